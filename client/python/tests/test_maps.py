@@ -46,6 +46,7 @@ from waymark.api import (
     Job,
     Parent,
     PoseBody,
+    Ros2Status,
     UploadedView,
     UploadedViews,
     VisibilitySettingsBody,
@@ -282,6 +283,7 @@ def test_a_robot_is_observed_and_its_camera_calibrated(server: Server, taught: s
             assert known.alive and known.conflict is None and known.map == taught
         assert maps.trajectories("observed").truth == ()
         assert not maps.relocalisation("observed").relocalising
+        assert maps.ros2_status("observed") == Ros2Status(False, {}, {}, {}), "a robot of the SDK"
         assert maps.corrections("observed").corrections == ()
         assert "observed" in {each.name for each in maps.robots()}
         report = maps.calibrate_camera(

@@ -130,6 +130,8 @@ def test_json_is_read_by_name_and_says_what_is_wrong() -> None:
     report |= {"reduced_chi2": 1, "orientations": 1, "aspect_ratio": 1, "warnings": [], "views": []}
     calibrated = from_json(api.CalibrationReport, report)
     assert (calibrated.fx_sigma_px, calibrated.cx_sigma_px) == (math.inf, 1.0), "null: nothing is known of it"
+    counted = {"configured": True, "received": {"scan": 7}, "sent": {}, "reasons": {"scan": {"no_transform": 2}}}
+    assert from_json(api.Ros2Status, counted).reasons["scan"]["no_transform"] == 2
     assert given(a=None, b=waymark.UNSET, c=Pose2()) == {"a": None, "c": {"x_m": 0.0, "y_m": 0.0, "theta_rad": 0.0}}
 
 

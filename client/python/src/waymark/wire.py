@@ -177,6 +177,16 @@ class LandmarkPose:
 
 
 @dataclass(frozen=True, slots=True)
+class CameraPose:
+    """Where a photograph was taken, with covariance over (rotation vector, position) in the map frame: 36 numbers.
+    `landmarks` are the one that gives the pose, then those that agree with it."""
+
+    map_from_camera: Pose3 | None = None
+    covariance: tuple[float, ...] = ()
+    landmarks: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class QuadAnswer:
     """A quad of the image, and what it was recognised as. `landmark` is set only for the verdict `unique`."""
 
@@ -266,6 +276,10 @@ class Answer:
     only_expected: bool = False
     # With gate_reprojection and gate_inconsistent: which number does not fit, and by how much.
     pose_refusal_detail: PoseRefusalDetail | None = None
+    # Only for a photograph that came with intrinsics and without a robot.
+    camera_pose: CameraPose | None = None
+    # Why recognised landmarks gave no pose of the camera; empty where they did.
+    camera_pose_refusal: str = ""
 
     def accepted(self) -> Answer:
         """This answer; raises `Refused` with the code and the field if the server refused the frame."""

@@ -149,6 +149,7 @@ class AsyncLandmarks(AsyncBase):
             job = await self.job(job.id)
 
     async def recognise(self, map: str, image: Picture, intrinsics: Intrinsics | None = None) -> Answer:
-        """Recognises the landmarks of one picture. Without intrinsics there is no pose."""
+        """Recognises the landmarks of one picture. Without intrinsics there is no pose; with them, `camera_pose` says
+        where it was taken, by landmarks of known size and place."""
         form = {"intrinsics": json.dumps(to_json(intrinsics))} if intrinsics is not None else {}
         return await self._send(Answer, "recognise", map, files=picture_part(image), data=form)

@@ -1,11 +1,11 @@
-"""Maps, their walls, and the server itself."""
+"""Maps, their walls and underlays, and the server itself."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
 from waymark._async.base import AsyncBase, AsyncEvents, AsyncStream
-from waymark._http import live_event
+from waymark._http import live_event, picture_part
 from waymark._values import UNSET, Unset, given, present, to_json
 from waymark.api import (
     CoverageResponse,
@@ -18,12 +18,15 @@ from waymark.api import (
     PoseBody,
     Readiness,
     TransformResponse,
+    Underlay,
+    UnderlayPlace,
     Version,
     VisibilitySettingsBody,
     VisibleResponse,
     WallBody,
     WallsBody,
 )
+from waymark.image import Picture
 from waymark.wire import GazeCriterion, Pose2
 
 
@@ -107,6 +110,23 @@ class AsyncMaps(AsyncBase):
     async def walls(self, map: str) -> WallsBody:
         """The walls, as stored."""
         return await self._send(WallsBody, "walls", map)
+
+    async def set_underlay(self, map: str, image: Picture, place: UnderlayPlace) -> Underlay:
+        """Replaces the picture that is shown under a map. It changes no answer to a robot."""
+        form = {name: repr(float(value)) for name, value in to_json(place).items()}
+        return await self._send(Underlay, "set_underlay", map, files=picture_part(image), data=form)
+
+    async def underlay(self, map: str) -> Underlay:
+        """Where the picture under a map lies; `Refused` with code `unknown_underlay` if there is none."""
+        return await self._send(Underlay, "underlay", map)
+
+    async def underlay_image(self, map: str) -> bytes:
+        """The picture under a map, as it was uploaded: PNG or JPEG."""
+        return await self._bytes("underlay_image", map)
+
+    async def delete_underlay(self, map: str) -> None:
+        """Deletes the picture under a map."""
+        await self._done("delete_underlay", map)
 
     async def visibility_settings(self, map: str) -> VisibilitySettingsBody:
         """The camera that visibility is computed for, and what counts as seen; every field is there."""

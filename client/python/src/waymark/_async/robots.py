@@ -25,6 +25,7 @@ from waymark.api import (
     ReferenceRunBody,
     RelocalisationStatus,
     Robot,
+    Ros2Status,
     TrackSummary,
     TrajectoriesBody,
     UploadedViews,
@@ -74,6 +75,10 @@ class AsyncRobots(AsyncBase):
     async def relocalisation(self, robot: str) -> RelocalisationStatus:
         """Pose hypotheses of a robot that observes nothing unique."""
         return await self._send(RelocalisationStatus, "relocalisation", robot)
+
+    async def ros2_status(self, robot: str) -> Ros2Status:
+        """What became of the messages of a robot of ROS 2."""
+        return await self._send(Ros2Status, "ros2_status", robot)
 
     async def trajectories(self, robot: str) -> TrajectoriesBody:
         """Recent trajectories of a robot, by source."""

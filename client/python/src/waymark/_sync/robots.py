@@ -26,6 +26,7 @@ from waymark.api import (
     ReferenceRunBody,
     RelocalisationStatus,
     Robot,
+    Ros2Status,
     TrackSummary,
     TrajectoriesBody,
     UploadedViews,
@@ -75,6 +76,10 @@ class Robots(Base):
     def relocalisation(self, robot: str) -> RelocalisationStatus:
         """Pose hypotheses of a robot that observes nothing unique."""
         return self._send(RelocalisationStatus, "relocalisation", robot)
+
+    def ros2_status(self, robot: str) -> Ros2Status:
+        """What became of the messages of a robot of ROS 2."""
+        return self._send(Ros2Status, "ros2_status", robot)
 
     def trajectories(self, robot: str) -> TrajectoriesBody:
         """Recent trajectories of a robot, by source."""

@@ -73,6 +73,28 @@ class WallsBody:
 
 
 @dataclass(frozen=True, slots=True)
+class UnderlayPlace:
+    """Where a picture lies in the map: side of a pixel, 0.0001 to 10; lower left corner of the lower left pixel; and
+    direction of the picture's rows."""
+
+    metres_per_pixel: float
+    x_m: float = 0.0
+    y_m: float = 0.0
+    theta_rad: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Underlay:
+    """A picture that is shown under a map, with its size as a viewer shows it; `image_kind` is `png` or `jpeg`."""
+
+    place: UnderlayPlace
+    width_px: int
+    height_px: int
+    image_kind: str
+    created_ms: int
+
+
+@dataclass(frozen=True, slots=True)
 class Job:
     """Long work. `progress` is 0 to 1; `message` says what it does, or why it failed."""
 

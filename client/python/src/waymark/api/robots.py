@@ -204,3 +204,15 @@ class CalibrationReport:
     warnings: tuple[str, ...]
     views: tuple[CalibrationViewReport, ...]
     linear_fx_px: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Ros2Status:
+    """What became of the messages of a robot of ROS 2 since the start of the server: messages received and sent by
+    topic, and those not used, or only in part, by topic and reason. Without `configured` the settings of the server do
+    not name the robot, and all else is empty."""
+
+    configured: bool
+    received: dict[str, int]
+    sent: dict[str, int]
+    reasons: dict[str, dict[str, int]]

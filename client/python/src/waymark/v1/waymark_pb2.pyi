@@ -283,6 +283,16 @@ class LandmarkPose(_message.Message):
     reprojection_rms_px: float
     def __init__(self, camera_from_landmark: _Optional[_Union[Pose3, _Mapping]] = ..., covariance: _Optional[_Iterable[float]] = ..., reprojection_rms_px: _Optional[float] = ...) -> None: ...
 
+class CameraPose(_message.Message):
+    __slots__ = ("map_from_camera", "covariance", "landmarks")
+    MAP_FROM_CAMERA_FIELD_NUMBER: _ClassVar[int]
+    COVARIANCE_FIELD_NUMBER: _ClassVar[int]
+    LANDMARKS_FIELD_NUMBER: _ClassVar[int]
+    map_from_camera: Pose3
+    covariance: _containers.RepeatedScalarFieldContainer[float]
+    landmarks: _containers.RepeatedScalarFieldContainer[str]
+    def __init__(self, map_from_camera: _Optional[_Union[Pose3, _Mapping]] = ..., covariance: _Optional[_Iterable[float]] = ..., landmarks: _Optional[_Iterable[str]] = ...) -> None: ...
+
 class QuadAnswer(_message.Message):
     __slots__ = ("corners", "kind", "score", "verdict", "landmark", "candidates", "entropy_m", "entropy_norm", "confidence", "pose", "second_pose", "pose_ambiguous", "pose_refusal", "points", "doubtful_landmark", "sighting", "guided_landmark")
     CORNERS_FIELD_NUMBER: _ClassVar[int]
@@ -366,7 +376,7 @@ class Hypothesis(_message.Message):
     def __init__(self, probability: _Optional[float] = ..., map_from_robot: _Optional[_Union[Pose2Covariance, _Mapping]] = ...) -> None: ...
 
 class Answer(_message.Message):
-    __slots__ = ("epoch", "seq", "captured_ns", "map", "map_version", "status", "rejection", "quads", "map_from_robot", "pose_landmarks", "latency_ms", "timings", "clock_suspect", "pose_refusal", "hypotheses", "guided_map_from_robot", "guided_landmarks", "only_expected", "pose_refusal_detail")
+    __slots__ = ("epoch", "seq", "captured_ns", "map", "map_version", "status", "rejection", "quads", "map_from_robot", "pose_landmarks", "latency_ms", "timings", "clock_suspect", "pose_refusal", "hypotheses", "guided_map_from_robot", "guided_landmarks", "only_expected", "pose_refusal_detail", "camera_pose", "camera_pose_refusal")
     EPOCH_FIELD_NUMBER: _ClassVar[int]
     SEQ_FIELD_NUMBER: _ClassVar[int]
     CAPTURED_NS_FIELD_NUMBER: _ClassVar[int]
@@ -386,6 +396,8 @@ class Answer(_message.Message):
     GUIDED_LANDMARKS_FIELD_NUMBER: _ClassVar[int]
     ONLY_EXPECTED_FIELD_NUMBER: _ClassVar[int]
     POSE_REFUSAL_DETAIL_FIELD_NUMBER: _ClassVar[int]
+    CAMERA_POSE_FIELD_NUMBER: _ClassVar[int]
+    CAMERA_POSE_REFUSAL_FIELD_NUMBER: _ClassVar[int]
     epoch: int
     seq: int
     captured_ns: int
@@ -405,7 +417,9 @@ class Answer(_message.Message):
     guided_landmarks: _containers.RepeatedScalarFieldContainer[str]
     only_expected: bool
     pose_refusal_detail: PoseRefusalDetail
-    def __init__(self, epoch: _Optional[int] = ..., seq: _Optional[int] = ..., captured_ns: _Optional[int] = ..., map: _Optional[str] = ..., map_version: _Optional[int] = ..., status: _Optional[_Union[Status, str]] = ..., rejection: _Optional[_Union[Rejection, _Mapping]] = ..., quads: _Optional[_Iterable[_Union[QuadAnswer, _Mapping]]] = ..., map_from_robot: _Optional[_Union[Pose2Covariance, _Mapping]] = ..., pose_landmarks: _Optional[_Iterable[str]] = ..., latency_ms: _Optional[float] = ..., timings: _Optional[_Iterable[_Union[StageTime, _Mapping]]] = ..., clock_suspect: bool = ..., pose_refusal: _Optional[str] = ..., hypotheses: _Optional[_Iterable[_Union[Hypothesis, _Mapping]]] = ..., guided_map_from_robot: _Optional[_Union[Pose2Covariance, _Mapping]] = ..., guided_landmarks: _Optional[_Iterable[str]] = ..., only_expected: bool = ..., pose_refusal_detail: _Optional[_Union[PoseRefusalDetail, _Mapping]] = ...) -> None: ...
+    camera_pose: CameraPose
+    camera_pose_refusal: str
+    def __init__(self, epoch: _Optional[int] = ..., seq: _Optional[int] = ..., captured_ns: _Optional[int] = ..., map: _Optional[str] = ..., map_version: _Optional[int] = ..., status: _Optional[_Union[Status, str]] = ..., rejection: _Optional[_Union[Rejection, _Mapping]] = ..., quads: _Optional[_Iterable[_Union[QuadAnswer, _Mapping]]] = ..., map_from_robot: _Optional[_Union[Pose2Covariance, _Mapping]] = ..., pose_landmarks: _Optional[_Iterable[str]] = ..., latency_ms: _Optional[float] = ..., timings: _Optional[_Iterable[_Union[StageTime, _Mapping]]] = ..., clock_suspect: bool = ..., pose_refusal: _Optional[str] = ..., hypotheses: _Optional[_Iterable[_Union[Hypothesis, _Mapping]]] = ..., guided_map_from_robot: _Optional[_Union[Pose2Covariance, _Mapping]] = ..., guided_landmarks: _Optional[_Iterable[str]] = ..., only_expected: bool = ..., pose_refusal_detail: _Optional[_Union[PoseRefusalDetail, _Mapping]] = ..., camera_pose: _Optional[_Union[CameraPose, _Mapping]] = ..., camera_pose_refusal: _Optional[str] = ...) -> None: ...
 
 class Odometry(_message.Message):
     __slots__ = ("epoch", "seq", "captured_ns", "odom_from_robot")
