@@ -36,8 +36,11 @@ fn first_pose_leads_to_the_pose_of_a_photograph() {
     let truth = guide_files::map_from_camera("here.jpg").translation;
     let found =
         ["x_m", "y_m", "z_m"].map(|k| pose[k].as_f64().unwrap_or_else(|| panic!("no pose: {answer}")));
-    let off = (0..3).map(|i| (found[i] - truth.vector[i]).powi(2)).sum::<f64>().sqrt();
-    assert!(off < 0.15, "{found:?}, truth {truth}: off by {off} m");
+    let variance = |k: usize| answer["camera_pose"]["covariance"][7 * (k + 3)].as_f64().expect("a variance");
+    let off: Vec<f64> = (0..3).map(|k| found[k] - truth.vector[k]).collect();
+    let metres = off.iter().map(|d| d * d).sum::<f64>().sqrt();
+    let sigmas = (0..3).map(|k| off[k].abs() / variance(k).sqrt()).fold(0.0, f64::max);
+    assert!(metres < 0.1 && sigmas < 4.0, "{found:?}, truth {truth}: off by {metres} m, {sigmas} sigma");
 }
 
 #[test]
@@ -78,6 +81,16 @@ fn the_commands_of_deploy_work() {
 #[test]
 fn the_commands_of_the_command_line_work() {
     run("command-line");
+}
+
+#[test]
+fn the_commands_of_record_and_replay_work() {
+    run("record-replay");
+}
+
+#[test]
+fn the_commands_of_evaluate_on_your_photographs_work() {
+    run("evaluate-on-your-photographs");
 }
 
 #[test]

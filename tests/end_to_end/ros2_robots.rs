@@ -211,6 +211,7 @@ async fn a_robot_behind_a_dds_bridge_is_served_on_its_topics() {
         (robot["alive"] == true).then_some(())
     };
     eventually("the robot is there", is_there).await;
+    run.is_heard().await;
     drive(&mut run, ["", ""], false).await;
     for (stamp_ns, pose) in poses(&run.ros, "/waymark/pose", 1).await {
         was_published(&run, stamp_ns, &pose).await;

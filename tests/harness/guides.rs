@@ -196,7 +196,7 @@ impl Guide {
     }
 
     fn command(&mut self, command: &str, status: i32, at: &str) {
-        if command.starts_with("waymark serve") && !command.contains("--help") {
+        if command == "waymark serve" || command.starts_with("waymark serve ") {
             return self.serve(command, at);
         }
         let limited = format!("timeout {} bash -euo pipefail -c {}", LONGEST.as_secs(), quoted(command));

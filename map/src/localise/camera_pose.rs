@@ -1,4 +1,4 @@
-//! The pose in space of a camera that is held in a hand, from the landmarks of one photograph (method 13.7). In:
+//! The pose in space of a camera that is held in a hand, from the landmarks of one photograph (method 13.8). In:
 //! observations of landmarks of known place. Out: `map_from_camera` with its covariance, or why there is none.
 //!
 //! Nothing is assumed of the mounting: one landmark alone determines the pose. The landmark that determines it best gives
@@ -71,9 +71,8 @@ fn decide(observations: &[LandmarkObservation<'_>]) -> Result<CameraPose, Camera
         all.push((observation.landmark, candidates));
     }
     // The best known position first; stable, so equal ones stay in order.
-    let spread = |c: &[Candidate]| {
-        c.iter().map(|c| c.covariance.fixed_view::<3, 3>(3, 3).trace()).fold(0.0, f64::max)
-    };
+    let spread =
+        |c: &[Candidate]| c.iter().map(|c| c.covariance.fixed_view::<3, 3>(3, 3).trace()).fold(0.0, f64::max);
     all.sort_by(|(_, a), (_, b)| spread(a).total_cmp(&spread(b)));
     let landmarks = all.iter().map(|(landmark, _)| *landmark).collect();
     let mut all = all.into_iter().map(|(_, candidates)| candidates);

@@ -46,7 +46,9 @@ fn image(robot: &Name, camera: &Name, frame: &mut v1::Frame, at: Timestamp) -> O
     let format = match frame.encoding() {
         v1::ImageEncoding::Jpeg => "jpeg",
         v1::ImageEncoding::Png => "png",
-        v1::ImageEncoding::Gray8 => return Some(Shown::new(topic, RAW, &raw(frame, frame_id, at, "mono8", 1))),
+        v1::ImageEncoding::Gray8 => {
+            return Some(Shown::new(topic, RAW, &raw(frame, frame_id, at, "mono8", 1)));
+        }
         v1::ImageEncoding::Rgb8 => return Some(Shown::new(topic, RAW, &raw(frame, frame_id, at, "rgb8", 3))),
         v1::ImageEncoding::Bgr8 => return Some(Shown::new(topic, RAW, &raw(frame, frame_id, at, "bgr8", 3))),
         v1::ImageEncoding::Unspecified => return None,

@@ -194,6 +194,14 @@ pub(super) struct Run {
     pub(super) odometry: Vec<(i64, Pose2)>,
 }
 
+const TOPICS: [(&str, TypeOfMessage); 5] = [
+    ("/tf", TF_MESSAGE),
+    ("/odom", ODOMETRY),
+    ("/scan", LASER_SCAN),
+    (CALIBRATION, CAMERA_INFO),
+    (IMAGES, COMPRESSED_IMAGE),
+];
+
 impl Run {
     pub(super) async fn start(speech: Speech, change: impl FnOnce(&mut RawRos2Robot)) -> Self {
         let (bridge, domain, key_prefix) = match speech {
@@ -224,15 +232,22 @@ impl Run {
         let laser = RobotParams::default().laser.robot_from_laser.to_isometry3();
         let fixed = transform(1, "laser", &laser);
         self.ros.keep("/tf_static", TF_MESSAGE, fixed.encode()).await;
-        let topics = [
-            ("/tf", TF_MESSAGE),
-            ("/odom", ODOMETRY),
-            ("/scan", LASER_SCAN),
-            (CALIBRATION, CAMERA_INFO),
-            (IMAGES, COMPRESSED_IMAGE),
-        ];
-        for (topic, kind) in topics {
+        for (topic, kind) in TOPICS {
             self.ros.declare("MP", topic, kind).await;
+        }
+    }
+
+    /// Waits until the robot's session knows the server's subscriptions: a message before that reaches nobody. Empty
+    /// messages are sent, which the server counts and refuses.
+    pub(super) async fn is_heard(&self) {
+        for (topic, kind) in TOPICS {
+            let key = self.ros.key(topic, kind);
+            let counted = || async {
+                self.ros.put_raw(&key, Vec::new(), None).await;
+                tokio::time::sleep(Duration::from_millis(50)).await;
+                self.status().await.received.get(topic).filter(|count| **count > 0).map(|_| ())
+            };
+            eventually("a message of each topic is counted", counted).await;
         }
     }
 

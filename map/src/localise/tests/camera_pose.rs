@@ -81,9 +81,8 @@ fn an_ambiguous_photograph_gives_no_pose_unless_another_landmark_decides() {
         if !a.ambiguous {
             continue;
         }
-        refused += usize::from(
-            camera_pose(&[seen(1, &a, &place)]).unwrap() == Err(CameraPoseRefusal::Ambiguous),
-        );
+        refused +=
+            usize::from(camera_pose(&[seen(1, &a, &place)]).unwrap() == Err(CameraPoseRefusal::Ambiguous));
         if let Ok(found) = camera_pose(&[seen(1, &a, &place), seen(2, &b, &beside)]).unwrap() {
             decided += 1;
             assert!(error(&found, &truth).rows(3, 3).norm() < 1.0, "{found:?}");
