@@ -62,6 +62,7 @@ const OPTIONS: [(&str, &[&str], &[&str]); 45] = [
             "<MAP>",
             "<FILE>",
             "--dry-run",
+            "--no-underlay",
             "--yes",
             "--min-length-m",
             "--metres-per-unit",
