@@ -14,7 +14,7 @@ const SERVER: &[&str] = &["--server", "--json"];
 const MAP: &[&str] = &["--map", "--server", "--json"];
 
 /// Options that each command must name in its help, beside those of its group.
-const OPTIONS: [(&str, &[&str], &[&str]); 45] = [
+const OPTIONS: [(&str, &[&str], &[&str]); 47] = [
     ("", &[], &["--log", "--version", "Exit status"]),
     ("demo", &[], &["--robots", "--rate-hz", "--legs", "--seed", "--http", "--data", "--stay", "--json"]),
     ("serve", &[], &["--config", "--data", "--http", "--zenoh", "--fleet", "--workers", "--insecure"]),
@@ -38,6 +38,22 @@ const OPTIONS: [(&str, &[&str], &[&str]); 45] = [
             "--remove-tiling",
             "--set",
             "[IMAGES]",
+        ],
+    ),
+    ("record", SERVER, &["<FILE>", "--robot", "--seconds", "--zenoh", "--fleet"]),
+    (
+        "replay",
+        SERVER,
+        &[
+            "<FILE>",
+            "--robot",
+            "--recorded",
+            "--map",
+            "--speed",
+            "--answers",
+            "--compare",
+            "--zenoh",
+            "--fleet",
         ],
     ),
     ("recognise", MAP, &["--camera", "<PHOTO>"]),

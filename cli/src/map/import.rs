@@ -134,9 +134,10 @@ async fn on_server(
     picture: Option<&Underlay>,
 ) -> anyhow::Result<(Difference, Outcome)> {
     let also_underlay = picture.is_some() && underlay::is_there(session, &args.map).await?;
-    let replacing = match args.dry_run {
-        true => Replacing::DryRun,
-        false => Replacing::With { consent: args.consent, also_underlay },
+    let replacing = if args.dry_run {
+        Replacing::DryRun
+    } else {
+        Replacing::With { consent: args.consent, also_underlay }
     };
     let difference = replace(session, &args.map, walls, replacing).await?;
     let outcome = match picture {
