@@ -125,6 +125,12 @@ impl Failure {
                     "Start one with `waymark serve`, or name its address with --server or WAYMARK_SERVER.",
                 )
             }
+            ClientError::Unreachable { endpoint, .. } => Self::new(
+                Class::Unreachable,
+                "unreachable",
+                format!("No server answers at {endpoint} (zenoh)."),
+            )
+            .advise("Start one with `waymark serve`, or name its endpoint with --zenoh or WAYMARK_ZENOH."),
             other => Self::new(Class::Failed, "failed", other.to_string()),
         }
     }
@@ -159,6 +165,7 @@ mod tests {
             (refused(503, "busy"), 1),
             (Failure::usage("no").into(), 2),
             (ClientError::Http { url: "http://x".into(), detail: String::new() }.into(), 6),
+            (ClientError::Unreachable { endpoint: "tcp/x:1".into(), detail: String::new() }.into(), 6),
             (anyhow::anyhow!("else"), 1),
         ] {
             let failure = Failure::of(&error);

@@ -23,8 +23,13 @@ struct Desk {
 
 impl Desk {
     fn new() -> Self {
+        Self::with(&[])
+    }
+
+    /// The server has these settings, as environment variables.
+    fn with(settings: &[(&str, &str)]) -> Self {
         let folder = TempDir::new().expect("a temporary directory");
-        Self { server: Child::start(&folder.path().join("data")), folder }
+        Self { server: Child::start_with(&folder.path().join("data"), settings), folder }
     }
 
     fn path(&self, name: &str) -> String {
@@ -247,5 +252,58 @@ async fn a_landmark_that_looks_like_an_active_one_is_refused_with_its_name() {
     assert_eq!(first.status, LandmarkStatus::Active, "the one in use stays as it is");
     let shown = desk.done("landmark show copy");
     assert!(shown.contains("copy: not in use") && shown.contains("`first`"), "{shown}");
+    desk.server.kill();
+}
+
+/// A room of 3 m by 2 m as a grid of `map_server`.
+fn write_grid(yaml: &str) {
+    let (width, height) = (60, 40);
+    let mut pgm = format!("P5 {width} {height} 255\n").into_bytes();
+    for (v, u) in (0..height).flat_map(|v| (0..width).map(move |u| (v, u))) {
+        let is_wall = v < 2 || u < 2 || v >= height - 2 || u >= width - 2;
+        pgm.push(if is_wall { 0 } else { 254 });
+    }
+    fs::write(Path::new(yaml).with_file_name("floor.pgm"), pgm).expect("a picture");
+    let text = "image: floor.pgm\nresolution: 0.05\norigin: [-1.0, 2.0, 0.0]\nnegate: 0\noccupied_thresh: 0.65\n\
+                free_thresh: 0.196\n";
+    fs::write(yaml, text).expect("a grid");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_picture_of_a_grid_becomes_the_underlay() {
+    let desk = Desk::new();
+    desk.done("map create office");
+    let yaml = desk.path("floor.yaml");
+    write_grid(&yaml);
+    let import = format!("map import office {yaml}");
+    let dry = desk.done(&format!("{import} --dry-run"));
+    assert!(dry.contains("(60 x 40 px) would become the underlay") && dry.contains("Nothing"), "{dry}");
+    let without: Value =
+        serde_json::from_str(&desk.done(&format!("{import} --no-underlay --json"))).expect("JSON");
+    assert_eq!(without["underlay"], Value::Null);
+    desk.server.maps().underlay("office").await.expect_err("neither has uploaded it");
+    let result: Value = serde_json::from_str(&desk.done(&format!("{import} --yes --json"))).expect("JSON");
+    assert_eq!(result["underlay"]["changed"], true, "{result}");
+    let underlay = desk.server.maps().underlay("office").await.expect("an underlay");
+    assert_eq!((underlay.width_px, underlay.height_px), (60, 40));
+    assert_eq!((underlay.place.metres_per_pixel, underlay.place.x_m, underlay.place.y_m), (0.05, -1.0, 2.0));
+    assert!(desk.failed(&import, 2, "not_confirmed").contains("Replace its walls and its underlay?"));
+    desk.server.kill();
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn walls_are_imported_where_the_picture_is_too_large() {
+    let desk = Desk::with(&[("WAYMARK_LIMITS__UPLOAD_PIXELS", "1000")]);
+    desk.done("map create office");
+    let yaml = desk.path("floor.yaml");
+    write_grid(&yaml);
+    let refused = desk.done(&format!("map import office {yaml}"));
+    assert!(refused.contains("(60 x 40 px) is not the underlay: "), "{refused}");
+    let result = desk.done(&format!("map import office {yaml} --yes --json"));
+    let result: Value = serde_json::from_str(&result).expect("JSON");
+    let underlay = &result["underlay"];
+    assert_eq!((&underlay["changed"], &underlay["refusal"]["code"]), (&false.into(), &"too_large".into()));
+    assert!(!desk.server.maps().walls("office").await.expect("walls").segments.is_empty());
+    desk.server.maps().underlay("office").await.expect_err("none");
     desk.server.kill();
 }

@@ -14,7 +14,7 @@ const SERVER: &[&str] = &["--server", "--json"];
 const MAP: &[&str] = &["--map", "--server", "--json"];
 
 /// Options that each command must name in its help, beside those of its group.
-const OPTIONS: [(&str, &[&str], &[&str]); 45] = [
+const OPTIONS: [(&str, &[&str], &[&str]); 47] = [
     ("", &[], &["--log", "--version", "Exit status"]),
     ("demo", &[], &["--robots", "--rate-hz", "--legs", "--seed", "--http", "--data", "--stay", "--json"]),
     ("serve", &[], &["--config", "--data", "--http", "--zenoh", "--fleet", "--workers", "--insecure"]),
@@ -40,6 +40,22 @@ const OPTIONS: [(&str, &[&str], &[&str]); 45] = [
             "[IMAGES]",
         ],
     ),
+    ("record", SERVER, &["<FILE>", "--robot", "--seconds", "--zenoh", "--fleet"]),
+    (
+        "replay",
+        SERVER,
+        &[
+            "<FILE>",
+            "--robot",
+            "--recorded",
+            "--map",
+            "--speed",
+            "--answers",
+            "--compare",
+            "--zenoh",
+            "--fleet",
+        ],
+    ),
     ("recognise", MAP, &["--camera", "<PHOTO>"]),
     ("completions", &[], &["<SHELL>", "bash", "fish"]),
     ("man", &[], &["<FOLDER>"]),
@@ -62,6 +78,7 @@ const OPTIONS: [(&str, &[&str], &[&str]); 45] = [
             "<MAP>",
             "<FILE>",
             "--dry-run",
+            "--no-underlay",
             "--yes",
             "--min-length-m",
             "--metres-per-unit",

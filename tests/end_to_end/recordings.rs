@@ -100,12 +100,16 @@ fn write_recording(path: &Path, readings: &[SensorReadings]) {
     writer.finish().expect("finished");
 }
 
-/// `waymark COMMAND FILE ...` against this server.
+/// `waymark COMMAND FILE ...` against this server, unless the options name another.
 fn run(inside: &Inside, command: &str, file: &Path, options: &[&str]) -> Run {
     let (url, zenoh) = (inside.url(), inside.server.zenoh_endpoint.clone());
-    let file = file.to_str().expect("a path").to_owned();
-    let fixed = [command, &file, "--json", "--server", &url, "--zenoh", &zenoh];
-    waymark(fixed.into_iter().chain(options.iter().copied()), LONGEST)
+    let mut line = vec![command, file.to_str().expect("a path"), "--json"];
+    for (option, value) in [("--server", url.as_str()), ("--zenoh", zenoh.as_str())] {
+        if !options.contains(&option) {
+            line.extend([option, value]);
+        }
+    }
+    waymark(line.iter().chain(options), LONGEST)
 }
 
 fn count(summary: &Value, pointer: &str) -> u64 {
@@ -169,6 +173,43 @@ async fn a_drive_is_recorded_replayed_and_compared() {
     assert!(count(&summary, "/comparison/counts/lost") > 0, "{summary}");
     let versions = &summary["comparison"]["map_versions"];
     assert!(versions[0] != versions[1], "two versions of the map: {summary}");
+    inside.server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn failures_have_the_statuses_and_the_json_of_all_commands() {
+    let inside = Inside::start(Limits::default()).await;
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| folder.path().join(name);
+    let robot = Name::new("r1").expect("a name");
+    let file = File::create_new(at("drive.mcap")).expect("a file");
+    let mut writer =
+        DriveWriter::create(file, &Name::new("default").expect("a name"), "test").expect("begun");
+    let odom_from_robot = Some(pose2_wire(&Pose2::default()));
+    let odometry = v1::Odometry { epoch: 1, seq: 1, captured_ns: START_NS, odom_from_robot };
+    let (key, body) = (Key::Odometry(robot), Body::Odometry(odometry));
+    writer.write(Recorded { log_time_ns: START_NS.unsigned_abs(), key, body }).expect("written");
+    writer.finish().expect("finished");
+
+    let nobody = ["--server", "http://127.0.0.1:1"];
+    let (drive, new, missing) = (at("drive.mcap"), at("new.mcap"), at("missing.mcap"));
+    let cases: [(&str, &Path, &[&str], i32, &str); 8] = [
+        ("record", &new, &nobody, 6, "unreachable"),
+        ("record", &new, &["--zenoh", "tcp/127.0.0.1:1"], 6, "unreachable"),
+        ("record", &new, &["--seconds=-1"], 2, "usage"),
+        ("record", &drive, &["--seconds", "1"], 4, "exists"),
+        ("replay", &missing, &[], 2, "unreadable"),
+        ("replay", &drive, &["--map", "nowhere"], 3, "unknown_map"),
+        ("replay", &drive, &["--recorded", "r2"], 3, "not_recorded"),
+        ("replay", &drive, &["--zenoh", "tcp/127.0.0.1:1"], 6, "unreachable"),
+    ];
+    for (command, file, options, status, code) in cases {
+        let failed = run(&inside, command, file, options);
+        let error: Value = serde_json::from_str(&failed.stderr).unwrap_or_else(|e| panic!("{e}: {failed:?}"));
+        assert_eq!((failed.status, &error["error"]["code"]), (status, &json!(code)), "{failed:?}");
+        assert_eq!((&error["error"]["exit_status"], failed.stdout.as_str()), (&json!(status), ""));
+    }
+    assert!(!new.exists(), "a recording that did not begin leaves no file");
     inside.server.stop().await;
 }
 

@@ -10,6 +10,7 @@ use super::{
     scratch, screen,
 };
 use anyhow::Context as _;
+use client::MapClient;
 use protos::Name;
 use server::{
     RunningServer, Server,
@@ -119,7 +120,7 @@ async fn recording(
     let Some(file) = &args.record else { return Ok(None) };
     let options = RecorderOptions {
         file: file.clone(),
-        server: format!("http://{}", server.http_addr),
+        server: MapClient::new(&format!("http://{}", server.http_addr))?,
         zenoh: server.zenoh_endpoint.clone(),
         fleet: Name::new(FLEET)?,
         maps: vec![MAP.to_owned()],

@@ -107,7 +107,7 @@ pub(crate) async fn run(args: &Args) -> anyhow::Result<()> {
     let difference = match &args.upload.into {
         None => None,
         Some(name) => {
-            let replacing = import::Replacing::With(args.upload.consent);
+            let replacing = import::Replacing::With { consent: args.upload.consent, also_underlay: false };
             let done = import::replace(&session, name, &import::body(&file), replacing).await;
             Some(session.explained(done).await?)
         }

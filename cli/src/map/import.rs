@@ -1,6 +1,10 @@
-//! `waymark map import`: the walls of a map from another program's file, with the difference before anything changes.
+//! `waymark map import`: the walls and the underlay of a map from another program's file, with the difference before
+//! anything changes.
 
-use super::difference::Difference;
+use super::{
+    difference::Difference,
+    underlay::{self, Outcome},
+};
 use crate::{
     screen,
     session::{Consent, ServerArgs, Session},
@@ -9,7 +13,7 @@ use anyhow::Context as _;
 use client::api::WallsBody;
 use formats::{
     map_svg,
-    walls::{self, GridReport, ImportOptions, ImportReport, Imported, MapFile},
+    walls::{self, GridReport, ImportOptions, ImportReport, Imported, MapFile, Underlay},
 };
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -24,6 +28,9 @@ pub(crate) struct ImportArgs {
     /// Show what would change, and change nothing.
     #[arg(long)]
     dry_run: bool,
+    /// Leave out a grid's picture, which else becomes the map's underlay.
+    #[arg(long)]
+    no_underlay: bool,
     #[command(flatten)]
     consent: Consent,
     #[command(flatten)]
@@ -107,14 +114,38 @@ pub(super) async fn run(args: &ImportArgs) -> anyhow::Result<()> {
     let imported = args.source.read()?;
     let session = args.server.session()?;
     session.note(&format!("{}: {}", args.source.file.display(), sentence(&imported.report)));
-    let consent = if args.dry_run { Replacing::DryRun } else { Replacing::With(args.consent) };
-    let done = replace(&session, &args.map, &body(&imported.map), consent).await;
-    let difference = session.explained(done).await?;
+    let picture = imported.underlay.as_ref().filter(|_| !args.no_underlay);
+    let done = on_server(&session, args, &body(&imported.map), picture).await;
+    let (difference, outcome) = session.explained(done).await?;
     let result = json!({
         "map": args.map, "changed": !args.dry_run, "difference": difference, "file": summary(&imported.report),
+        "underlay": outcome.to_json(picture),
     });
     let nothing = if args.dry_run { "\nNothing was changed (--dry-run)." } else { "" };
-    session.show(&result, &format!("{}: {difference}{nothing}", args.map))
+    let underlay = outcome.sentence(picture);
+    session.show(&result, &format!("{}: {difference}{underlay}{nothing}", args.map))
+}
+
+/// Replaces walls, then the underlay if there is a picture; one consent is for both.
+async fn on_server(
+    session: &Session,
+    args: &ImportArgs,
+    walls: &WallsBody,
+    picture: Option<&Underlay>,
+) -> anyhow::Result<(Difference, Outcome)> {
+    let also_underlay = picture.is_some() && underlay::is_there(session, &args.map).await?;
+    let replacing = if args.dry_run {
+        Replacing::DryRun
+    } else {
+        Replacing::With { consent: args.consent, also_underlay }
+    };
+    let difference = replace(session, &args.map, walls, replacing).await?;
+    let outcome = match picture {
+        None => Outcome::Absent,
+        Some(_) if args.dry_run => Outcome::DryRun,
+        Some(picture) => underlay::upload(session, &args.map, picture).await?,
+    };
+    Ok((difference, outcome))
 }
 
 /// Whether walls are replaced.
@@ -123,7 +154,11 @@ pub(super) enum Replacing {
     /// They stay; only the difference is computed.
     DryRun,
     /// They are replaced, by this consent if there are any.
-    With(Consent),
+    With {
+        consent: Consent,
+        /// Whether the consent is also to another underlay in the place of the one that is there.
+        also_underlay: bool,
+    },
 }
 
 /// Replaces the walls of a map; asks with the difference if there are walls already. Gives the difference.
@@ -134,9 +169,15 @@ pub(super) async fn replace(
     replacing: Replacing,
 ) -> anyhow::Result<Difference> {
     let difference = Difference::of(&session.maps().walls(map).await?, walls);
-    if let Replacing::With(consent) = replacing {
-        if difference.old_segments > 0 {
-            consent.ask(&format!("{map}: {difference}. Replace its walls?"))?;
+    if let Replacing::With { consent, also_underlay } = replacing {
+        let old = match (difference.old_segments > 0, also_underlay) {
+            (true, true) => Some("walls and its underlay"),
+            (true, false) => Some("walls"),
+            (false, true) => Some("underlay"),
+            (false, false) => None,
+        };
+        if let Some(old) = old {
+            consent.ask(&format!("{map}: {difference}. Replace its {old}?"))?;
         }
         session.maps().set_walls(map, walls).await?;
     }

@@ -7,6 +7,7 @@ mod export;
 mod fusion;
 mod import;
 mod location;
+mod underlay;
 mod visibility;
 mod walls;
 
@@ -93,7 +94,8 @@ enum Verb {
     },
     /// Set a map's walls from a ROS occupancy grid, a floor plan, a vector map or a map file
     ///
-    /// If the map has walls, the difference is shown first and you are asked. For example:
+    /// If the map has walls, the difference is shown first and you are asked. The picture of a grid becomes the map's
+    /// underlay. For example:
     ///   waymark map import office floor.yaml --dry-run
     ///   waymark map import office plan.geojson --yes
     #[command(verbatim_doc_comment)]

@@ -4,8 +4,7 @@ use super::{
     Endpoints,
     recorder::{Recorder, RecorderOptions},
 };
-use crate::screen;
-use anyhow::Context as _;
+use crate::{failure::Failure, session::Session};
 use client::protos::Name;
 use std::{path::PathBuf, time::Duration};
 
@@ -20,26 +19,30 @@ pub(crate) struct Args {
     /// End after so many seconds [default: with Ctrl-C].
     #[arg(long, value_name = "SECONDS")]
     seconds: Option<f64>,
-    /// End with the counts as one JSON object.
-    #[arg(long)]
-    json: bool,
     #[command(flatten)]
     endpoints: Endpoints,
 }
 
 /// Records until it is told to end.
 pub(crate) async fn run(args: &Args) -> anyhow::Result<()> {
-    let longest = args.seconds.map(Duration::try_from_secs_f64).transpose().context("--seconds")?;
+    let session = args.endpoints.server.session()?;
+    let done = record(&session, args).await;
+    session.explained(done).await
+}
+
+async fn record(session: &Session, args: &Args) -> anyhow::Result<()> {
+    let longest = args.seconds.map(Duration::try_from_secs_f64).transpose();
+    let longest = longest.map_err(|error| Failure::usage(format!("--seconds: {error}.")))?;
     let options = RecorderOptions {
         file: args.file.clone(),
-        server: args.endpoints.server.clone(),
+        server: session.maps().clone(),
         zenoh: args.endpoints.zenoh.clone(),
         fleet: args.endpoints.fleet.clone(),
         robots: args.robot.clone(),
         maps: Vec::new(),
     };
     let recorder = Recorder::start(&options).await?;
-    screen::complain(&format!("Recording to {}; end with Ctrl-C.", args.file.display()));
+    session.note(&format!("Recording to {}; end with Ctrl-C.", args.file.display()));
     let end = async {
         match longest {
             Some(longest) => tokio::time::sleep(longest).await,
@@ -47,10 +50,5 @@ pub(crate) async fn run(args: &Args) -> anyhow::Result<()> {
         }
     };
     let report = recorder.run(end).await?;
-    if args.json {
-        screen::say(&serde_json::to_string(&report)?);
-    } else {
-        screen::say(&report.sentence(&args.file));
-    }
-    Ok(())
+    session.show(&report, &report.sentence(&args.file))
 }

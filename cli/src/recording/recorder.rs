@@ -1,9 +1,8 @@
 //! Writes what a fleet sends into a file until it is told to end. In: messages of the SDK's listener, walls and landmarks
 //! over HTTP. Out: an MCAP file, and counts.
 
-use super::PROGRAM;
+use super::{PROGRAM, new_file};
 use crate::screen;
-use anyhow::Context as _;
 use client::{
     FleetListener, ListenedMessage, MapClient,
     protos::{Key, Name},
@@ -31,8 +30,8 @@ const MAP_EVERY: Duration = Duration::from_secs(2);
 pub(crate) struct RecorderOptions {
     /// The file; it must not exist.
     pub(crate) file: PathBuf,
-    /// Address of the HTTP interface.
-    pub(crate) server: String,
+    /// The HTTP interface.
+    pub(crate) server: MapClient,
     /// Endpoint of zenoh.
     pub(crate) zenoh: String,
     /// The fleet.
@@ -92,7 +91,7 @@ pub(crate) struct Recorder {
 impl Recorder {
     /// Connects, makes the file, and writes the maps of the robots.
     pub(crate) async fn start(options: &RecorderOptions) -> anyhow::Result<Self> {
-        let maps = MapClient::new(&options.server)?;
+        let maps = options.server.clone();
         let robots = maps.robots().await?;
         let is_wanted =
             |name: &str| options.robots.is_empty() || options.robots.iter().any(|r| r.as_str() == name);
@@ -100,8 +99,7 @@ impl Recorder {
         let changed_maps = of_robots.chain(options.maps.iter().cloned()).collect();
         let listener =
             FleetListener::connect(&options.zenoh, &options.fleet, &options.robots, CONNECT_TIMEOUT).await?;
-        let file = File::create_new(&options.file)
-            .with_context(|| format!("cannot make {}", options.file.display()))?;
+        let file = new_file(&options.file)?;
         let writer = DriveWriter::create(BufWriter::new(file), &options.fleet, PROGRAM)?;
         let mut recorder =
             Self { listener, writer, maps, written_maps: BTreeMap::new(), changed_maps, malformed: 0 };

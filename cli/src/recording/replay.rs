@@ -1,13 +1,16 @@
 //! `waymark replay`: plays a recording or a bag of ROS 2 into a server, as a robot, and compares the answers.
 
 use super::{
-    Endpoints, PROGRAM,
+    Endpoints, PROGRAM, new_file,
     player::{Player, PlayerOptions},
     report::{ReplayReport, table},
 };
-use crate::screen;
-use anyhow::{Context as _, bail};
-use client::{MapClient, protos::Name};
+use crate::{
+    failure::{Class, Failure},
+    session::Session,
+};
+use anyhow::Context as _;
+use client::protos::Name;
 use recordings::{
     BagRobot, Body, DriveReader, DriveWriter, bag,
     compare::Play,
@@ -47,9 +50,6 @@ pub(crate) struct Args {
     #[arg(long, value_name = "OTHER", num_args = 0..=1)]
     #[allow(clippy::option_option, reason = "clap's form of an option with an optional value")]
     compare: Option<Option<PathBuf>>,
-    /// End with the counts as one JSON object.
-    #[arg(long)]
-    json: bool,
     #[command(flatten)]
     bag: BagArgs,
     #[command(flatten)]
@@ -86,17 +86,23 @@ fn speed(text: &str) -> Result<f64, String> {
 
 /// Plays a file.
 pub(crate) async fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    let session = args.endpoints.server.session()?;
+    let done = replay(&session, args).await;
+    session.explained(done).await
+}
+
+async fn replay(session: &Session, args: &Args) -> anyhow::Result<ExitCode> {
     let (robot, recorded, bag) = tokio::task::block_in_place(|| robots(args))?;
     if let Some(map) = &args.map {
-        MapClient::new(&args.endpoints.server)?.put_robot(robot.as_str(), map.as_str()).await?;
+        session.maps().put_robot(robot.as_str(), map.as_str()).await?;
     }
     let before = match &args.compare {
         Some(Some(other)) => Some(tokio::task::block_in_place(|| play_of(other, &recorded))?),
         _ => None,
     };
     let answers = args.answers.as_deref().map(|path| {
-        let file = File::create_new(path).with_context(|| format!("cannot make {}", path.display()))?;
-        Ok::<_, anyhow::Error>(DriveWriter::create(BufWriter::new(file), &args.endpoints.fleet, PROGRAM)?)
+        let file = BufWriter::new(new_file(path)?);
+        Ok::<_, anyhow::Error>(DriveWriter::create(file, &args.endpoints.fleet, PROGRAM)?)
     });
     let options = PlayerOptions {
         zenoh: args.endpoints.zenoh.clone(),
@@ -112,20 +118,20 @@ pub(crate) async fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let before = before.or_else(|| args.compare.is_some().then_some(played.before));
     let comparison = before.map(|before| before.compare(&played.now));
     if comparison.as_ref().is_some_and(|c| c.frames == 0) {
-        bail!("there are no answers to compare with in {}", args.file.display());
+        let other = args.compare.iter().flatten().next().unwrap_or(&args.file);
+        let sentence = format!("There are no answers to compare with in {}.", other.display());
+        return Err(Failure::new(Class::NotFound, "no_answers", sentence).into());
     }
     let is_different = comparison.as_ref().is_some_and(recordings::compare::Comparison::is_different);
     let report = ReplayReport { robot, counts: played.counts, comparison };
-    if args.json {
-        screen::say(&serde_json::to_string(&report)?);
-    } else {
-        screen::say(&table(&report));
-    }
+    session.show(&report, &table(&report))?;
     Ok(if is_different { ExitCode::FAILURE } else { ExitCode::SUCCESS })
 }
 
 fn opened(path: &Path) -> anyhow::Result<BufReader<File>> {
-    Ok(BufReader::new(File::open(path).with_context(|| unreadable(path))?))
+    let unreadable =
+        |error| Failure::new(Class::Usage, "unreadable", format!("{}: {error}", unreadable(path)));
+    Ok(BufReader::new(File::open(path).map_err(unreadable)?))
 }
 
 fn unreadable(path: &Path) -> String {
@@ -138,22 +144,34 @@ fn robots(args: &Args) -> anyhow::Result<(Name, Name, Option<BagRobot>)> {
     let channels = file.channels().with_context(|| unreadable(&args.file))?;
     if bag::is_bag(channels.iter().map(AsRef::as_ref)) {
         let Some(robot) = args.robot.clone() else {
-            bail!("{} is a bag of ROS: say with --robot as which robot it is played", args.file.display());
+            let sentence = format!("{} is a bag of ROS: which robot plays it?", args.file.display());
+            return Err(Failure::usage(sentence).advise("Name it with --robot.").into());
         };
         let bag = BagRobot::new(robot.clone(), settings(&args.bag, &channels)?)?;
         return Ok((robot.clone(), robot, Some(bag)));
     }
     let names: BTreeSet<&str> = channels.iter().filter_map(|channel| robot_of(channel)).collect();
-    let recorded = match (&args.recorded, names.len()) {
-        (Some(recorded), _) if names.contains(recorded.as_str()) => recorded.clone(),
-        (None, 1) => Name::new(*names.first().context("a robot")?)?,
-        (_, 0) => bail!("no robot's messages are in {}", args.file.display()),
-        _ => {
-            let names: Vec<&str> = names.into_iter().collect();
-            bail!("say with --recorded which robot is played: {}", names.join(", "));
-        }
-    };
+    let recorded = recorded_robot(args.recorded.as_ref(), &names, &args.file)?;
     Ok((args.robot.clone().unwrap_or_else(|| recorded.clone()), recorded, None))
+}
+
+/// The robot of a recording that is played: the one named, or the only one.
+fn recorded_robot(named: Option<&Name>, names: &BTreeSet<&str>, file: &Path) -> anyhow::Result<Name> {
+    let all = || names.iter().copied().collect::<Vec<_>>().join(", ");
+    let missing = |sentence: String| Failure::new(Class::NotFound, "not_recorded", sentence);
+    match (named, names.len()) {
+        (_, 0) => Err(missing(format!("No robot's messages are in {}.", file.display())).into()),
+        (Some(named), _) if names.contains(named.as_str()) => Ok(named.clone()),
+        (Some(named), _) => {
+            let sentence =
+                format!("There is no robot `{named}` in {} (there are: {}).", file.display(), all());
+            Err(missing(sentence).into())
+        }
+        (None, 1) => Ok(Name::new(*names.first().context("a robot")?)?),
+        (None, _) => Err(Failure::usage(format!("Which robot is played? There are {}.", all()))
+            .advise("Name it with --recorded.")
+            .into()),
+    }
 }
 
 /// The robot that a topic of ours belongs to: the chunk after `robot` of its key.
@@ -186,16 +204,23 @@ fn settings(args: &BagArgs, channels: &[Arc<ChannelInfo>]) -> anyhow::Result<Rob
 }
 
 fn camera(given: &str, channels: &[Arc<ChannelInfo>]) -> anyhow::Result<CameraSettings> {
-    let (name, topic) = given.split_once('=').with_context(|| format!("`{given}` is not NAME=TOPIC"))?;
+    let wrong = |sentence: String| anyhow::Error::from(Failure::usage(sentence));
+    let (name, topic) =
+        given.split_once('=').ok_or_else(|| wrong(format!("--image {given}: not NAME=TOPIC.")))?;
     let found = channels.iter().find(|channel| channel.topic == topic);
     let form = match found.map(|channel| channel.schema.as_str()) {
         Some("sensor_msgs/msg/Image") => ImageForm::Raw,
         Some("sensor_msgs/msg/CompressedImage") => ImageForm::Compressed,
-        Some(other) => bail!("{topic} has messages of {other}, not images"),
-        None => bail!("there is no topic {topic} in the bag"),
+        Some(other) => return Err(wrong(format!("{topic} has messages of {other}, not images."))),
+        None => {
+            let sentence = format!("There is no topic {topic} in the bag.");
+            return Err(Failure::new(Class::NotFound, "unknown_topic", sentence).into());
+        }
     };
-    let camera = bag::camera(topic, form).with_context(|| format!("{topic} is no usual topic"))?;
-    Ok(CameraSettings { name: Name::new(name)?, ..camera })
+    let camera =
+        bag::camera(topic, form).ok_or_else(|| wrong(format!("{topic} is no usual topic of images.")))?;
+    let name = Name::new(name).map_err(|error| wrong(format!("--image {given}: {error}.")))?;
+    Ok(CameraSettings { name, ..camera })
 }
 
 /// The answers to a robot in a file.
@@ -211,4 +236,26 @@ fn play_of(path: &Path, robot: &Name) -> anyhow::Result<Play> {
         }
     }
     Ok(play)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_only_robot_of_a_recording_need_not_be_named() {
+        let file = Path::new("drive.mcap");
+        let name = |text: &str| Name::new(text).unwrap();
+        let refused = |named: Option<&Name>, names: &[&str]| {
+            let error = recorded_robot(named, &names.iter().copied().collect(), file).unwrap_err();
+            Failure::of(&error)
+        };
+        assert_eq!(recorded_robot(None, &["r1"].into(), file).unwrap(), name("r1"));
+        assert_eq!(recorded_robot(Some(&name("r2")), &["r1", "r2"].into(), file).unwrap(), name("r2"));
+        let several = refused(None, &["r1", "r2"]);
+        assert!(several.class == Class::Usage && several.sentence.contains("r1, r2"), "{several:?}");
+        let other = refused(Some(&name("r3")), &["r1", "r2"]);
+        assert!(other.class == Class::NotFound && other.sentence.contains("`r3`"), "{other:?}");
+        assert_eq!(refused(None, &[]).class, Class::NotFound);
+    }
 }
