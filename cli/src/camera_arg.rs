@@ -57,7 +57,9 @@ mod tests {
         let path = folder.path().join("camera.json");
         let name = path.to_str().unwrap();
         std::fs::write(&path, r#"{"fx_px": 500, "fy_px": 500, "cx_px": 320, "cy_px": 240}"#).unwrap();
-        assert_eq!(camera(name).unwrap().sigmas, None);
+        // What a frame does not say: 0.5 % and 0.3 % of the focal length.
+        let usual = IntrinsicsSigmas { focal_px: 2.5, center_px: 1.5 };
+        assert_eq!(camera(name).unwrap().sigmas, Some(usual));
         std::fs::write(&path, r#"{"fx_px": 500, "fy_px": 500, "cx_px": 320}"#).unwrap();
         assert!(camera(name).is_err());
         assert!(camera("nosuch.json").unwrap_err().contains("waymark camera calibrate --json"));

@@ -8,6 +8,7 @@ use protos::{
 
 /// Content of a message that a recording contains.
 #[derive(Debug, Clone, PartialEq)]
+#[expect(clippy::large_enum_variant, reason = "one message is at hand at a time")]
 pub enum Body {
     /// Of [`Key::Frame`].
     Frame(v1::Frame),

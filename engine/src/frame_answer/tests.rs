@@ -36,7 +36,9 @@ fn a_photograph_of_landmarks_without_a_place_says_so() {
     let mut scene = Scene::new();
     let (map, camera) = (scene.taught(), scene.intrinsics());
     let mut landmarks = map.landmarks.clone();
-    landmarks.values_mut().for_each(|info| info.place = None);
+    for info in landmarks.values_mut() {
+        info.place = None;
+    }
     let map = MapSnapshot { landmarks, ..Arc::unwrap_or_clone(map) };
     let (_, readings) = scene.stops(5, 1).remove(0);
     let answer = answer_to_photograph(&readings.frame.image, Some(&camera), &map);

@@ -15,12 +15,12 @@ use sim::{
 };
 use std::{
     sync::{Arc, Mutex},
-    time::{SystemTime, UNIX_EPOCH},
+    time::{Duration, SystemTime, UNIX_EPOCH},
 };
 use tests::{
     Inside, eventually,
     robots::{MAP, jpeg, put_walls},
-    ros::{CAMERA_INFO, COMPRESSED_IMAGE, IMAGE, LASER_SCAN, ODOMETRY, RosRobot, Speech, TF_MESSAGE},
+    ros::{CAMERA_INFO, COMPRESSED_IMAGE, IMAGE, LASER_SCAN, ODOMETRY, RosRobot, Speech, TF_MESSAGE, Type},
 };
 use zenoh::Session;
 
@@ -194,7 +194,7 @@ pub(super) struct Run {
     pub(super) odometry: Vec<(i64, Pose2)>,
 }
 
-const TOPICS: [(&str, TypeOfMessage); 5] = [
+const TOPICS: [(&str, Type); 5] = [
     ("/tf", TF_MESSAGE),
     ("/odom", ODOMETRY),
     ("/scan", LASER_SCAN),
