@@ -102,8 +102,10 @@ async function showFrame(key, answer) {
     byId("quads").replaceChildren(...quadCells(answer).map(row));
     byId("frame-hint").textContent = answer.pose_refusal_detail?.sentence ?? "";
     const work = (answer.timings ?? []).reduce((sum, t) => sum + t.ms, 0);
-    byId("frame-facts").textContent = `frame ${answer.seq}: ${answer.status}, ${answer.quads.length} quads, ` +
-      `${work.toFixed(1)} ms of work, answered after ${answer.latency_ms.toFixed(0)} ms`;
+    byId("frame-facts").textContent = answer.rejection
+      ? `frame ${answer.seq} refused, ${answer.rejection.field}: ${answer.rejection.detail}`
+      : `frame ${answer.seq}: ${answer.status}, ${answer.quads.length} quads, ` +
+        `${work.toFixed(1)} ms of work, answered after ${answer.latency_ms.toFixed(0)} ms`;
   } finally { frameBusy = false; }
 }
 
@@ -428,7 +430,7 @@ async function start() {
   const asked = new URLSearchParams(location.search).get("map");
   const name = maps.some((m) => m.name === asked) ? asked : maps[0]?.name;
   if (!name) {
-    byId("map-hint").textContent = "There is no map yet. Make one with `waymark map create`, or by the API.";
+    byId("map-hint").textContent = "There is no map yet. Make one: waymark map create NAME. Then its floor plan: waymark map import NAME FILE.";
     setTimeout(start, 2000);
     return;
   }

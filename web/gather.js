@@ -151,6 +151,8 @@ byId("gather-stop").addEventListener("click", () => act(async () => {
 byId("gather-look").addEventListener("click", () => act(look));
 byId("gather-accept").addEventListener("click", () => act(accept));
 byId("gather-drop").addEventListener("click", () => act(async () => {
+  const count = state.tracks.length;
+  if (!confirm(`Throw away this gathering with ${count} ${count === 1 ? "track" : "tracks"}? It cannot be restored.`)) return;
   await ask("DELETE", here());
   Object.assign(state, { gathering: null, tracks: [] });
   list();

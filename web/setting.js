@@ -7,8 +7,8 @@ const DEG = Math.PI / 180;
 
 // Name on the wire, label, unit, factor from what is shown to the wire.
 const WORDS = [["site", "site"], ["building", "building"], ["floor", "floor"]];
-const LINK = [["x_m", "x of its origin there", "m", 1], ["y_m", "y of its origin there", "m", 1],
-  ["theta_rad", "its x axis there", "°", DEG], ["level_m", "its floor above that one", "m", 1]];
+const LINK = [["x_m", "x of its origin", "m", 1], ["y_m", "y of its origin", "m", 1],
+  ["theta_rad", "rotation", "°", DEG], ["level_m", "height above it", "m", 1]];
 const VISIBILITY = [["width_px", "image width", "px", 1], ["height_px", "image height", "px", 1], ["focal_px", "focal length", "px", 1],
   ["camera_height_m", "camera above the floor", "m", 1], ["tilt_low_rad", "lowest tilt", "°", DEG], ["tilt_high_rad", "highest tilt", "°", DEG],
   ["pan_low_rad", "rightmost pan", "°", DEG], ["pan_high_rad", "leftmost pan", "°", DEG],
@@ -99,7 +99,7 @@ function saveWhere(event) {
     const parent = form.elements.parent.value;
     const link = numbers(form, LINK);
     const missing = parent && LINK.slice(0, 3).find(([name]) => link[name] === undefined);
-    if (missing) throw Object.assign(new Error("needed where it lies in another map"), { field: missing[0] });
+    if (missing) throw Object.assign(new Error("needed with another map"), { field: missing[0] });
     const kept = parent && form.dataset.parent === parent && form.dataset.covariance ? { covariance: JSON.parse(form.dataset.covariance) } : {};
     changes.parent = parent ? { map: parent, ...link, ...kept } : null;
     await ask("PATCH", place(), changes);

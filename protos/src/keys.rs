@@ -17,7 +17,7 @@ pub enum NameError {
     #[error("a name has 1 to {MAX_NAME_BYTES} characters, this one has {0}")]
     Length(usize),
     /// A character outside the set.
-    #[error("a name has only a-z, 0-9, '_' and '-'; position {0} has another character")]
+    #[error("a name has lower-case letters, digits, `-` and `_`; character {} is none of them", .0 + 1)]
     Character(usize),
 }
 

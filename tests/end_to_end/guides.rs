@@ -93,6 +93,60 @@ fn the_commands_of_evaluate_on_your_photographs_work() {
     run("evaluate-on-your-photographs");
 }
 
+/// The words that a file of code gives on the wire: those of `=> "word"`, of `=> ("word", "field")`, and the codes of
+/// errors of HTTP.
+fn words(file: &str) -> Vec<String> {
+    let text = std::fs::read_to_string(tests::documents::root().join(file)).expect("a file of code");
+    let text: String = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    let text = text.split("#[cfg(test)]").next().unwrap_or_default();
+    let is_code = |before: &str| {
+        let before = before.trim_end();
+        let of_status = before.rsplit("StatusCode::").next().is_some_and(|rest| {
+            rest.strip_suffix(',').is_some_and(|name| name.chars().all(|c| c.is_ascii_uppercase() || c == '_'))
+        });
+        before.ends_with("=>") || before.ends_with("=> (") || before.ends_with("invalid(") || of_status
+    };
+    let mut found = Vec::new();
+    let mut parts = text.split('"');
+    let mut before = parts.next().unwrap_or_default();
+    while let (Some(word), Some(after)) = (parts.next(), parts.next()) {
+        if is_code(before) && word.len() > 3 && word.chars().all(|c| c.is_ascii_lowercase() || c == '_') {
+            found.push(word.to_owned());
+        }
+        before = after;
+    }
+    found
+}
+
+#[test]
+fn troubleshooting_has_every_word_of_refusal() {
+    let mut all = Vec::new();
+    for file in ["engine/src/fixes.rs", "protos/src/rejection.rs", "protos/src/convert/result.rs"] {
+        let found = words(file);
+        assert!(found.len() >= 8, "{file}: only {found:?}: it is no longer read");
+        all.extend(found);
+    }
+    let http: Vec<String> = std::fs::read_dir(tests::documents::root().join("server/src/http"))
+        .expect("a folder")
+        .map(|entry| format!("server/src/http/{}", entry.expect("an entry").file_name().to_string_lossy()))
+        .filter(|file| file.ends_with(".rs") && !file.ends_with("tests.rs"))
+        .flat_map(|file| words(&file))
+        .collect();
+    assert!(http.len() >= 30, "only {http:?}: the codes are no longer read");
+    all.extend(http);
+    let guide = std::fs::read_to_string(tests::documents::root().join("docs/guides/troubleshooting.md"));
+    let guide = guide.expect("the guide");
+    let missing: Vec<_> = all.iter().filter(|word| !guide.contains(&format!("`{word}`"))).collect();
+    assert!(missing.is_empty(), "{missing:?}");
+}
+
+#[test]
+fn the_commands_of_the_readme_work() {
+    let folder = tempfile::tempdir().expect("a folder");
+    guide_files::write(folder.path());
+    guides::run(&tests::documents::root().join("README.md"), folder.path(), &mut |_, _| ());
+}
+
 #[test]
 fn every_guide_is_run_by_a_test() {
     let source = include_str!("guides.rs");

@@ -6,7 +6,8 @@
 //! - Before a block, `<!-- status N -->` says that its last command ends with status N instead of 0.
 //! - A block `bash` is for another machine (a robot with ROS 2, an installed server) and is not run: it may hold only
 //!   the programs of [`ELSEWHERE`].
-//! - `cargo run -p client --example NAME` runs the example of this build, `cargo install` installs nothing.
+//! - `cargo run -p client --example NAME` runs the example of this build; `cargo install`, `cargo test` and the demo do
+//!   nothing here.
 
 use crate::command::program;
 use std::{
@@ -239,7 +240,14 @@ set -euo pipefail
 case "$1" in
 install)
     test -f "$TESTED_SOURCES/${3:?}/Cargo.toml" ;;
+test)
+    # The README's second command: this test is one of its own.
+    ;;
 run)
+    if [ "$*" = "run --release -- demo" ]; then
+        # The README's first command: the demo has a test of its own.
+        exit 0
+    fi
     shift
     while [ "$1" != "--" ]; do
         if [ "$1" = "--example" ]; then example="$2"; fi

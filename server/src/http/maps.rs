@@ -149,7 +149,7 @@ async fn get(
     Ok(Json(map_shown(row, found)))
 }
 
-/// Says where a map is.
+/// Changes a map's site, building, floor or position.
 #[utoipa::path(patch, path = "/maps/{map}", tag = "maps", params(("map" = String, Path)), request_body = MapPatch,
     responses((status = 200, body = Map), (status = 404, body = Problem),
     (status = 409, body = Problem, description = "cycle: it would lie in itself; too_deep"),
