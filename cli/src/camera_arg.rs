@@ -27,10 +27,21 @@ fn of_file(path: &Path) -> Result<Intrinsics, String> {
     let bytes = std::fs::read(path).map_err(|error| format!("{error}; {EXPECTED}"))?;
     let wire = match serde_json::from_slice::<CalibrationReport>(&bytes) {
         Ok(report) => with_sigmas(&report),
-        Err(_not_a_report) => serde_json::from_slice::<v1::Intrinsics>(&bytes)
-            .map_err(|error| format!("{}: {error}; {EXPECTED}", path.display()))?,
+        Err(_not_a_report) => {
+            intrinsics_alone(&bytes).map_err(|error| format!("{}: {error}; {EXPECTED}", path.display()))?
+        }
     };
     intrinsics(&wire).map_err(|refused| format!("{}: {}: {}", path.display(), refused.field, refused.detail))
+}
+
+/// `Intrinsics` as JSON. All four numbers are needed: on the wire one that is left out is 0.
+fn intrinsics_alone(bytes: &[u8]) -> Result<v1::Intrinsics, String> {
+    let value: serde_json::Value = serde_json::from_slice(bytes).map_err(|error| error.to_string())?;
+    if let Some(missing) = ["fx_px", "fy_px", "cx_px", "cy_px"].iter().find(|key| value.get(**key).is_none())
+    {
+        return Err(format!("{missing} is missing"));
+    }
+    serde_json::from_value(value).map_err(|error| error.to_string())
 }
 
 /// The intrinsics of a report with its standard deviations.

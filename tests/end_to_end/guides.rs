@@ -102,7 +102,8 @@ fn words(file: &str) -> Vec<String> {
     let is_code = |before: &str| {
         let before = before.trim_end();
         let of_status = before.rsplit("StatusCode::").next().is_some_and(|rest| {
-            rest.strip_suffix(',').is_some_and(|name| name.chars().all(|c| c.is_ascii_uppercase() || c == '_'))
+            rest.strip_suffix(',')
+                .is_some_and(|name| name.chars().all(|c| c.is_ascii_uppercase() || c == '_'))
         });
         before.ends_with("=>") || before.ends_with("=> (") || before.ends_with("invalid(") || of_status
     };
