@@ -271,7 +271,7 @@ mod tests {
 
     #[test]
     fn blocks_are_read_with_their_status_and_their_files() {
-        let text = "a\n```sh\nwaymark serve   # x\n# only this\nb \\\n  --c\n```\n1. <!-- status 5 -->\n   ```sh\n   d\n   ```\n\
+        let text = "a\n```sh\nwaymark serve   # x\n# only this\nb \\\n  --c\n```\n   <!-- status 5 -->\n   ```sh\n   d\n   ```\n\
                     ```toml w.toml\nx = 1\n```\n```bash\nros2 launch\n```\n```json\n{}\n```\n```sh\ne\n```\n";
         let run = |line, commands: &[&str], status| Block::Run {
             line,
