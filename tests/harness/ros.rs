@@ -147,7 +147,9 @@ impl RosRobot {
 
     /// Publishes on any key.
     pub async fn put_raw(&self, key: &str, payload: Vec<u8>, attachment: Option<Vec<u8>>) {
-        self.node.put(key, payload).attachment(attachment).await.expect("sent");
+        let put = self.node.put(key, payload).attachment(attachment);
+        // A busy machine may not lose what is compared.
+        put.congestion_control(zenoh::qos::CongestionControl::Block).await.expect("sent");
     }
 
     /// Number, time and a name of the publisher.

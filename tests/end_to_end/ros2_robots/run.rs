@@ -22,7 +22,7 @@ use tests::{
     robots::{MAP, jpeg, put_walls},
     ros::{CAMERA_INFO, COMPRESSED_IMAGE, IMAGE, LASER_SCAN, ODOMETRY, RosRobot, Speech, TF_MESSAGE, Type},
 };
-use zenoh::Session;
+use zenoh::{Session, qos::CongestionControl};
 
 pub(super) const IMAGES: &str = "/camera/image_raw/compressed";
 pub(super) const CALIBRATION: &str = "/camera/camera_info";
@@ -80,7 +80,9 @@ impl Native {
     }
 
     pub(super) async fn put(&self, key: &str, message: Vec<u8>) {
-        self.session.put(format!("waymark/1/default/robot/native/{key}"), message).await.expect("sent");
+        let put = self.session.put(format!("waymark/1/default/robot/native/{key}"), message);
+        // A busy machine may not lose what is compared.
+        put.congestion_control(CongestionControl::Block).await.expect("sent");
     }
 
     pub(super) async fn odometry(&mut self, readings: &SensorReadings, captured_ns: i64) {
