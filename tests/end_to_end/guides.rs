@@ -100,7 +100,7 @@ fn words(file: &str, with_arms: bool) -> Vec<String> {
     let text = text.split("#[cfg(test)]").next().unwrap_or_default();
     let is_code = |before: &str| {
         let before = before.trim_end();
-        let of_status = before.rsplit("StatusCode::").next().is_some_and(|rest| {
+        let of_status = before.rsplit_once("StatusCode::").is_some_and(|(_, rest)| {
             rest.strip_suffix(',')
                 .is_some_and(|name| name.chars().all(|c| c.is_ascii_uppercase() || c == '_'))
         });
