@@ -1,7 +1,7 @@
 //! Every command of every guide is run, in order, with the files that the guide names.
 
 use serde_json::Value;
-use std::process::Command;
+use std::{path::Path, process::Command};
 use tests::{documents::markdown, guide_files, guides};
 
 /// Guides that are run by tests of another part.
@@ -129,7 +129,7 @@ fn troubleshooting_has_every_word_of_refusal() {
     let http: Vec<String> = std::fs::read_dir(tests::documents::root().join("server/src/http"))
         .expect("a folder")
         .map(|entry| format!("server/src/http/{}", entry.expect("an entry").file_name().to_string_lossy()))
-        .filter(|file| file.ends_with(".rs") && !file.ends_with("tests.rs"))
+        .filter(|file| Path::new(file).extension().is_some_and(|e| e == "rs") && !file.ends_with("tests.rs"))
         .flat_map(|file| words(&file, false))
         .collect();
     assert!(http.len() >= 30, "only {http:?}: the codes are no longer read");
