@@ -1,5 +1,5 @@
 //! The weights of the confidence, by the distance that decides. Not for editing: this command writes the file, byte
-//! for byte but for :
+//! for byte but for `BOTH`:
 //!
 //! ```text
 //! waymark-lab train confidence --set calibrate --photographs museum-paintings --photographs \
@@ -12,9 +12,8 @@
 
 use super::measures::MEASURES;
 
-/// Where slopes decide. Of the same command at the commit before 46b9d8d: nearly all of its answers are
-/// decided by points now, and a curve fitted to those hardly falls with the measures, so that it would say 0.98 of a doubtful
-/// answer.
+/// Where slopes decide. Of the same command at the commit before 46b9d8d: nearly all of its answers are decided by points
+/// now, and a curve fitted to those hardly falls with the measures: it would say 0.98 of a doubtful answer.
 pub(super) const BOTH: [f64; MEASURES + 1] = [-1.6149, -2.3303, 0.0, -0.5381, 0.0, -2.1789, 0.0, 5.8694];
 
 /// Where C^r decides.
