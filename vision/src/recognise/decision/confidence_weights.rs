@@ -12,8 +12,8 @@
 
 use super::measures::MEASURES;
 
-/// Where slopes decide. Of the same command at the commit before 46b9d8d: nearly all of its answers are decided by points
-/// now, and a curve fitted to those hardly falls with the measures: it would say 0.98 of a doubtful answer.
+/// Where slopes decide. Of the same command at the commit before 46b9d8d: nearly all of its answers are decided by
+/// points now, and a curve fitted to those hardly falls with the measures: it would say 0.98 of a doubtful answer.
 pub(super) const BOTH: [f64; MEASURES + 1] = [-1.6149, -2.3303, 0.0, -0.5381, 0.0, -2.1789, 0.0, 5.8694];
 
 /// Where C^r decides.
