@@ -17,7 +17,7 @@ mod robot_pose;
 mod camera_pose;
 pub mod intrinsics_monitor;
 
-pub use camera_pose::{CAMERA_HEIGHT_M, CameraPose, CameraPoseRefusal, camera_pose};
+pub use camera_pose::{CameraPose, CameraPoseRefusal, camera_pose};
 pub use fix::{
     AmbiguityResolvedBy, Fix, FixRefusal, FixResult, FixSource, LandmarkObservation, Nuisance, NuisanceKey,
 };

@@ -64,9 +64,7 @@ pub struct DriveWriter<W: Write + Seek> {
 impl<W: Write + Seek> DriveWriter<W> {
     /// Begins a recording of a fleet. `program` is the name and version of who records.
     pub fn create(file: W, fleet: &Name, program: &str) -> Result<Self, WriteError> {
-        let options = WriteOptions::new()
-            .profile(PROFILE)
-            .library(program)
+        let options = WriteOptions::library(WriteOptions::new().profile(PROFILE), program)
             .compression(None)
             .chunk_size(Some(CHUNK_BYTES))
             // A chunk is written when it is whole; otherwise its length would be corrected afterwards.

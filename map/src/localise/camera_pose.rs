@@ -17,7 +17,7 @@ use vision::{
 };
 
 /// Heights above the floor, metres, at which a camera is accepted.
-pub const CAMERA_HEIGHT_M: std::ops::RangeInclusive<f64> = 0.0..=5.0;
+const CAMERA_HEIGHT_M: std::ops::RangeInclusive<f64> = 0.0..=5.0;
 /// 99.9 % quantile of chi2 with 6 degrees of freedom: the largest distance of two poses that agree.
 const AGREE_CHI2: f64 = 22.458;
 
