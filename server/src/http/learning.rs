@@ -7,11 +7,7 @@ use super::{
 };
 use crate::{
     jobs::{JobProgress, request},
-    store::{
-        StoreError,
-        jobs::{self, JobRow},
-        landmarks, maps,
-    },
+    store::{StoreError, jobs::JobRow, landmarks, maps},
 };
 use axum::{
     Json,
@@ -45,11 +41,6 @@ pub(super) fn job_shown(row: JobRow, progress: Option<&JobProgress>) -> Job {
         "running" => JobState::Running,
         _ => JobState::Queued,
     };
-    // The row is committed with the models, before they are published: until then the job is still at work.
-    let published = progress.is_none();
-    let state = if state == JobState::Done && !published { JobState::Running } else { state };
-    let open = matches!(state, JobState::Queued | JobState::Running);
-    let progress = progress.filter(|_| open);
     Job {
         id: row.id,
         kind: row.kind,
@@ -137,9 +128,8 @@ async fn submit(
 }
 
 async fn read(app: &AppState, id: i64) -> Result<Job, StoreError> {
-    // Progress before the row: a job that ends in between is then shown as ended.
-    let progress = app.jobs.progress(id);
-    Ok(job_shown(jobs::get(app.store.reads(), id).await?, progress.as_ref()))
+    let (row, progress) = app.jobs.get(id).await?;
+    Ok(job_shown(row, progress.as_ref()))
 }
 
 /// One job.

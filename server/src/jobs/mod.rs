@@ -155,19 +155,29 @@ impl Jobs {
         write.await
     }
 
-    /// How far a job is that runs or is watched; `None` for any other.
-    pub(crate) fn progress(&self, id: i64) -> Option<JobProgress> {
-        self.lock().of.get(&id).map(|reporter| reporter.progress.borrow().clone())
+    /// A job with its progress while it is open. Its row ends in the transaction of its models; here it has ended once those
+    /// are published, so whoever asks next is answered by them.
+    pub(crate) async fn get(&self, id: i64) -> Result<(JobRow, Option<JobProgress>), StoreError> {
+        let mut row = jobs::get(self.store.reads(), id).await?;
+        let reporters = self.lock();
+        if !is_open(&row) {
+            if reporters.running != Some(id) {
+                return Ok((row, None));
+            }
+            (row.state, row.message, row.result) = ("running".to_owned(), String::new(), None);
+        }
+        let progress = reporters.of.get(&id).map(|reporter| reporter.progress.borrow().clone());
+        Ok((row, progress))
     }
 
     /// Progress of an open job, from its queue to its end; `None` once it has ended.
     pub(crate) async fn watch(&self, id: i64) -> Result<Option<watch::Receiver<JobProgress>>, StoreError> {
-        if !is_open(&jobs::get(self.store.reads(), id).await?) {
+        if !is_open(&self.get(id).await?.0) {
             return Ok(None);
         }
         let watched = self.reporter(id).progress.subscribe();
         // If it ended in between, nobody else removes the reporter.
-        if !is_open(&jobs::get(self.store.reads(), id).await?) {
+        if !is_open(&self.get(id).await?.0) {
             self.leave(id);
         }
         Ok(Some(watched))

@@ -79,6 +79,28 @@ async fn a_job_that_waits_is_cancelled_in_the_table() {
 }
 
 #[tokio::test]
+async fn a_job_has_ended_once_its_models_are_published() {
+    let dir = tempfile::tempdir().unwrap();
+    let (store, _task) = store(dir.path()).await;
+    let (jobs, _stop) = started(&store, dir.path()).await;
+    let id = queued(&store).await;
+    ended(&store, id).await;
+    while jobs.lock().running.is_some() {
+        tokio::time::sleep(Duration::from_millis(5)).await;
+    }
+    assert_eq!(jobs.get(id).await.unwrap().0.state, "failed");
+    // The row is committed, and its writer still publishes.
+    jobs.reporter(id).report(0.9, "storing");
+    jobs.lock().running = Some(id);
+    let (row, progress) = jobs.get(id).await.unwrap();
+    assert_eq!((row.state.as_str(), row.message.as_str(), progress.unwrap().share), ("running", "", 0.9));
+    let mut watched = jobs.watch(id).await.unwrap().expect("it is watched to its end");
+    jobs.leave(id);
+    assert!(watched.changed().await.is_err());
+    assert_eq!(jobs.get(id).await.unwrap().0.state, "failed");
+}
+
+#[tokio::test]
 async fn a_job_that_ends_the_process_each_time_is_given_up() {
     let dir = tempfile::tempdir().unwrap();
     let (store, _task) = store(dir.path()).await;

@@ -160,11 +160,11 @@ impl Service {
         assert_eq!(status, 202, "{job}");
         let id = job["id"].as_i64().unwrap();
         for _ in 0..6_000 {
-            let row = jobs::get(self.store.reads(), id).await.unwrap();
-            if row.state == "done" {
+            let (_, job) = read(self.ask(request("GET", &format!("/api/v1/jobs/{id}"), "")).await).await;
+            if job["state"] == "done" {
                 return;
             }
-            assert!(row.state != "failed", "{row:?}");
+            assert_ne!(job["state"], "failed", "{job}");
             tokio::time::sleep(std::time::Duration::from_millis(10)).await;
         }
         panic!("the job does not end");

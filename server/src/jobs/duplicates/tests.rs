@@ -3,7 +3,6 @@ use crate::{
     jobs::{Jobs, request::Request},
     publication::{Catalogue, CatalogueTasks},
     store::{
-        jobs,
         landmarks::{self, LandmarkGeometry, ModelSummary, StoredPlace},
         maps,
         teaching::{self, Teaching},
@@ -103,7 +102,7 @@ impl School {
         let request = Request { landmarks, ..Request::default() };
         let id = self.jobs.submit("a", &request).await.unwrap().id;
         for _ in 0..6_000 {
-            let row = jobs::get(self.store.reads(), id).await.unwrap();
+            let (row, _) = self.jobs.get(id).await.unwrap();
             if row.state == "done" {
                 return serde_json::from_str(&row.result.unwrap()).unwrap();
             }

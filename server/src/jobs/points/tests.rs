@@ -112,8 +112,8 @@ async fn started(store: &Catalogue, config: &Config) -> (Arc<Jobs>, watch::Sende
 async fn ended(jobs: &Jobs, job: i64) -> JobRow {
     let begun = Instant::now();
     loop {
-        let row = jobs::get(jobs.store.reads(), job).await.unwrap();
-        if !matches!(row.state.as_str(), "queued" | "running") && jobs.progress(job).is_none() {
+        let (row, _) = jobs.get(job).await.unwrap();
+        if !matches!(row.state.as_str(), "queued" | "running") {
             return row;
         }
         assert!(begun.elapsed() < Duration::from_mins(1), "{row:?}");
