@@ -1,4 +1,4 @@
-//! The OpenAPI document: names of schemas are unique, every JSON body has an example, and each example is accepted.
+//! The OpenAPI document: names of schemas are unique, every body has an example, and each example is accepted.
 
 use super::*;
 use crate::store::{landmark_placement::tests::seen_from, track_acceptance::tests::gathered};
@@ -68,16 +68,20 @@ async fn read_long(service: &Service, path: &str) -> (u16, Value) {
     (status, serde_json::from_slice(&bytes).unwrap())
 }
 
+/// A picture of a poster: PNG.
+fn poster(seed: u64) -> Vec<u8> {
+    let poster = sim::posters::poster_of_size(seed, 120, 1.0);
+    engine::picture::png(poster.width(), poster.height(), poster.data()).unwrap()
+}
+
 /// Map `hall` with walls, the landmark `poster` with a view, and robot `r1`, which has been recorded or has gathered where the
 /// operation asks for it.
 async fn prepared(operation: &str) -> (Service, String) {
     let service = Service::start(Limits::default()).await;
     let walls = json!({ "segments": [{ "a": [0.0, 0.0], "b": [6.0, 0.0] }] }).to_string();
     assert_eq!(service.ask(request("PUT", "/api/v1/maps/hall/walls", walls)).await.status(), StatusCode::OK);
-    let poster = sim::posters::poster_of_size(1, 120, 1.0);
-    let picture = engine::picture::png(poster.width(), poster.height(), poster.data()).unwrap();
     let parts = [("create", "true"), ("whole_image", "true"), ("width_m", "0.6"), ("height_m", "0.84")];
-    assert_eq!(service.upload("poster", picture, &parts).await.0, 201);
+    assert_eq!(service.upload("poster", poster(1), &parts).await.0, 201);
     let mut gathering = 0;
     if operation.ends_with("/accept") {
         gathering = gathered(&service.store, "hall", std::iter::once(seen_from(1.0, 1, 0.0))).await;
@@ -89,16 +93,17 @@ async fn prepared(operation: &str) -> (Service, String) {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn every_json_body_has_an_example_and_the_server_takes_it() {
+async fn every_body_has_an_example_and_the_server_takes_it() {
     let service = Service::start(Limits::default()).await;
     let (_, document) = read_long(&service, "/api/v1/openapi.json").await;
     let mut sent = BTreeSet::new();
     for (path, item) in document["paths"].as_object().unwrap() {
         for (method, operation) in item.as_object().unwrap() {
-            let body = &operation["requestBody"]["content"]["application/json"];
-            if body.is_null() {
+            let Some((kind, body)) =
+                operation["requestBody"]["content"].as_object().and_then(|c| c.iter().next())
+            else {
                 continue;
-            }
+            };
             let name = format!("{} {}", method.to_uppercase(), path.trim_start_matches("/api/v1"));
             assert!(
                 !body["example"].is_null(),
@@ -115,8 +120,17 @@ async fn every_json_body_has_an_example_and_the_server_takes_it() {
             ] {
                 at = at.replace(parameter, value);
             }
-            let request = request(&method.to_uppercase(), &at, body["example"].to_string());
-            let (status, answer) = read(service.ask(request).await).await;
+            let method = method.to_uppercase();
+            let (status, answer) = if kind == "multipart/form-data" {
+                let parts = body["example"].as_object().unwrap().iter();
+                let parts = parts.map(|(name, value)| (name.as_str(), value.as_str().unwrap()));
+                let (files, texts): (Vec<_>, Vec<_>) = parts.partition(|(_, value)| value.starts_with('@'));
+                assert_eq!(files.iter().map(|(name, _)| *name).collect::<Vec<_>>(), ["image"], "{name}");
+                service.send_form(&method, &at, poster(2), &texts).await
+            } else {
+                assert_eq!(kind, "application/json", "{name}");
+                read(service.ask(request(&method, &at, body["example"].to_string())).await).await
+            };
             assert!((200..300).contains(&status), "{name}: {status} {answer}");
             sent.insert(name);
         }

@@ -25,6 +25,18 @@ impl Service {
         image: Vec<u8>,
         parts: &[(&str, &str)],
     ) -> (u16, Value) {
+        let path = format!("/api/v1/maps/hall/landmarks/{landmark}/views");
+        self.send_form("POST", &path, image, parts).await
+    }
+
+    /// Sends a form with a picture and these parts.
+    pub(super) async fn send_form(
+        &self,
+        method: &str,
+        path: &str,
+        image: Vec<u8>,
+        parts: &[(&str, &str)],
+    ) -> (u16, Value) {
         let mut text = String::new();
         for (name, value) in parts {
             write!(text, "--b\r\ncontent-disposition: form-data; name=\"{name}\"\r\n\r\n{value}\r\n")
@@ -33,8 +45,8 @@ impl Service {
         text.push_str("--b\r\ncontent-disposition: form-data; name=\"image\"; filename=\"i\"\r\n\r\n");
         let body = [text.into_bytes(), image, b"\r\n--b--\r\n".to_vec()].concat();
         let request = Request::builder()
-            .method("POST")
-            .uri(format!("/api/v1/maps/hall/landmarks/{landmark}/views"))
+            .method(method)
+            .uri(path)
             .header(header::HOST, "localhost")
             .header(header::CONTENT_TYPE, "multipart/form-data; boundary=b")
             .body(Body::from(body))
