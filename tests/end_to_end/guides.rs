@@ -85,7 +85,28 @@ fn the_commands_of_the_command_line_work() {
 
 #[test]
 fn the_commands_of_record_and_replay_work() {
-    run("record-replay");
+    let guide =
+        markdown("docs/guides").into_iter().find(|g| g.ends_with("record-replay.md")).expect("a guide");
+    let folder = tempfile::tempdir().expect("a folder");
+    guide_files::write(folder.path());
+    let mut bags = 0;
+    guides::run(&guide, folder.path(), &mut |command, guide| {
+        if command.contains("bag_0.mcap") {
+            let json = Command::new(tests::command::program())
+                .args(command.split_whitespace().skip(1))
+                .args(["--json", "--server", guide.url().expect("the guide's server")])
+                .args(["--zenoh", guide.endpoint().expect("the guide's server")])
+                .current_dir(folder.path())
+                .output()
+                .expect("the program");
+            let counts: Value = serde_json::from_slice(&json.stdout).expect("JSON");
+            let scans = if command.contains("--scan /lidar") { 3 } else { 0 };
+            let counted = ["recognised", "odometry", "scans"].map(|name| counts[name].as_u64());
+            assert_eq!(counted, [Some(3), Some(3), Some(scans)], "{command}: {counts}");
+            bags += 1;
+        }
+    });
+    assert_eq!(bags, 2, "bags are played");
 }
 
 #[test]

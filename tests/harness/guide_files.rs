@@ -1,10 +1,13 @@
 //! The files that the guides name: photographs of an office, a laser log, a floor plan. The office is rendered, so that
 //! where each photograph was taken is known.
 
-use crate::scenes::{self, png};
+use crate::{
+    bag,
+    scenes::{self, png},
+};
 use image::{ExtendedColorType, codecs::jpeg::JpegEncoder};
 use map::{extrinsics::pan_tilt, pose2::Pose2};
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use sim::{
     building::Building,
     camera::Camera,
@@ -65,10 +68,14 @@ const PHOTOGRAPHS: [(&str, Standpoint); 6] = [
 pub fn write(folder: &Path) {
     let building = office();
     let mut renderer = Renderer::new(camera());
+    let mut stops = Vec::new();
     for (number, (name, standpoint)) in PHOTOGRAPHS.iter().enumerate() {
         let image = photograph(&mut renderer, &building, standpoint, number as u64);
         fs::write(folder.join(name), jpeg(&image)).expect("a photograph");
+        stops.push(stop(&building, standpoint, image));
     }
+    fs::create_dir_all(folder.join("bag")).expect("a folder");
+    bag::write(&folder.join("bag/bag_0.mcap"), &camera(), &stops[..3]);
     fs::write(folder.join("blank.jpg"), jpeg(&GrayImage::from_fn(640, 480, |_, _| 180)))
         .expect("a photograph");
     let pictures = folder.join("pictures");
@@ -110,6 +117,22 @@ fn pose(building: &Building, standpoint: &Standpoint) -> Isometry3<f64> {
     let up = (centre.z - standpoint.height_m).atan2(distance_m);
     let heading = to_camera + std::f64::consts::PI + standpoint.turned[0].to_radians();
     pan_tilt(heading, up + standpoint.turned[1].to_radians(), Vector3::new(x, y, standpoint.height_m))
+}
+
+/// What a robot below the camera measured, whose odometry began at the map's origin.
+fn stop(building: &Building, standpoint: &Standpoint, picture: GrayImage) -> bag::Stop {
+    let map_from_camera = pose(building, standpoint);
+    let ahead = map_from_camera.rotation * Vector3::z();
+    let at = map_from_camera.translation.vector;
+    let odom_from_robot = Pose2::new(at.x, at.y, ahead.y.atan2(ahead.x));
+    let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), odom_from_robot.theta_rad);
+    let map_from_robot = Isometry3::from_parts(Vector3::new(at.x, at.y, 0.0).into(), turn);
+    bag::Stop {
+        odom_from_robot,
+        scan: scan(building, &odom_from_robot, &LaserParams::default(), 1),
+        picture,
+        robot_from_camera: map_from_robot.inv_mul(&map_from_camera),
+    }
 }
 
 fn photograph(renderer: &mut Renderer, building: &Building, standpoint: &Standpoint, seed: u64) -> GrayImage {

@@ -1,17 +1,20 @@
 //! Harness of the end-to-end tests: the real program as a child process that can be killed, a server inside the
 //! test process, pictures to send. The claims are in `end_to_end/`, one a file.
 
+pub mod bag;
 mod child;
 pub mod command;
 pub mod documents;
 pub mod guide_files;
 pub mod guides;
+mod open_data;
 pub mod pictures;
 pub mod robots;
 pub mod ros;
 pub mod scenes;
 
 pub use child::Child;
+pub use open_data::{open_data, skipped};
 
 use client::MapClient;
 use server::{

@@ -66,9 +66,10 @@ with open(folder / "bag.mcap", "wb") as file:
             transform(ns, "base_link", "laser", vector(lx, ly, 0.2), turn(ltheta)),
         ]
         write("/tf", "tf2_msgs/msg/TFMessage", make("tf2_msgs/msg/TFMessage", mountings), ns)
-        k = [float(v) for v in readings["k"]]
+        k = [float(v) for v in frame["k"]]
+        width, height = frame["size"]
         info = make(
-            "sensor_msgs/msg/CameraInfo", header(ns, "camera_optical_frame"), readings["height"], readings["width"],
+            "sensor_msgs/msg/CameraInfo", header(ns, "camera_optical_frame"), height, width,
             "plumb_bob", np.zeros(5), np.array(k), np.eye(3).ravel(),
             np.array(k[0:3] + [0.0] + k[3:6] + [0.0] + k[6:9] + [0.0]), 0, 0,
             make("sensor_msgs/msg/RegionOfInterest", 0, 0, 0, 0, False),
