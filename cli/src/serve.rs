@@ -86,6 +86,7 @@ impl Serve {
 
     pub(super) async fn run(self) -> anyhow::Result<()> {
         let config = self.settings()?;
+        warn_of_plain_text(&config);
         let data = config.data.clone();
         let server = Server::start(config).await?;
         ready(&server);
@@ -97,6 +98,19 @@ impl Serve {
         tracing::info!("stopping");
         server.stop().await;
         Ok(())
+    }
+}
+
+/// `--insecure` is a decision of the operator; the log of every start says what it means.
+fn warn_of_plain_text(config: &Config) {
+    for (what, address) in config.plain_text_beyond_loopback() {
+        tracing::warn!(
+            what,
+            address,
+            follows =
+                "whoever reaches it can read and change everything: trust that network, or use a tunnel",
+            "plain_text_beyond_loopback"
+        );
     }
 }
 

@@ -261,6 +261,15 @@ pub struct Config {
     pub params: Arc<Params>,
 }
 
+impl Config {
+    /// The listeners that other machines can reach, by setting, with their addresses: they are not encrypted.
+    pub fn plain_text_beyond_loopback(&self) -> Vec<(&'static str, String)> {
+        let zenoh = zenoh_address(&self.zenoh_endpoint).ok().filter(|a| !is_loopback(a.ip()));
+        let http = (!is_loopback(self.http_addr.ip())).then(|| ("http", self.http_addr.to_string()));
+        http.into_iter().chain(zenoh.map(|_| ("zenoh", self.zenoh_endpoint.clone()))).collect()
+    }
+}
+
 impl TryFrom<RawConfig> for Config {
     type Error = ConfigError;
 

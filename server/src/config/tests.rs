@@ -117,17 +117,24 @@ fn bad_settings_of_a_robot_of_ros_are_named() {
 
 #[test]
 fn plain_text_beyond_loopback_is_refused() {
-    for (http, zenoh, ok) in [
-        ("127.0.0.1:0", "tcp/[::1]:7447", true),
-        ("127.9.9.9:80", "tcp/127.0.0.1:0", true),
-        ("0.0.0.0:8080", "tcp/127.0.0.1:7447", false),
-        ("[::]:8080", "tcp/127.0.0.1:7447", false),
-        ("127.0.0.1:8080", "tcp/0.0.0.0:7447", false),
-        ("127.0.0.1:8080", "tcp/192.168.1.4:7447", false),
-    ] {
+    let cases: [(&str, &str, &[&str]); 6] = [
+        ("127.0.0.1:0", "tcp/[::1]:7447", &[]),
+        ("127.9.9.9:80", "tcp/127.0.0.1:0", &[]),
+        ("0.0.0.0:8080", "tcp/127.0.0.1:7447", &["http"]),
+        ("[::]:8080", "tcp/192.168.1.4:7447", &["http", "zenoh"]),
+        ("127.0.0.1:8080", "tcp/0.0.0.0:7447", &["zenoh"]),
+        ("127.0.0.1:8080", "tcp/192.168.1.4:7447", &["zenoh"]),
+    ];
+    for (http, zenoh, reachable) in cases {
         let raw = RawConfig { http: http.into(), zenoh: zenoh.into(), ..RawConfig::default() };
-        assert_eq!(Config::try_from(raw.clone()).is_ok(), ok, "{http} {zenoh}");
-        assert!(Config::try_from(RawConfig { insecure: true, ..raw }).is_ok());
+        assert_eq!(Config::try_from(raw.clone()).is_ok(), reachable.is_empty(), "{http} {zenoh}");
+        let trusted = Config::try_from(RawConfig { insecure: true, ..raw }).unwrap();
+        let found = trusted.plain_text_beyond_loopback();
+        assert_eq!(
+            found.iter().map(|(setting, _)| *setting).collect::<Vec<_>>(),
+            reachable,
+            "{http} {zenoh}"
+        );
     }
 }
 

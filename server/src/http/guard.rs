@@ -50,7 +50,12 @@ pub(super) async fn guard(State(app): State<AppState>, request: Request, next: N
         },
     };
     let ms = started.elapsed().as_secs_f64() * 1e3;
-    tracing::debug!(id = ?id, %method, path, status = response.status().as_u16(), ms, "request");
+    let status = response.status();
+    if is_change(&method, status) {
+        tracing::info!(id = ?id, %method, path, status = status.as_u16(), ms, "changed");
+    } else {
+        tracing::debug!(id = ?id, %method, path, status = status.as_u16(), ms, "request");
+    }
     let docs = path.starts_with("/api/docs");
     let headers = response.headers_mut();
     headers.insert(REQUEST_ID, id);
@@ -60,6 +65,11 @@ pub(super) async fn guard(State(app): State<AppState>, request: Request, next: N
     headers.insert(header::REFERRER_POLICY, HeaderValue::from_static("no-referrer"));
     headers.insert("cross-origin-resource-policy", HeaderValue::from_static("same-origin"));
     response
+}
+
+/// Whether something was changed. Some questions are put by POST: they are answered with 200, creations are not.
+fn is_change(method: &Method, status: StatusCode) -> bool {
+    status.is_success() && !method.is_safe() && (*method != Method::POST || status != StatusCode::OK)
 }
 
 /// Handles a request. One with a large body has a place from before its body is read until it is answered.
@@ -156,6 +166,25 @@ mod tests {
         assert!(check_origin(&Method::GET, &foreign, true).is_ok());
         let none = headers(&[("host", "localhost:8080")]);
         assert!(check_origin(&Method::DELETE, &none, true).is_ok());
+    }
+
+    #[test]
+    fn what_changes_something_is_told_from_a_question() {
+        let is = |method: Method, status: u16| is_change(&method, StatusCode::from_u16(status).unwrap());
+        for (method, status) in [
+            (Method::POST, 201),
+            (Method::POST, 202),
+            (Method::PUT, 200),
+            (Method::PATCH, 200),
+            (Method::DELETE, 204),
+        ] {
+            assert!(is(method.clone(), status), "{method} {status}");
+        }
+        for (method, status) in
+            [(Method::GET, 200), (Method::POST, 200), (Method::DELETE, 404), (Method::PUT, 422)]
+        {
+            assert!(!is(method.clone(), status), "{method} {status}");
+        }
     }
 
     #[test]

@@ -314,14 +314,20 @@ impl Jobs {
         }
         let ended = match learn::run(&self.store, &self.config, row, &reporter).await {
             // The row has ended together with the models.
-            Ok(()) => return Ok(()),
+            Ok(()) => {
+                tracing::info!(job = id, map = row.map, "job_done");
+                return Ok(());
+            }
             // It resumes at the next start.
             Err(JobError::Cancelled) if !reporter.cancelled.load(Ordering::Relaxed) => {
                 let write = self.store.write(move |tx| Box::pin(async move { jobs::put_back(tx, id).await }));
                 return write.await;
             }
             Err(JobError::Cancelled) => cancelled(),
-            Err(JobError::Failed(message)) => Ended { state: "failed", message, result: None },
+            Err(JobError::Failed(message)) => {
+                tracing::warn!(job = id, map = row.map, message, "job_failed");
+                Ended { state: "failed", message, result: None }
+            }
             Err(JobError::Store(error)) => {
                 tracing::error!(job = id, error = &error as &dyn std::error::Error, "job_failed");
                 Ended { state: "failed", message: error.to_string(), result: None }
