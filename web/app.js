@@ -104,7 +104,7 @@ async function showFrame(key, answer) {
     const work = (answer.timings ?? []).reduce((sum, t) => sum + t.ms, 0);
     byId("frame-facts").textContent = answer.rejection
       ? `frame ${answer.seq} refused, ${answer.rejection.field}: ${answer.rejection.detail}`
-      : `frame ${answer.seq}: ${answer.status}, ${answer.quads.length} quads, ` +
+      : `frame ${answer.seq}: ${answer.status}, ${answer.quads.length} ${answer.quads.length === 1 ? "quad" : "quads"}, ` +
         `${work.toFixed(1)} ms of work, answered after ${answer.latency_ms.toFixed(0)} ms`;
   } finally { frameBusy = false; }
 }
