@@ -1,6 +1,7 @@
 // The live page: the map from above with every robot's trajectories, and the last frame of one camera with its quads.
 // Reads the HTTP API once, then follows `maps/{map}/live` (server-sent events). Draws at most once per animation frame.
 
+import { offer, wireUp as wireUpFirstMap } from "/first-map.js";
 import { drawFrame, quadCells } from "/frame.js";
 import { drawHypotheses, fromAnswer, fromServer, positionText } from "/hypotheses.js";
 import { drawModalities, loadModalities } from "/modalities.js";
@@ -121,6 +122,14 @@ function fit() {
   const xs = [], ys = [];
   for (const w of state.walls) for (const [x, y] of [w.a, w.b]) { xs.push(x); ys.push(y); }
   for (const l of state.landmarks) if (l.place) { xs.push(l.place.x_m); ys.push(l.place.y_m); }
+  if (state.underlay) {
+    const { picture, place } = state.underlay, [c, s] = [Math.cos(place.theta_rad), Math.sin(place.theta_rad)];
+    for (const [u, v] of [[0, 0], [picture.width, 0], [0, picture.height], [picture.width, picture.height]]) {
+      const [x, y] = [u * place.metres_per_pixel, v * place.metres_per_pixel];
+      xs.push(place.x_m + c * x - s * y);
+      ys.push(place.y_m + s * x + c * y);
+    }
+  }
   if (!xs.length) return;
   const canvas = byId("map");
   const [x0, x1, y0, y1] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
@@ -372,13 +381,16 @@ async function loadMap(name) {
   await loadTrajectories(name);
   Object.assign(state, { map: name, walls: walls.segments, landmarks: landmarks.items, dirty: true });
   listNotInUse();
-  loadUnderlay(name);
+  loadUnderlay(name).then(() => {
+    offer(name, !state.walls.length && !state.underlay);
+    if (!state.view.fitted) fit();
+  });
   if (state.chosen) choose(state.landmarks.find((l) => l.name === state.chosen));
   const active = state.landmarks.filter((l) => l.status === "active").length;
   const where = [map.site, map.building, map.floor].filter(Boolean).join(" / ");
   const lies = map.parent ? `, in ${map.parent.map} at ${map.parent.x_m.toFixed(1)}, ${map.parent.y_m.toFixed(1)} m` : "";
   byId("map-facts").textContent = `${where}${where ? ", " : ""}version ${map.version}, ${active} of ${state.landmarks.length} landmarks active, ${state.walls.length} walls${lies}`;
-  byId("map-hint").textContent = state.walls.length || state.landmarks.some((l) => l.place) ? "" : "This map has no walls and no placed landmarks yet.";
+  byId("map-hint").textContent = state.walls.length || state.landmarks.some((l) => l.place) ? "" : "This map has no walls and no placed landmarks yet. Walls come from a grid, a plan or a laser log: waymark map import.";
   if (!state.view.fitted) fit();
   loadModalities(name, () => { state.dirty = true; });
   window.dispatchEvent(new CustomEvent("map-loaded", { detail: { map: name, landmarks: state.landmarks } }));
@@ -430,7 +442,8 @@ async function start() {
   const asked = new URLSearchParams(location.search).get("map");
   const name = maps.some((m) => m.name === asked) ? asked : maps[0]?.name;
   if (!name) {
-    byId("map-hint").textContent = "There is no map yet. Make one: waymark map create NAME. Then its floor plan: waymark map import NAME FILE.";
+    byId("map-hint").textContent = "There is no map yet.";
+    offer(null, true);
     setTimeout(start, 2000);
     return;
   }
@@ -440,6 +453,7 @@ async function start() {
 }
 
 function wireUp() {
+  wireUpFirstMap((name) => { location.search = `?map=${encodeURIComponent(name)}`; });
   window.addEventListener("maps-changed", () => mapsChanged().catch(() => { /* the next change brings it */ }));
   byId("map-choice").addEventListener("change", (e) => { location.search = `?map=${encodeURIComponent(e.target.value)}`; });
   byId("camera-choice").addEventListener("change", (e) => {

@@ -4,9 +4,10 @@ use super::AppState;
 use axum::{Router, http::header, response::IntoResponse, routing::get};
 
 /// Path, media type, content.
-const FILES: [(&str, &str, &str); 10] = [
+const FILES: [(&str, &str, &str); 11] = [
     ("/", "text/html; charset=utf-8", include_str!("../../../web/index.html")),
     ("/app.js", "text/javascript; charset=utf-8", include_str!("../../../web/app.js")),
+    ("/first-map.js", "text/javascript; charset=utf-8", include_str!("../../../web/first-map.js")),
     ("/frame.js", "text/javascript; charset=utf-8", include_str!("../../../web/frame.js")),
     ("/naming.js", "text/javascript; charset=utf-8", include_str!("../../../web/naming.js")),
     ("/corrections.js", "text/javascript; charset=utf-8", include_str!("../../../web/corrections.js")),
