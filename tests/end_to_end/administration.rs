@@ -142,6 +142,32 @@ fn every_class_of_failure_has_its_exit_status_and_names_the_next_command() {
 }
 
 #[test]
+fn a_map_gets_another_name_while_nothing_works_on_it() {
+    let desk = Desk::new();
+    desk.done("map create hall");
+    desk.done("map create office");
+    desk.failed("map rename hall office", 4, "exists");
+    assert!(desk.failed("map rename hall Hall", 2, "usage").contains("use `hall`?"));
+    desk.done("robot add r1 --map hall");
+    let busy = desk.failed("map rename hall lobby", 4, "in_use");
+    assert!(busy.contains("robot `r1`"), "{busy}");
+    desk.done("robot add r1 --map office");
+    let photograph = desk.path("poster.png");
+    wall_with(&photograph, &[1]);
+    desk.done(&format!("landmark teach poster {photograph} --map hall"));
+    assert!(desk.done("map rename hall lobby").contains("lobby now"));
+    desk.failed("map show hall", 3, "unknown_map");
+    let found: Value = serde_json::from_str(&desk.done("map show lobby --json")).expect("JSON");
+    let found = &found["map"];
+    assert_eq!((&found["name"], &found["landmarks"]), (&"lobby".into(), &1.into()), "{found}");
+    // What is recognised is recognised under the new name at once.
+    let seen = desk.done(&format!("recognise {photograph} --map lobby --json"));
+    let seen: Value = serde_json::from_str(&seen).expect("JSON");
+    assert_eq!(seen["map"], "lobby", "{seen}");
+    desk.server.kill();
+}
+
+#[test]
 fn one_of_several_framed_things_is_picked() {
     let desk = Desk::new();
     desk.done("map create office");

@@ -50,6 +50,7 @@ impl LocationArgs {
     /// A change to what is given; the rest stays.
     pub(super) fn patch(&self) -> MapPatch {
         MapPatch {
+            name: None,
             site: self.site.clone().map(Some),
             building: self.building.clone().map(Some),
             floor: self.floor.clone().map(Some),

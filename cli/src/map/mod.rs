@@ -83,6 +83,16 @@ enum Verb {
     },
     /// Show or set the fusion mode of a map: what is fused where reference runs know the best modality.
     Fusion(fusion::FusionArgs),
+    /// Give a map another name; no robot may be on it.
+    Rename {
+        /// The map.
+        map: String,
+        /// Its new name: lower-case letters, digits, `-` and `_`.
+        #[arg(value_parser = name)]
+        new_name: String,
+        #[command(flatten)]
+        server: ServerArgs,
+    },
     /// Delete a map with its landmarks, walls and runs. This cannot be undone.
     Delete {
         /// The map.
@@ -163,6 +173,7 @@ pub(crate) async fn run(args: &Args) -> anyhow::Result<()> {
         | Verb::Show { server, .. }
         | Verb::Locate { server, .. }
         | Verb::Visibility { server, .. }
+        | Verb::Rename { server, .. }
         | Verb::Delete { server, .. } => {
             let session = server.session()?;
             session.explained(on_server(&session, &args.verb).await).await
@@ -188,6 +199,10 @@ async fn on_server(session: &Session, verb: &Verb) -> anyhow::Result<()> {
         Verb::Visibility { map, visibility, .. } => {
             let settings = visibility.set(maps, map).await?;
             session.show(&settings, &visibility::sentences(map, &settings))
+        }
+        Verb::Rename { map, new_name, .. } => {
+            let renamed = maps.rename_map(map, new_name).await?;
+            session.show(&renamed, &format!("map {map} is {new_name} now"))
         }
         Verb::Delete { map, consent, .. } => {
             let found = maps.map(map).await?;
@@ -216,7 +231,11 @@ async fn show(session: &Session, name: &str) -> anyhow::Result<()> {
     let map = maps.map(name).await?;
     let walls = maps.walls(name).await?;
     let landmarks = maps.landmarks(name).await?;
-    let length_m: f64 = walls.segments.iter().map(|w| (w.b[0] - w.a[0]).hypot(w.b[1] - w.a[1])).sum();
+    let length_m: f64 = walls
+        .segments
+        .iter()
+        .map(|w| (w.b[0] - w.a[0]).hypot(w.b[1] - w.a[1]))
+        .fold(0.0, |sum, each| sum + each);
     let active = landmarks.iter().filter(|l| l.status == LandmarkStatus::Active);
     let placed = active.clone().filter(|l| l.place.is_some() && l.size.is_some()).count();
     let active = active.count();

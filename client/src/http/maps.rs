@@ -34,6 +34,11 @@ impl MapClient {
         self.send(self.ask(&LOCATE, &[&map])?.json(patch)).await
     }
 
+    /// Gives a map another name.
+    pub async fn rename_map(&self, map: &str, new: &str) -> Result<Map, ClientError> {
+        self.locate_map(map, &MapPatch { name: Some(new.to_owned()), ..MapPatch::default() }).await
+    }
+
     /// Deletes a map and all that is in it.
     pub async fn delete_map(&self, map: &str) -> Result<(), ClientError> {
         self.done(self.ask(&DELETE, &[&map])?).await

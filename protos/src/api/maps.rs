@@ -125,6 +125,9 @@ impl NewMap {
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct MapPatch {
+    /// Another name. Refused while a robot, an open job or an open gathering has the present one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
     /// The site it belongs to, in words: 1 to 64 characters.
     #[serde(
         default,
@@ -213,6 +216,6 @@ mod tests {
         let expected = MapPatch { site: Some(None), floor: Some(Some("1st".into())), ..MapPatch::default() };
         assert_eq!(patch, expected);
         assert_eq!(serde_json::to_string(&patch).unwrap(), r#"{"site":null,"floor":"1st"}"#);
-        assert!(serde_json::from_str::<MapPatch>(r#"{"name": "other"}"#).is_err());
+        assert!(serde_json::from_str::<MapPatch>(r#"{"names": "other"}"#).is_err());
     }
 }

@@ -149,16 +149,18 @@ async fn get(
     Ok(Json(map_shown(row, found)))
 }
 
-/// Changes a map's site, building, floor or position.
+/// Changes a map's name, site, building, floor or position.
 #[utoipa::path(patch, path = "/maps/{map}", tag = "maps", params(("map" = String, Path)), request_body = MapPatch,
     responses((status = 200, body = Map), (status = 404, body = Problem),
-    (status = 409, body = Problem, description = "cycle: it would lie in itself; too_deep"),
-    (status = 422, body = Problem, description = "out_of_range, invalid_value")))]
+    (status = 409, body = Problem, description = "cycle: it would lie in itself; too_deep; exists: the new name; \
+     in_use: a robot, an open job or an open gathering has the present name"),
+    (status = 422, body = Problem, description = "bad_name, out_of_range, invalid_value")))]
 async fn patch(
     State(app): State<AppState>,
     PathParams(map): PathParams<String>,
     Body(changes): Body<MapPatch>,
 ) -> Result<Json<Map>, ApiError> {
+    let new_name = changes.name.map(|new| name("name", new)).transpose()?;
     let changed = |field, given: Option<Option<String>>| given.map(|text| word(field, text)).transpose();
     let (site, building) = (changed("site", changes.site)?, changed("building", changes.building)?);
     let floor = changed("floor", changes.floor)?;
@@ -173,7 +175,9 @@ async fn patch(
                 link: parent.unwrap_or(old.link),
             })
             .await?;
-            Ok((maps::of(tx, &map).await?, found))
+            let now = new_name.as_ref().map_or(map.as_str(), protos::Name::as_str);
+            maps::rename(tx, &map, now).await?;
+            Ok((maps::of(tx, now).await?, found))
         })
     });
     let (row, found) = write.await.map_err(|e| unknown_parent(e.into()))?;

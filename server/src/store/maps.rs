@@ -13,6 +13,10 @@ statements! {
             FROM maps WHERE name > ?1 ORDER BY name LIMIT ?2";
     BUMP = "UPDATE maps SET version = version + 1 WHERE id = ?1";
     DELETE = "DELETE FROM maps WHERE id = ?1";
+    RENAME = "UPDATE maps SET name = ?2, version = version + 1 WHERE id = ?1";
+    RENAME_IN_JOBS = "UPDATE jobs SET map = ?2 WHERE map = ?1";
+    OPEN_JOB = "SELECT id FROM jobs WHERE map = ?1 AND state IN ('queued', 'running') LIMIT 1";
+    OPEN_GATHERING = "SELECT id FROM gatherings WHERE map_id = ?1 AND open = 1 LIMIT 1";
     LIES_IN = "SELECT name FROM maps WHERE parent_id = ?1 ORDER BY name LIMIT 1";
     ROBOT_ON = "SELECT name FROM robots WHERE map_id = ?1 ORDER BY name LIMIT 1";
 }
@@ -117,17 +121,54 @@ pub(crate) async fn bump(tx: &mut Tx, id: i64) -> Result<(), StoreError> {
     Ok(())
 }
 
-/// Deletes a map and all that is in it. Errors: `InUse` while a robot is on it, or another map is linked to it.
-pub(crate) async fn delete(tx: &mut Tx, name: &str) -> Result<(), StoreError> {
+/// Gives a map another name. Errors: `Exists`; `InUse` while a robot, an open job or an open gathering has the present one.
+pub(crate) async fn rename(tx: &mut Tx, name: &str, new: &str) -> Result<(), StoreError> {
     let map = get(&mut tx.conn, name).await?;
+    if name == new {
+        return Ok(());
+    }
+    no_robot_on(tx, &map).await?;
+    let job: Option<i64> = sqlx::query_scalar(OPEN_JOB)
+        .bind(name)
+        .fetch_optional(&mut tx.conn)
+        .await
+        .map_err(StoreError::during("look for jobs"))?;
+    let gathering: Option<i64> = sqlx::query_scalar(OPEN_GATHERING)
+        .bind(map.id)
+        .fetch_optional(&mut tx.conn)
+        .await
+        .map_err(StoreError::during("look for gatherings"))?;
+    for (what, id) in [("job", job), ("gathering", gathering)] {
+        if let Some(id) = id {
+            return Err(StoreError::InUse(format!("{what} {id} works on map `{name}`")));
+        }
+    }
+    let renamed = sqlx::query(RENAME).bind(map.id).bind(new).execute(&mut tx.conn).await;
+    renamed.map_err(StoreError::inserting("rename map", Kind::Map, new))?;
+    let in_jobs = sqlx::query(RENAME_IN_JOBS).bind(name).bind(new).execute(&mut tx.conn).await;
+    in_jobs.map_err(StoreError::during("rename map in jobs"))?;
+    tx.changed(CommittedChange::MapRemoved(map.name));
+    tx.changed(CommittedChange::Map(map.id));
+    tx.changed(CommittedChange::Links);
+    Ok(())
+}
+
+async fn no_robot_on(tx: &mut Tx, map: &MapRow) -> Result<(), StoreError> {
     let robot: Option<String> = sqlx::query_scalar(ROBOT_ON)
         .bind(map.id)
         .fetch_optional(&mut tx.conn)
         .await
         .map_err(StoreError::during("look for robots"))?;
-    if let Some(robot) = robot {
-        return Err(StoreError::InUse(format!("robot `{robot}` stands on map `{name}`")));
+    match robot {
+        Some(robot) => Err(StoreError::InUse(format!("robot `{robot}` stands on map `{}`", map.name))),
+        None => Ok(()),
     }
+}
+
+/// Deletes a map and all that is in it. Errors: `InUse` while a robot is on it, or another map is linked to it.
+pub(crate) async fn delete(tx: &mut Tx, name: &str) -> Result<(), StoreError> {
+    let map = get(&mut tx.conn, name).await?;
+    no_robot_on(tx, &map).await?;
     let inner: Option<String> = sqlx::query_scalar(LIES_IN)
         .bind(map.id)
         .fetch_optional(&mut tx.conn)

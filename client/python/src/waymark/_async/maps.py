@@ -90,6 +90,10 @@ class AsyncMaps(AsyncBase):
         body = given(site=site, building=building, floor=floor, parent=parent)
         return await self._send(Map, "locate_map", map, json=body)
 
+    async def rename_map(self, map: str, new_name: str) -> Map:
+        """Gives a map another name; no robot may be on it."""
+        return await self._send(Map, "locate_map", map, json={"name": new_name})
+
     async def delete_map(self, map: str) -> None:
         """Deletes a map and all that is in it."""
         await self._done("delete_map", map)

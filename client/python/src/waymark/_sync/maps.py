@@ -91,6 +91,10 @@ class Maps(Base):
         body = given(site=site, building=building, floor=floor, parent=parent)
         return self._send(Map, "locate_map", map, json=body)
 
+    def rename_map(self, map: str, new_name: str) -> Map:
+        """Gives a map another name; no robot may be on it."""
+        return self._send(Map, "locate_map", map, json={"name": new_name})
+
     def delete_map(self, map: str) -> None:
         """Deletes a map and all that is in it."""
         self._done("delete_map", map)
