@@ -4,7 +4,7 @@ use super::AppState;
 use axum::{Router, http::header, response::IntoResponse, routing::get};
 
 /// Path, media type, content.
-const FILES: [(&str, &str, &str); 10] = [
+const FILES: [(&str, &str, &str); 11] = [
     ("/", "text/html; charset=utf-8", include_str!("../../../web/index.html")),
     ("/app.js", "text/javascript; charset=utf-8", include_str!("../../../web/app.js")),
     ("/frame.js", "text/javascript; charset=utf-8", include_str!("../../../web/frame.js")),
@@ -13,6 +13,7 @@ const FILES: [(&str, &str, &str); 10] = [
     ("/gather.js", "text/javascript; charset=utf-8", include_str!("../../../web/gather.js")),
     ("/modalities.js", "text/javascript; charset=utf-8", include_str!("../../../web/modalities.js")),
     ("/hypotheses.js", "text/javascript; charset=utf-8", include_str!("../../../web/hypotheses.js")),
+    ("/session.js", "text/javascript; charset=utf-8", include_str!("../../../web/session.js")),
     ("/setting.js", "text/javascript; charset=utf-8", include_str!("../../../web/setting.js")),
     ("/style.css", "text/css; charset=utf-8", include_str!("../../../web/style.css")),
 ];
