@@ -126,30 +126,30 @@ impl MapClient {
     /// Sends, and turns refusals into errors. A 401 of a server on this machine is followed by a second try with its token.
     pub(super) async fn checked(&self, request: RequestBuilder) -> Result<Response, ClientError> {
         let request = request.build().map_err(|e| self.unsent(&e))?;
-        let Some(again) = request.try_clone() else {
-            // A form is a stream that can be sent once: the token must be right before.
-            self.find_local_token().await?;
-            return refused(self.execute(request, self.token().as_deref()).await?, None).await;
-        };
+        let again = request.try_clone();
+        // A form is a stream that can be sent once, and a refusal may break off a large body: the token is found before.
+        if again.is_none() || (request.body().is_some() && self.token().is_none()) {
+            self.find_local_token().await;
+        }
         let sent = self.token();
         let response = self.execute(request, sent.as_deref()).await?;
-        match self.take_local_token(&response, sent.as_deref()) {
-            Ok(true) => refused(self.execute(again, self.token().as_deref()).await?, None).await,
-            Ok(false) => refused(response, None).await,
-            Err(error) => refused(response, Some(error)).await,
+        match (self.take_local_token(&response, sent.as_deref()), again) {
+            (Ok(true), Some(again)) => refused(self.execute(again, self.token().as_deref()).await?, None).await,
+            (Ok(_), _) => refused(response, None).await,
+            (Err(error), _) => refused(response, Some(error)).await,
         }
     }
 
-    /// Makes sure that the token is that of the server on this machine, if there is one and no other token was given.
-    async fn find_local_token(&self) -> Result<(), ClientError> {
-        if self.local_port.is_some() {
-            let asked = self.http.request(Method::GET, format!("{}/api/v1/whoami", self.base)).build();
+    /// Makes sure that the token is that of the server on this machine, if there is one and no other token was given. What
+    /// goes wrong here goes wrong with the request, too, which says so.
+    async fn find_local_token(&self) {
+        let asked = self.http.request(Method::GET, format!("{}/api/v1/whoami", self.base)).build();
+        if let Some(asked) = asked.ok().filter(|_| self.local_port.is_some()) {
             let sent = self.token();
-            let response = self.execute(asked.map_err(|e| self.unsent(&e))?, sent.as_deref()).await?;
-            // Without one, the request itself is refused with the reason.
-            self.take_local_token(&response, sent.as_deref()).ok();
+            if let Ok(response) = self.execute(asked, sent.as_deref()).await {
+                self.take_local_token(&response, sent.as_deref()).ok();
+            }
         }
-        Ok(())
     }
 
     async fn execute(&self, mut request: Request, token: Option<&str>) -> Result<Response, ClientError> {

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
@@ -39,6 +40,7 @@ class Base:
     def _checked(self, call: str, at: Sequence[str | int], is_stream: bool = False, **parts: Any) -> httpx.Response:
         method, path = request_of(call, at)
         try:
+            self._find_local_token(parts)
             sent = self._token
             response = self._sent(method, path, is_stream, parts)
             reason = ""
@@ -55,6 +57,14 @@ class Base:
             return response
         except httpx.HTTPError as error:
             raise unreachable(self._base, error) from error
+
+    def _find_local_token(self, parts: dict[str, Any]) -> None:
+        """Finds the token of the server on this machine before a body is sent: a refusal may break off a large one."""
+        is_large = "files" in parts or (self._token is None and "json" in parts)
+        if self._local_port is not None and is_large:
+            response = self._sent(*request_of("whoami", ()), is_stream=False, parts={})
+            with contextlib.suppress(_local_token.NotUsedError):
+                self._take_local_token(response)
 
     def _sent(self, method: str, path: str, is_stream: bool, parts: dict[str, Any]) -> httpx.Response:
         headers = {"Authorization": f"Bearer {self._token}"} if self._token is not None else None
