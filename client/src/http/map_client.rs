@@ -134,7 +134,9 @@ impl MapClient {
         let sent = self.token();
         let response = self.execute(request, sent.as_deref()).await?;
         match (self.take_local_token(&response, sent.as_deref()), again) {
-            (Ok(true), Some(again)) => refused(self.execute(again, self.token().as_deref()).await?, None).await,
+            (Ok(true), Some(again)) => {
+                refused(self.execute(again, self.token().as_deref()).await?, None).await
+            }
             (Ok(_), _) => refused(response, None).await,
             (Err(error), _) => refused(response, Some(error)).await,
         }
