@@ -6,6 +6,7 @@ import { drawFrame, quadCells } from "/frame.js";
 import { drawHypotheses, fromAnswer, fromServer, positionText } from "/hypotheses.js";
 import { drawModalities, loadModalities } from "/modalities.js";
 import { named, trustText } from "/naming.js";
+import { api } from "/session.js";
 
 const API = "/api/v1";
 const TRAJECTORY_POINTS = 4000; // per robot and kind: the oldest are forgotten
@@ -20,7 +21,7 @@ const state = {
 };
 
 const getJson = async (path) => {
-  const answer = await fetch(API + path, { headers: { accept: "application/json" } });
+  const answer = await api(path, { headers: { accept: "application/json" } });
   if (!answer.ok) throw new Error(`${path}: ${answer.status}`);
   return answer.json();
 };
@@ -82,7 +83,11 @@ function follow(map) {
   state.source = source;
   const link = byId("link");
   source.onopen = () => { link.textContent = "live"; link.className = "link-live"; };
-  source.onerror = () => { link.textContent = "connection lost, trying again"; link.className = "link-lost"; };
+  source.onerror = () => {
+    // Refused, and not only interrupted: whoever is not signed in is asked.
+    if (source.readyState === EventSource.CLOSED) api("/whoami").catch(() => { /* asked already */ });
+    link.textContent = "connection lost, trying again"; link.className = "link-lost";
+  };
   for (const [kind, hear] of Object.entries(heard)) {
     source.addEventListener(kind, (event) => { hear(JSON.parse(event.data)); state.dirty = true; });
   }
@@ -96,7 +101,7 @@ async function showFrame(key, answer) {
   frameBusy = true;
   try {
     const [robot, camera] = key.split("/");
-    const reply = await fetch(`${API}/robots/${robot}/cameras/${camera}/frame?seq=${answer.seq}`, { cache: "no-store" });
+    const reply = await api(`/robots/${robot}/cameras/${camera}/frame?seq=${answer.seq}`, { cache: "no-store" });
     if (!reply.ok) return;
     const picture = await createImageBitmap(await reply.blob());
     drawFrame(byId("frame"), picture, answer);
@@ -224,7 +229,7 @@ function drawUnderlay(c, px, px_per_m) {
 async function loadUnderlay(map) {
   const path = `/maps/${encodeURIComponent(map)}/underlay`;
   const underlay = await getJson(path).catch(() => null);
-  const reply = underlay && await fetch(`${API}${path}/image`);
+  const reply = underlay && await api(`${path}/image`);
   const picture = reply?.ok ? await createImageBitmap(await reply.blob()) : null;
   if (state.map !== map) return;
   state.underlay = picture && { picture, place: underlay.place };

@@ -2,8 +2,8 @@
 // Hears from app.js which map is shown; asks only while the panel is open.
 
 import { correctionCells, totalsText } from "/naming.js";
+import { api } from "/session.js";
 
-const API = "/api/v1";
 const POLL_MS = 2000;
 const SHOWN = 40;
 const byId = (id) => document.getElementById(id);
@@ -11,7 +11,7 @@ const panel = byId("corrections-panel");
 let map = null;
 
 async function asked(path) {
-  const answer = await fetch(API + path, { headers: { accept: "application/json" } });
+  const answer = await api(path, { headers: { accept: "application/json" } });
   if (!answer.ok) throw new Error(`${path}: ${answer.status}`);
   return answer.json();
 }

@@ -1,12 +1,13 @@
 // What a server without maps and a map without walls offer: to make a map, and to lay a floor plan under it.
 
-const API = "/api/v1";
+import { api } from "/session.js";
+
 const byId = (id) => document.getElementById(id);
 
 async function send(method, path, body) {
   const headers = { accept: "application/json", "if-match": "*" };
   if (typeof body === "string") headers["content-type"] = "application/json";
-  const answer = await fetch(API + path, { method, headers, body });
+  const answer = await api(path, { method, headers, body });
   if (!answer.ok) throw new Error((await answer.json().catch(() => ({}))).detail ?? `${answer.status}`);
 }
 

@@ -1,6 +1,8 @@
 // The panel for views gathered while a robot drives: turn it on, watch the counts, look at the tracks, accept or throw
 // away. Hears from app.js which map is shown; talks to `maps/{map}/gatherings`.
 
+import { api } from "/session.js";
+
 const API = "/api/v1";
 const POLL_MS = 2000;
 
@@ -13,7 +15,7 @@ async function ask(method, path, body) {
     init.headers["content-type"] = "application/json";
     init.body = JSON.stringify(body);
   }
-  const answer = await fetch(API + path, init);
+  const answer = await api(path, init);
   const value = answer.status === 204 ? null : await answer.json();
   if (!answer.ok) throw new Error(value?.detail ?? `${path}: ${answer.status}`);
   return value;

@@ -1,14 +1,15 @@
 // Which modality is best where, as runs have shown: a layer of the map, and the choice of what is fused.
 // A square metre has four triangles, one for each heading in which it was driven through.
 
-const API = "/api/v1";
+import { api } from "/session.js";
+
 const byId = (id) => document.getElementById(id);
 const known = { map: null, areas: null, changed: () => {} };
 
 const shown = () => document.querySelector("[data-layer=modalities]").checked;
 
 async function asked(path, options) {
-  const answer = await fetch(API + path, { headers: { "content-type": "application/json" }, ...options });
+  const answer = await api(path, { headers: { "content-type": "application/json" }, ...options });
   const body = await answer.json();
   if (!answer.ok) throw new Error(body.detail ?? body.title);
   return body;

@@ -1,7 +1,8 @@
 // What an administrator says of a map: where it belongs and lies, and which camera looks for its landmarks. Angles are in
 // degrees here and in radians on the wire; what the server refuses is said at its field.
 
-const API = "/api/v1";
+import { api } from "/session.js";
+
 const byId = (id) => document.getElementById(id);
 const DEG = Math.PI / 180;
 
@@ -19,7 +20,7 @@ let map = null;
 async function ask(method, path, body) {
   const options = { method, headers: { accept: "application/json" } };
   if (body !== undefined) Object.assign(options, { body: JSON.stringify(body), headers: { ...options.headers, "content-type": "application/json" } });
-  const answer = await fetch(API + path, options);
+  const answer = await api(path, options);
   const found = await answer.json().catch(() => ({}));
   if (!answer.ok) throw Object.assign(new Error(found.detail ?? `${answer.status}`), { field: found.field });
   return found;

@@ -49,6 +49,10 @@ pub(crate) async fn explained(failure: Failure, maps: Option<&MapClient>, map: O
         "unknown_track" => failure.advised("waymark gathering show GATHERING lists the tracks."),
         "unknown_view" => failure.advised("waymark view list LANDMARK shows the numbers."),
         "unknown_reference_run" => failure.advised("waymark run list shows the numbers."),
+        "unknown_token" => failure.advised("waymark token list shows the numbers."),
+        "unauthenticated" => {
+            failure.advised("Sign in with a token: waymark login, or give it with WAYMARK_TOKEN.")
+        }
         "unknown_camera" => failure.advised("waymark camera list ROBOT shows the cameras."),
         "not_recording" => failure.advised("Begin a recording: waymark run start ROBOT"),
         "exists" => failure.advised("Choose another name, or delete the other one first."),

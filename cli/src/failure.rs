@@ -23,11 +23,14 @@ pub(crate) enum Class {
     Refused = 5,
     /// No server answers.
     Unreachable = 6,
+    /// The server does not know who asks, or does not let them.
+    Denied = 7,
 }
 
 /// What `--help` says of exit statuses.
 pub(crate) const EXIT_STATUSES: &str = "Exit status: 0 done, 1 failed, 2 wrong use, 3 not found, 4 conflict,\n\
-    5 refused by a check (a photograph or a model that fails a gate), 6 no server answers.";
+    5 refused by a check (a photograph or a model that fails a gate), 6 no server answers,\n\
+    7 not signed in, or not allowed.";
 
 impl Class {
     pub(crate) fn exit_code(self) -> ExitCode {
@@ -36,6 +39,7 @@ impl Class {
 
     fn of_status(status: u16, code: &str) -> Self {
         match (status, code) {
+            (401 | 403, _) => Self::Denied,
             (404, _) => Self::NotFound,
             (409 | 412, _) => Self::Conflict,
             (422, code) if PICTURE_CODES.contains(&code) => Self::Refused,
@@ -157,6 +161,8 @@ mod tests {
     #[test]
     fn every_class_has_its_own_exit_status() {
         for (error, wanted) in [
+            (refused(401, "unauthenticated"), 7),
+            (refused(403, "forbidden"), 7),
             (refused(404, "unknown_map"), 3),
             (refused(409, "exists"), 4),
             (refused(422, "quad_ambiguous"), 5),

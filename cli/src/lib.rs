@@ -12,6 +12,7 @@ pub mod drawing;
 mod explain;
 mod failure;
 mod gathering;
+mod identity;
 mod job;
 mod landmark;
 pub mod map;
@@ -59,6 +60,18 @@ enum Command {
     Serve(serve::Serve),
     /// Whether a server does its work: status.
     Server(server_status::Args),
+    /// Who may do what on a server: create, list, revoke tokens.
+    Token(identity::token::Args),
+    /// Keep a token for a server: that of --token, or the first line of standard input
+    ///
+    /// On the server's own machine nobody needs one. For example:
+    ///   waymark login < kim.token
+    #[command(verbatim_doc_comment)]
+    Login(identity::login::Args),
+    /// Forget the token of a server.
+    Logout(identity::login::Args),
+    /// A link that opens the page once, with your rights, within ten minutes.
+    Open(identity::open::Args),
     /// Maps: create, list, show, locate, delete; walls from laser logs, grids and plans.
     Map(map::Args),
     /// Landmarks: teach, list, show, place, size, rename, delete, accept.
@@ -153,6 +166,10 @@ pub fn main() -> ExitCode {
         Command::Demo(args) => run(demo::run(args)),
         Command::Serve(serve) => run(serve.clone().run()).map(done),
         Command::Server(args) => run(server_status::run(args)).map(done),
+        Command::Token(args) => run(identity::token::run(args)).map(done),
+        Command::Login(args) => run(identity::login::login(args)).map(done),
+        Command::Logout(args) => identity::login::logout(args).map(done),
+        Command::Open(args) => run(identity::open::run(args)).map(done),
         Command::Map(args) => run(map::run(args)).map(done),
         Command::Landmark(args) => run(landmark::run(args)).map(done),
         Command::View(args) => run(view::run(args)).map(done),

@@ -7,31 +7,35 @@ use server::{
     RunningServer, Server,
     config::{Config, RawConfig},
 };
-use std::{path::PathBuf, time::Duration};
+use std::{
+    io::{IsTerminal as _, Write as _},
+    path::PathBuf,
+    time::Duration,
+};
 
 /// Time that the other parts have to end after one has failed.
 const STOP_AFTER_FAILURE: Duration = Duration::from_secs(20);
 
 /// What `--help` teaches.
-const HELP: &str = r#"Runs the server: zenoh for robots, HTTP for people and programs, one SQLite file for everything that lasts.
+const HELP: &str = r"Runs the server: zenoh for robots, HTTP for people and programs, one SQLite file for everything that lasts.
 
 Starts with no settings at all; then the page is at http://127.0.0.1:8080/, the API with its interactive
 documentation at http://127.0.0.1:8080/api/docs/, and robots connect to tcp/127.0.0.1:7447.
 
 Teach a first landmark from a photograph of a picture on a wall:
 
-  curl -X POST localhost:8080/api/v1/maps -H 'content-type: application/json' -d '{"name": "office"}'
-  curl -X POST localhost:8080/api/v1/maps/office/landmarks -H 'content-type: application/json' \
-       -d '{"name": "poster", "size": {"width_m": 0.6, "height_m": 0.84}}'
-  curl -X POST localhost:8080/api/v1/maps/office/landmarks/poster/views -F image=@photo.jpg
-  curl -X POST localhost:8080/api/v1/maps/office/landmarks/poster/learn
-  curl -X POST localhost:8080/api/v1/maps/office/recognise -F image=@other-photo.jpg
+  waymark map create office
+  waymark landmark teach poster photo.jpg --size 0.60x0.84
+  waymark recognise other-photo.jpg
+
+Commands and SDKs of the same user on the same machine find the token that `serve` writes to local-token in its data
+directory. `waymark open` prints a link that opens the page; `waymark token create` makes tokens for others.
 
 Runs until Ctrl-C or SIGTERM. If a part of it ends by itself, /readyz answers 503 with its name and the program ends with
 an error: start it again, and it goes on from what is on the disk.
 
 Settings come from defaults, then the file, then WAYMARK_... variables, then these options;
-server/config.example.toml lists all of them."#;
+server/config.example.toml lists all of them.";
 
 /// Runs the server until it is told to stop.
 #[derive(Debug, Clone, Args)]
@@ -55,8 +59,8 @@ pub(super) struct Serve {
     /// Vision threads [default: one per core].
     #[arg(long, value_name = "N")]
     workers: Option<usize>,
-    /// Allows addresses beyond loopback. Nothing is encrypted and nobody is asked who they are: only for a network
-    /// that is trusted as a whole.
+    /// Allows addresses beyond loopback. Nothing is encrypted, and robots are not asked who they are: only for a
+    /// network that is trusted as a whole.
     #[arg(long)]
     insecure: bool,
 }
@@ -123,11 +127,19 @@ async fn after(failure: &Failure, server: RunningServer) -> anyhow::Error {
     anyhow!("{failure}; start the server again: it goes on from what is on the disk")
 }
 
-/// The first lines on stdout, for people and for programs that started this one on port 0.
-#[expect(clippy::print_stdout, reason = "the one result of this command")]
+/// The first lines on stdout, for people and for programs that started this one on port 0. The link is a secret: where
+/// standard output is no terminal it may be a log.
 fn ready(server: &RunningServer) {
-    println!("pages   http://{}/", server.http_addr);
-    println!("robots  {}", server.zenoh_endpoint);
+    let link = server.page_link().filter(|_| std::io::stdout().is_terminal());
+    let open = link.unwrap_or_else(|| "waymark open prints a link that opens the page".to_owned());
+    let text = format!(
+        "pages   http://{}/\nrobots  {}\ntoken   {}\nopen    {open}\n",
+        server.http_addr,
+        server.zenoh_endpoint,
+        server.local_token_file().display()
+    );
+    // At once: who reads only the first lines may close the pipe after them.
+    std::io::stdout().write_all(text.as_bytes()).ok();
 }
 
 #[cfg(unix)]

@@ -3,6 +3,7 @@
 use super::{
     explain,
     failure::{Class, Failure},
+    identity::{TokenArg, credentials::Credentials},
     screen,
 };
 use client::{ClientError, MapClient, api::Job};
@@ -33,6 +34,16 @@ pub(crate) struct ServerArgs {
         default_value = "http://127.0.0.1:8080"
     )]
     server: String,
+    /// Token for the server [default: that of `waymark login`; on the server's own machine none is needed].
+    #[arg(
+        long,
+        global = true,
+        env = "WAYMARK_TOKEN",
+        hide_env_values = true,
+        help_heading = HEADING,
+        value_name = "TOKEN"
+    )]
+    token: Option<TokenArg>,
     /// Print results and errors as JSON.
     #[arg(long, global = true, help_heading = HEADING)]
     json: bool,
@@ -69,12 +80,31 @@ pub(crate) struct Session {
 impl ServerArgs {
     /// A session without a map.
     pub(crate) fn session(&self) -> anyhow::Result<Session> {
-        Ok(Session {
-            maps: MapClient::new(&self.server)?,
-            json: self.json,
-            named_map: None,
-            map: OnceLock::new(),
-        })
+        if let Some(token) = &self.token {
+            return self.session_with(Some(token));
+        }
+        let stored = Credentials::of_user().map(|file| file.token(&self.server)).transpose()?;
+        self.session_with(stored.flatten().as_ref())
+    }
+
+    /// A session with this token or none.
+    pub(crate) fn session_with(&self, token: Option<&TokenArg>) -> anyhow::Result<Session> {
+        let maps = MapClient::new(&self.server)?;
+        let maps = match token {
+            Some(token) => maps.with_token(&token.0),
+            None => maps,
+        };
+        Ok(Session { maps, json: self.json, named_map: None, map: OnceLock::new() })
+    }
+
+    /// Address of the server, without a slash at the end.
+    pub(crate) fn url(&self) -> &str {
+        self.server.trim_end_matches('/')
+    }
+
+    /// The token of the command line or the environment.
+    pub(crate) fn given_token(&self) -> Option<&TokenArg> {
+        self.token.as_ref()
     }
 }
 

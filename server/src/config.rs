@@ -27,7 +27,7 @@ use std::{
 use vision::{model::MAX_LANDMARKS, params::Params};
 
 /// Variables that begin with `WAYMARK_` but are read by the command line, not by the settings.
-const NOT_SETTINGS: [&str; 4] = ["config", "server", "map", "log"];
+const NOT_SETTINGS: [&str; 5] = ["config", "server", "map", "log", "token"];
 /// Most vision threads that can be asked for.
 pub const MAX_WORKERS: usize = 256;
 

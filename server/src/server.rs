@@ -5,6 +5,7 @@ use crate::{
     config::Config,
     gather::{self, Gatherer, GatheringTap},
     http::{self, App, Services},
+    identity::{Sessions, TokenId, local_token::LocalToken},
     jobs::Jobs,
     publication::{Catalogue, CatalogueTasks},
     ros2::Ros2,
@@ -21,7 +22,12 @@ use engine::{
     vitals::{Failure, Pulse, Vitals},
     workers::{Engine, Workers},
 };
-use std::{net::SocketAddr, sync::Arc, time::Duration};
+use std::{
+    net::{IpAddr, Ipv4Addr, SocketAddr},
+    path::Path,
+    sync::Arc,
+    time::{Duration, Instant},
+};
 use tokio::{
     net::TcpListener,
     sync::{mpsc::Receiver, watch},
@@ -37,6 +43,9 @@ pub enum StartError {
     /// Robots cannot connect.
     #[error(transparent)]
     Bus(#[from] BusError),
+    /// There is no token for this machine.
+    #[error("{0}")]
+    LocalToken(String),
     /// The system gives no threads.
     #[error("no threads for the workers: {0}")]
     Threads(#[source] std::io::Error),
@@ -81,6 +90,8 @@ pub struct RunningServer {
     pub slots: Arc<Slots<FrameJob>>,
     /// Robots of ROS 2.
     pub ros2: Arc<Ros2>,
+    sessions: Arc<Sessions>,
+    local_token: LocalToken,
     stop: watch::Sender<bool>,
     vitals: Arc<Vitals>,
     tasks: Tasks,
@@ -107,6 +118,10 @@ impl Server {
         let at = |source| StartError::Http { addr: config.http_addr, source };
         let listener = TcpListener::bind(config.http_addr).await.map_err(at)?;
         let http_addr = listener.local_addr().map_err(at)?;
+        let local_token = LocalToken::write(&config.data, http_addr.port())
+            .map_err(|e| StartError::LocalToken(e.to_string()))?;
+        store.tokens().set_local(local_token.secret());
+        let sessions = Arc::<Sessions>::default();
         let (stop, stopping) = watch::channel(false);
         let (snapshots, vitals) = (store.snapshots().clone(), store.vitals().clone());
         let (jobs, jobs_task) = Jobs::start(store.clone(), config.clone(), stopping.clone())
@@ -137,7 +152,13 @@ impl Server {
         vitals.probe("the outbox", move || outbox.is_running());
         let workers = Workers::start(&engine, config.workers, &publisher).map_err(StartError::Threads)?;
         let zenoh_endpoint = bus.endpoint().to_owned();
-        let services = Services { jobs, gatherer, ros2: ros2.clone() };
+        let services = Services {
+            jobs,
+            gatherer,
+            ros2: ros2.clone(),
+            sessions: sessions.clone(),
+            local_token_file: Some(local_token.path().to_owned()),
+        };
         let app = App::new(config.clone(), store, services, &engine, stopping.clone());
         let pulse = vitals.begin("the HTTP listener");
         let router = http::router(app);
@@ -147,7 +168,19 @@ impl Server {
         });
         let watch = tokio::spawn(vitals.clone().watch());
         let tasks = Tasks { workers, bus, http, jobs: jobs_task, findings, gather, writer, watch };
-        Ok(RunningServer { http_addr, zenoh_endpoint, snapshots, live, slots, ros2, stop, vitals, tasks })
+        Ok(RunningServer {
+            http_addr,
+            zenoh_endpoint,
+            snapshots,
+            live,
+            slots,
+            ros2,
+            sessions,
+            local_token,
+            stop,
+            vitals,
+            tasks,
+        })
     }
 }
 
@@ -212,6 +245,22 @@ impl RunningServer {
         &self.vitals
     }
 
+    /// File with an administrator's token for programs of this user on this machine, absolute.
+    pub fn local_token_file(&self) -> &Path {
+        self.local_token.path()
+    }
+
+    /// A link that opens the page as an administrator, once, within ten minutes. It is a secret. `None` if the system has
+    /// no randomness for it.
+    pub fn page_link(&self) -> Option<String> {
+        let code = self.sessions.code(TokenId::Local, Instant::now()).ok()?;
+        let mut at = self.http_addr;
+        if at.ip().is_unspecified() {
+            at.set_ip(IpAddr::V4(Ipv4Addr::LOCALHOST));
+        }
+        Some(format!("http://{at}/open?code={code}"))
+    }
+
     /// Returns when a part of the server has ended untold, with its name and the reason: stop, and start again from disk.
     pub async fn failed(&self) -> Failure {
         self.vitals.failed().await
@@ -220,6 +269,7 @@ impl RunningServer {
     /// Answers what is in work, then closes everything.
     pub async fn stop(self) {
         self.vitals.stop();
+        self.local_token.remove();
         self.stop.send_replace(true);
         let Tasks { workers, bus, http, jobs, findings, gather, writer, watch } = self.tasks;
         watch.abort();

@@ -10,11 +10,11 @@ use tests::{
 
 const LONGEST: Duration = Duration::from_mins(2);
 /// Options of every command against a server, and of every command for one map.
-const SERVER: &[&str] = &["--server", "--json"];
-const MAP: &[&str] = &["--map", "--server", "--json"];
+const SERVER: &[&str] = &["--server", "--token", "--json"];
+const MAP: &[&str] = &["--map", "--server", "--token", "--json"];
 
 /// Options that each command must name in its help, beside those of its group.
-const OPTIONS: [(&str, &[&str], &[&str]); 47] = [
+const OPTIONS: [(&str, &[&str], &[&str]); 53] = [
     ("", &[], &["--log", "--version", "Exit status"]),
     ("demo", &[], &["--robots", "--rate-hz", "--legs", "--seed", "--http", "--data", "--stay", "--json"]),
     ("serve", &[], &["--config", "--data", "--http", "--zenoh", "--fleet", "--workers", "--insecure"]),
@@ -60,6 +60,12 @@ const OPTIONS: [(&str, &[&str], &[&str]); 47] = [
     ("completions", &[], &["<SHELL>", "bash", "fish"]),
     ("man", &[], &["<FOLDER>"]),
     ("server status", SERVER, &[]),
+    ("token create", SERVER, &["<NAME>", "--role", "--for-map", "--valid"]),
+    ("token list", SERVER, &[]),
+    ("token revoke", SERVER, &["<NUMBER>", "--yes"]),
+    ("login", SERVER, &[]),
+    ("logout", SERVER, &[]),
+    ("open", SERVER, &[]),
     ("map create", SERVER, &["--distance", "--site", "--building", "--floor", "<MAP>"]),
     ("map list", SERVER, &[]),
     ("map show", SERVER, &["<MAP>"]),

@@ -8,7 +8,7 @@ use client::{Capture, Delivery, LandmarkRegion, RobotClient, RobotOptions, api::
 use figures::{Figures, figures};
 use map::pose2::{Pose2, Pose2Covariance};
 use nalgebra::{Matrix3, Vector3};
-use reqwest::{Client, Method, StatusCode};
+use reqwest::{Method, StatusCode};
 use serde_json::{Value, json};
 use server::config::Limits;
 use sim::{
@@ -188,7 +188,7 @@ async fn gather_all(inside: &Inside, client: &RobotClient, building: &Arc<Buildi
     let first = &list(&waiting, "tracks")[0];
     let icon =
         format!("{}/api/v1{path}/tracks/{}/views/{}/icon", inside.url(), first["number"], first["best_view"]);
-    let picture = Client::new().get(icon).send().await.expect("an answer");
+    let picture = tests::http(&inside.url()).await.get(icon).send().await.expect("an answer");
     assert_eq!(picture.headers()["content-type"], "image/png");
     // Nothing is accepted if one of the decisions is invalid.
     let mut bad = picks.clone();

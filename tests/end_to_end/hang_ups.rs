@@ -20,18 +20,21 @@ async fn no_job_stays_open_when_clients_disconnect() {
     maps.create_map(&NewMap::new("hall")).await.expect("map");
     maps.add_landmark("hall", "p1", None, None).await.expect("landmark");
     maps.upload_view("hall", "p1", pictures::picture(1), LandmarkRegion::WholeImage).await.expect("view");
+    let token = tests::token(&inside.url()).await;
     for i in 0..REQUESTS {
         let mut stream = TcpStream::connect(inside.server.http_addr).await.expect("connection");
         let path = "/api/v1/maps/hall/landmarks/p1/learn";
-        let head = format!("POST {path} HTTP/1.1\r\nHost: localhost\r\nContent-Length: 0\r\n\r\n");
+        let head = format!(
+            "POST {path} HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer {token}\r\nContent-Length: 0\r\n\r\n"
+        );
         stream.write_all(head.as_bytes()).await.expect("sent");
         // Disconnects at once, then ever later: at some delay the job is committed but not yet answered.
         tokio::time::sleep(std::time::Duration::from_micros(250 * i)).await;
         drop(stream);
     }
-    let url = inside.url();
+    let (url, http) = (inside.url(), tests::http(&inside.url()).await);
     let state = async |job: i64| {
-        let answer = reqwest::get(format!("{url}/api/v1/jobs/{job}")).await.expect("answer");
+        let answer = http.get(format!("{url}/api/v1/jobs/{job}")).send().await.expect("answer");
         let job: Value = answer.json().await.expect("JSON");
         job["state"].as_str().map(str::to_owned)
     };

@@ -167,7 +167,8 @@ async fn prepared() -> (Inside, Client, String) {
     maps.add_landmark("hall", "p1", None, None).await.expect("landmark");
     maps.put_robot("r1", "hall").await.expect("robot");
     let base = format!("{}/api/v1", inside.url());
-    (inside, Client::builder().no_proxy().build().expect("client"), base)
+    let http = tests::http(&inside.url()).await;
+    (inside, http, base)
 }
 
 async fn refusal(response: reqwest::Response) -> (u16, String, String) {

@@ -149,7 +149,8 @@ async fn refusals(inside: &Inside, path: &str) {
 
 /// A request about the mapping to a server that can be killed.
 async fn ask(server: &Child, method: Method, path: &str, body: Option<Value>) -> Value {
-    let request = reqwest::Client::new().request(method, format!("{}/api/v1/maps/{MAP}/{path}", server.url));
+    let http = tests::http(&server.url).await;
+    let request = http.request(method, format!("{}/api/v1/maps/{MAP}/{path}", server.url));
     let request = match body {
         Some(body) => request.json(&body),
         None => request,

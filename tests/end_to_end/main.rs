@@ -26,6 +26,7 @@ mod several_maps;
 mod style;
 mod teach_and_recognise;
 mod tidy;
+mod tokens;
 mod two_programs;
 mod underlay;
 mod visibility_settings;

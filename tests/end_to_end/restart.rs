@@ -58,7 +58,8 @@ async fn teach(
 
 async fn views_of(server: &Child, landmark: &str) -> Vec<i64> {
     let url = format!("{}/api/v1/maps/{MAP}/landmarks/{landmark}/views", server.url);
-    let page: serde_json::Value = reqwest::get(url).await.expect("answer").json().await.expect("JSON");
+    let page: serde_json::Value =
+        tests::http(&server.url).await.get(url).send().await.expect("answer").json().await.expect("JSON");
     page["items"].as_array().expect("items").iter().map(|v| v["id"].as_i64().expect("a number")).collect()
 }
 

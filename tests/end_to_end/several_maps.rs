@@ -5,14 +5,14 @@ use client::{
     LandmarkRegion, MapClient,
     api::{NewMap, TransformQuery, UploadOutcomeBody, WallBody},
 };
-use reqwest::{Client, Method, StatusCode};
+use reqwest::{Method, StatusCode};
 use serde_json::{Value, json};
 use server::config::Limits;
 use std::{fs, time::Duration};
 use tests::{Child, Inside, command::waymark, pictures};
 
 async fn call(url: &str, method: Method, path: &str, body: Option<Value>) -> (StatusCode, Value) {
-    let request = Client::new().request(method, format!("{url}/api/v1{path}"));
+    let request = tests::http(url).await.request(method, format!("{url}/api/v1{path}"));
     let request = match body {
         Some(body) => request.json(&body),
         None => request,

@@ -3,13 +3,14 @@
 //! ceiling is visible only to a camera that can be tilted up.
 
 use client::api::NewMap;
-use reqwest::{Client, Method, StatusCode};
+use reqwest::{Method, StatusCode};
 use serde_json::{Value, json};
 use std::{f64::consts::FRAC_PI_2, time::Duration};
 use tests::{Child, command::waymark};
 
 async fn call(server: &Child, method: Method, path: &str, body: Option<Value>) -> (StatusCode, Value) {
-    let request = Client::new().request(method, format!("{}/api/v1/maps/hall{path}", server.url));
+    let http = tests::http(&server.url).await;
+    let request = http.request(method, format!("{}/api/v1/maps/hall{path}", server.url));
     let request = match body {
         Some(body) => request.json(&body),
         None => request,

@@ -96,7 +96,9 @@ pub fn run<A: AsRef<OsStr>>(program: &Path, args: impl IntoIterator<Item = A>, l
     let mut command = Command::new(program);
     command.args(args).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
     // Removes settings of the tests' caller, which must not change a claim.
-    for name in ["WAYMARK_LOG", "WAYMARK_SERVER", "WAYMARK_MAP", "WAYMARK_CONFIG", "WAYMARK_DATA"] {
+    for name in
+        ["WAYMARK_LOG", "WAYMARK_SERVER", "WAYMARK_MAP", "WAYMARK_CONFIG", "WAYMARK_DATA", "WAYMARK_TOKEN"]
+    {
         command.env_remove(name);
     }
     let mut child = command.spawn().expect("the program starts");

@@ -181,9 +181,10 @@ impl Guide {
     fn shell(&self, command: &str) -> Command {
         let mut shell = Command::new("bash");
         shell.args(["-euo", "pipefail", "-c", command]).current_dir(&self.folder);
-        for name in ["WAYMARK_LOG", "WAYMARK_SERVER", "WAYMARK_CONFIG", "WAYMARK_DATA", "WAYMARK_MAP"] {
-            shell.env_remove(name);
+        for name in ["LOG", "SERVER", "CONFIG", "DATA", "MAP", "TOKEN"] {
+            shell.env_remove(format!("WAYMARK_{name}"));
         }
+        shell.env_remove("XDG_CONFIG_HOME");
         shell.env("PATH", &self.path).env("NO_COLOR", "1").env("HOME", &self.folder);
         // Not `WAYMARK_...`: the server takes those for settings.
         shell.env("TESTED_PROGRAMS", program().parent().expect("its folder"));

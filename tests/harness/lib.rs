@@ -17,11 +17,15 @@ pub use child::Child;
 pub use open_data::{open_data, skipped};
 
 use client::MapClient;
+use reqwest::header::{AUTHORIZATION, HeaderMap};
 use server::{
     RunningServer, Server,
     config::{Config, Limits, RawConfig},
 };
-use std::time::{Duration, Instant};
+use std::{
+    path::Path,
+    time::{Duration, Instant},
+};
 use tempfile::TempDir;
 
 /// Longest wait for something that should happen at once: long, for busy machines.
@@ -32,7 +36,7 @@ pub const SOON: Duration = Duration::from_mins(1);
 pub struct Inside {
     /// The server.
     pub server: RunningServer,
-    _data: TempDir,
+    data: TempDir,
 }
 
 impl Inside {
@@ -52,7 +56,12 @@ impl Inside {
         };
         let config = Config::try_from(raw).expect("a valid configuration");
         let server = Server::start(config).await.expect("the server starts");
-        Self { server, _data: data }
+        Self { server, data }
+    }
+
+    /// Its data directory.
+    pub fn data(&self) -> &Path {
+        self.data.path()
     }
 
     /// Base URL, without a slash at the end.
@@ -64,6 +73,19 @@ impl Inside {
     pub fn maps(&self) -> MapClient {
         MapClient::new(&self.url()).expect("a client")
     }
+}
+
+/// The local token of a server, found as the SDK finds it.
+pub async fn token(url: &str) -> String {
+    let found = MapClient::new(url).expect("a client").token_in_use().await.expect("the local token");
+    found.expect("the server asks for a token")
+}
+
+/// A client for requests that the SDK does not make, with the local token of this server.
+pub async fn http(url: &str) -> reqwest::Client {
+    let mut headers = HeaderMap::new();
+    headers.insert(AUTHORIZATION, format!("Bearer {}", token(url).await).parse().expect("a token"));
+    reqwest::Client::builder().no_proxy().default_headers(headers).build().expect("a client")
 }
 
 /// Polls until `ready` returns a value, at most [`SOON`].

@@ -1,6 +1,6 @@
 //! A simulated robot against a server: its building as a map, its landmarks taught, its readings as messages.
 
-use crate::{Inside, SOON, eventually};
+use crate::{Inside, SOON, eventually, http};
 use client::{
     Capture, Delivery, LandmarkRegion, RobotClient, RobotOptions,
     api::{Place, Size},
@@ -8,7 +8,7 @@ use client::{
 };
 use image::{ExtendedColorType, codecs::jpeg::JpegEncoder};
 use map::{laser::Scan, pose2::Pose2};
-use reqwest::{Client, Method, StatusCode};
+use reqwest::{Method, StatusCode};
 use serde_json::{Value, json};
 use sim::{
     building::Building,
@@ -34,7 +34,8 @@ pub fn jpeg(image: &GrayImage) -> Vec<u8> {
 
 /// A request to the server's interface: status and JSON.
 pub async fn call(inside: &Inside, method: Method, path: &str, body: Option<Value>) -> (StatusCode, Value) {
-    let request = Client::new().request(method, format!("{}/api/v1{path}", inside.url()));
+    let url = inside.url();
+    let request = http(&url).await.request(method, format!("{url}/api/v1{path}"));
     let request = match body {
         Some(body) => request.json(&body),
         None => request,

@@ -76,8 +76,7 @@ pub(crate) async fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let scratch = scratch::Folder::new("demo").context("a temporary folder")?;
     let data = args.data.clone().unwrap_or_else(|| scratch.path().to_owned());
     let server = Server::start(settings(args, data)?).await?;
-    let url = format!("http://{}/", server.http_addr);
-    screen::complain(&format!("Waymark demo. Watch it at {url}"));
+    screen::complain(&format!("Waymark demo. Watch it at {}", page(&server)));
 
     let building = Arc::new(Building::corridor(args.seed));
     let taught = teaching::teach(&building, &server, args.seed).await?;
@@ -105,11 +104,16 @@ pub(crate) async fn run(args: &Args) -> anyhow::Result<ExitCode> {
         screen::say(&summary.table());
     }
     if args.stay {
-        screen::complain(&format!("The page stays at {url} until Ctrl-C."));
+        screen::complain(&format!("The page stays until Ctrl-C. A new link to it: {}", page(&server)));
         tokio::signal::ctrl_c().await.context("Ctrl-C")?;
     }
     server.stop().await;
     Ok(if summary.false_matches + summary.false_guided == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+/// A link to the page that opens it once.
+fn page(server: &RunningServer) -> String {
+    server.page_link().unwrap_or_else(|| format!("http://{}/", server.http_addr))
 }
 
 /// A recording of the demo that ends when the sender is dropped.

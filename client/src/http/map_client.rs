@@ -1,11 +1,23 @@
-//! A connection to the server's HTTP interface: sends requests, reads answers, turns refusals into errors.
+//! A connection to the server's HTTP interface: sends requests with a token, reads answers, turns refusals into errors.
+//!
+//! A client without a token takes that of a server on this machine, once the server has answered 401 (`local_token`).
 
-use super::operation::{Operation, PathValue, path_of, query_of};
+use super::{
+    local_token::{self, LocalTokenError},
+    operation::{Operation, PathValue, path_of, query_of},
+};
 use crate::ClientError;
 use protos::api::{Page, PageQuery, Problem};
-use reqwest::{RequestBuilder, Response};
+use reqwest::{
+    Method, Request, RequestBuilder, Response, StatusCode,
+    header::{AUTHORIZATION, HeaderValue, WWW_AUTHENTICATE},
+};
 use serde::{Serialize, de::DeserializeOwned};
-use std::time::Duration;
+use std::{
+    fmt,
+    sync::{Arc, PoisonError, RwLock},
+    time::Duration,
+};
 
 /// Longest wait for one request.
 const REQUEST_TIMEOUT: Duration = Duration::from_mins(1);
@@ -15,15 +27,43 @@ const REQUEST_TIMEOUT: Duration = Duration::from_mins(1);
 pub struct MapClient {
     http: reqwest::Client,
     base: String,
+    token: Arc<RwLock<Option<TokenText>>>,
+    /// Port of a server on this machine, whose local token may be taken.
+    local_port: Option<u16>,
+}
+
+/// A token, not shown.
+#[derive(Clone, PartialEq, Eq)]
+struct TokenText(String);
+
+impl fmt::Debug for TokenText {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("…")
+    }
 }
 
 impl MapClient {
-    /// A client of the server at `base`, such as `http://127.0.0.1:8080`. Nothing is sent yet.
+    /// A client of the server at `base`, such as `http://127.0.0.1:8080`. Nothing is sent yet. On this machine and for this
+    /// user no token is needed; else [`MapClient::with_token`].
     pub fn new(base: &str) -> Result<Self, ClientError> {
         // Ignores proxies of the environment: the server is in the robot's own network.
         let http = reqwest::Client::builder().no_proxy().timeout(REQUEST_TIMEOUT).build();
         let http = http.map_err(|e| ClientError::Http { url: base.to_owned(), detail: e.to_string() })?;
-        Ok(Self { http, base: base.trim_end_matches('/').to_owned() })
+        let base = base.trim_end_matches('/').to_owned();
+        let local_port = local_token::local_port(&base);
+        Ok(Self { http, base, token: Arc::default(), local_port })
+    }
+
+    /// The same client with this token, as `waymark token create` prints it. No other is taken.
+    #[must_use]
+    pub fn with_token(self, token: &str) -> Self {
+        let token = Arc::new(RwLock::new(Some(TokenText(token.trim().to_owned()))));
+        Self { token, local_port: None, ..self }
+    }
+
+    /// The token that requests carry now.
+    pub(super) fn token(&self) -> Option<String> {
+        self.token.read().unwrap_or_else(PoisonError::into_inner).as_ref().map(|token| token.0.clone())
     }
 
     /// A request of an operation; `at` are the parameters of its path, in order.
@@ -83,26 +123,83 @@ impl MapClient {
         whole(self.checked(request).await?).await
     }
 
-    /// Sends, and turns refusals into errors.
+    /// Sends, and turns refusals into errors. A 401 of a server on this machine is followed by a second try with its token.
     pub(super) async fn checked(&self, request: RequestBuilder) -> Result<Response, ClientError> {
-        let response = request.send().await.map_err(|e| {
-            let url = e.url().map_or_else(|| self.base.clone(), ToString::to_string);
-            ClientError::Http { url, detail: reason(&e) }
-        })?;
-        let status = response.status();
-        if status.is_success() {
-            return Ok(response);
+        let request = request.build().map_err(|e| self.unsent(&e))?;
+        let again = request.try_clone();
+        // A form is a stream that can be sent once, and a refusal may break off a large body: the token is found before.
+        if again.is_none() || (request.body().is_some() && self.token().is_none()) {
+            self.find_local_token().await;
         }
-        let body = response.bytes().await.unwrap_or_default();
-        let problem: Problem = serde_json::from_slice(&body).unwrap_or_default();
-        Err(ClientError::Refused {
-            status: status.as_u16(),
-            code: if problem.code.is_empty() { "unknown".to_owned() } else { problem.code },
-            field: problem.field.unwrap_or_default(),
-            detail: problem.detail,
-            more: problem.more,
-        })
+        let sent = self.token();
+        let response = self.execute(request, sent.as_deref()).await?;
+        match (self.take_local_token(&response, sent.as_deref()), again) {
+            (Ok(true), Some(again)) => {
+                refused(self.execute(again, self.token().as_deref()).await?, None).await
+            }
+            (Ok(_), _) => refused(response, None).await,
+            (Err(error), _) => refused(response, Some(error)).await,
+        }
     }
+
+    /// Makes sure that the token is that of the server on this machine, if there is one and no other token was given. What
+    /// goes wrong here goes wrong with the request, too, which says so.
+    async fn find_local_token(&self) {
+        let asked = self.http.request(Method::GET, format!("{}/api/v1/whoami", self.base)).build();
+        if let Some(asked) = asked.ok().filter(|_| self.local_port.is_some()) {
+            let sent = self.token();
+            if let Ok(response) = self.execute(asked, sent.as_deref()).await {
+                self.take_local_token(&response, sent.as_deref()).ok();
+            }
+        }
+    }
+
+    async fn execute(&self, mut request: Request, token: Option<&str>) -> Result<Response, ClientError> {
+        if let Some(token) = token
+            && let Ok(mut value) = HeaderValue::from_str(&format!("Bearer {token}"))
+        {
+            value.set_sensitive(true);
+            request.headers_mut().insert(AUTHORIZATION, value);
+        }
+        self.http.execute(request).await.map_err(|e| self.unsent(&e))
+    }
+
+    /// Takes the local token that a 401 names. Whether it is another than the one that was sent.
+    fn take_local_token(&self, response: &Response, sent: Option<&str>) -> Result<bool, LocalTokenError> {
+        let challenge = response.headers().get(WWW_AUTHENTICATE);
+        let Some((port, challenge)) = self.local_port.zip(challenge) else { return Ok(false) };
+        if response.status() != StatusCode::UNAUTHORIZED {
+            return Ok(false);
+        }
+        let Some(file) = local_token::named_file(challenge) else { return Ok(false) };
+        let found = local_token::read(&file, port)?;
+        let is_other = sent != Some(found.as_str());
+        *self.token.write().unwrap_or_else(PoisonError::into_inner) = Some(TokenText(found));
+        Ok(is_other)
+    }
+
+    fn unsent(&self, error: &reqwest::Error) -> ClientError {
+        let url = error.url().map_or_else(|| self.base.clone(), ToString::to_string);
+        ClientError::Http { url, detail: reason(error) }
+    }
+}
+
+/// The answer, or what it refuses. `local` says why the local token was not taken.
+async fn refused(response: Response, local: Option<LocalTokenError>) -> Result<Response, ClientError> {
+    let status = response.status();
+    if status.is_success() {
+        return Ok(response);
+    }
+    let body = response.bytes().await.unwrap_or_default();
+    let problem: Problem = serde_json::from_slice(&body).unwrap_or_default();
+    let why = local.map(|error| format!(" (the local token is not used: {error})")).unwrap_or_default();
+    Err(ClientError::Refused {
+        status: status.as_u16(),
+        code: if problem.code.is_empty() { "unknown".to_owned() } else { problem.code },
+        field: problem.field.unwrap_or_default(),
+        detail: problem.detail + &why,
+        more: problem.more,
+    })
 }
 
 /// The whole body of an answer.

@@ -8,6 +8,7 @@ mod health;
 mod landmarks;
 mod learning;
 mod live;
+mod local_token;
 mod map_client;
 mod mapping;
 mod maps;
@@ -16,6 +17,7 @@ mod operation;
 mod recognise;
 mod reference_runs;
 mod robots;
+mod tokens;
 mod underlay;
 mod views;
 mod visibility;
@@ -44,6 +46,7 @@ pub fn operations() -> impl Iterator<Item = &'static Operation> {
         recognise::OPERATIONS,
         reference_runs::OPERATIONS,
         robots::OPERATIONS,
+        tokens::OPERATIONS,
         underlay::OPERATIONS,
         views::OPERATIONS,
         visibility::OPERATIONS,

@@ -9,6 +9,7 @@ use client::{
     LandmarkRegion, MapClient,
     api::{NewMap, Place, WallsBody},
 };
+use reqwest::header::{AUTHORIZATION, HeaderMap};
 use serde::Serialize;
 use serde_json::{Value, json};
 use server::{
@@ -92,6 +93,14 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     tokio::runtime::Builder::new_multi_thread().enable_all().build()?.block_on(measured(args))
 }
 
+/// A client for requests that the SDK does not make, with its token.
+async fn with_token(maps: &MapClient) -> anyhow::Result<reqwest::Client> {
+    let token = maps.token_in_use().await?.context("the server asks for no token")?;
+    let mut headers = HeaderMap::new();
+    headers.insert(AUTHORIZATION, format!("Bearer {token}").parse()?);
+    Ok(reqwest::Client::builder().default_headers(headers).build()?)
+}
+
 async fn measured(args: &Args) -> anyhow::Result<()> {
     let folder = scratch::Folder::new("edits")?;
     let started = Instant::now();
@@ -101,7 +110,9 @@ async fn measured(args: &Args) -> anyhow::Result<()> {
     let server = Server::start(settings(folder.path(), args)?).await?;
     let start_ms = ms(started);
     let base = format!("http://{}", server.http_addr);
-    let large = Large { maps: MapClient::new(&base)?, base, http: reqwest::Client::new() };
+    let maps = MapClient::new(&base)?;
+    let http = with_token(&maps).await?;
+    let large = Large { maps, base, http };
     let (mut moved, mut settled, mut trusted, mut lessons) = (vec![], vec![], vec![], vec![]);
     let bar = screen::progress(args.changes as usize, "changing");
     for i in 0..args.changes as usize {

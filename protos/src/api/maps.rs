@@ -196,7 +196,7 @@ pub struct TransformedPose {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct TransformResponse {
-    /// The maps on the way, both ends included.
+    /// The maps on the way, both ends included; those that the asker may not see are left out.
     pub via: Vec<String>,
     /// Maps coordinates of the first to the other.
     pub to_from_map: TransformedPose,

@@ -97,6 +97,7 @@ impl From<StoreError> for ApiError {
                     Kind::Track => ("unknown_track", "track"),
                     Kind::ReferenceRun => ("unknown_reference_run", "run"),
                     Kind::Underlay => ("unknown_underlay", "underlay"),
+                    Kind::Token => ("unknown_token", "token"),
                     Kind::Model => ("not_found", "path"),
                 };
                 Self::new(StatusCode::NOT_FOUND, code, detail).field(field)
@@ -139,6 +140,17 @@ impl From<protos::Rejection> for ApiError {
     fn from(rejection: protos::Rejection) -> Self {
         Self::invalid(rejection.code.as_str(), rejection.field, rejection.detail)
     }
+}
+
+/// 404 for a path without a route.
+pub(super) fn not_found() -> ApiError {
+    ApiError::new(StatusCode::NOT_FOUND, "not_found", "there is nothing at this path").field("path")
+}
+
+/// 405.
+pub(super) fn method_not_allowed() -> ApiError {
+    let detail = "this path does not take this method";
+    ApiError::new(StatusCode::METHOD_NOT_ALLOWED, "method_not_allowed", detail).field("method")
 }
 
 /// 422 for a number outside its range, in this part of the input.

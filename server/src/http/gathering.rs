@@ -3,6 +3,7 @@
 use super::{
     AppState,
     answers::page,
+    authorise::check_robot,
     error::ApiError,
     extract::{Body, PathParams, QueryParams, after_number, name, page_limit},
     learning::job_shown,
@@ -10,6 +11,7 @@ use super::{
 };
 use crate::{
     gather::{GatheringCounts, track_summaries::track_summaries},
+    identity::Principal,
     store::{
         gatherings::{self, GatheringRow, NewGathering},
         landmarks, maps,
@@ -17,7 +19,7 @@ use crate::{
     },
 };
 use axum::{
-    Json,
+    Extension, Json,
     extract::State,
     http::{StatusCode, header},
     response::{IntoResponse, Response},
@@ -86,8 +88,10 @@ fn gathering_shown(app: &AppState, row: GatheringRow) -> Gathering {
 async fn begin(
     State(app): State<AppState>,
     PathParams(map): PathParams<String>,
+    Extension(principal): Extension<Principal>,
     Body(new): Body<NewGatheringBody>,
 ) -> Result<(StatusCode, Json<Gathering>), ApiError> {
+    check_robot(&app, &principal, &new.robot)?;
     if let Some(landmark) = &new.landmark {
         maps::get(app.store.reads(), &map).await?;
         let row = landmarks::get(app.store.reads(), &map, landmark).await?;

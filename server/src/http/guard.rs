@@ -1,8 +1,7 @@
 //! Around every request: an id, a log line, a deadline, a place for a large body, safe headers, and a refusal of what other web pages send.
 //!
-//! The server has no passwords yet and trusts whoever reaches its loopback port. A browser reaches it too, on behalf of
-//! any page it shows; so a request must name this server as its host and, if it changes anything, come from its own
-//! pages or from no page at all.
+//! A browser reaches the server on behalf of any page it shows; so a request must name this server as its host and, if it
+//! changes anything, come from its own pages or from no page at all. Who asks is the matter of `authorise`.
 
 use super::{AppState, error::ApiError};
 use axum::{

@@ -6,11 +6,12 @@ use super::{
     extract::{Body, PathParams},
 };
 use crate::{
+    identity::Principal,
     jobs::{JobProgress, request},
     store::{StoreError, jobs::JobRow, landmarks, maps},
 };
 use axum::{
-    Json,
+    Extension, Json,
     extract::State,
     http::StatusCode,
     response::{
@@ -154,6 +155,7 @@ async fn cancel(State(app): State<AppState>, PathParams(id): PathParams<i64>) ->
 async fn events(
     State(app): State<AppState>,
     PathParams(id): PathParams<i64>,
+    Extension(principal): Extension<Principal>,
 ) -> Result<Sse<impl Stream<Item = Result<Event, Infallible>>>, ApiError> {
     let place = app.stream_place()?;
     let progress = app.jobs.watch(id).await?;
@@ -161,7 +163,7 @@ async fn events(
         Some(progress) => WatchStream::new(progress).map(|_| ()).left_stream(),
         None => stream::iter([()]).right_stream(),
     };
-    let stopping = app.stopped();
+    let stopping = app.ended_for(principal);
     // The sender of the changes goes when the job has ended; one more look then shows how.
     let states = changes.chain(stream::iter([()])).then(move |()| {
         let (app, _place) = (app.clone(), &place);

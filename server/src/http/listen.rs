@@ -1,20 +1,21 @@
 //! The accept loop: bounded connections, a deadline for the head of a request and for the reading of an answer, a graceful
 //! end. axum's own `serve` installs no timer, so hyper's deadline would not work there.
 
+use super::authorise::Peer;
 use crate::config::Limits;
-use axum::Router;
-use hyper::server::conn::http1;
+use axum::{Router, extract::Request};
+use hyper::{body::Incoming, server::conn::http1, service::service_fn};
 use hyper_util::{
     rt::{TokioIo, TokioTimer},
     server::graceful::GracefulShutdown,
-    service::TowerToHyperService,
 };
-use std::{sync::Arc, time::Duration};
+use std::{net::SocketAddr, sync::Arc, time::Duration};
 use tokio::{
     net::TcpListener,
     sync::{Semaphore, watch},
 };
 use tokio_io_timeout::TimeoutStream;
+use tower::ServiceExt as _;
 
 /// Largest head of a request, in bytes.
 const HEAD_MAX: usize = 32 << 10;
@@ -42,12 +43,17 @@ pub(crate) async fn serve(
             _ = stopping.wait_for(|stop| *stop) => break,
             accepted = accept(&listener, &places) => accepted,
         };
-        let Some((stream, place)) = accepted else { continue };
+        let Some((stream, peer, place)) = accepted else { continue };
         let mut stream = TimeoutStream::new(stream);
         // Runs only while there is something to write, and starts again with every part that is taken.
         stream.set_write_timeout(Some(Duration::from_secs(limits.write_timeout_s)));
         let stream = TokioIo::new(Box::pin(stream));
-        let connection = builder.serve_connection(stream, TowerToHyperService::new(router.clone()));
+        let router = router.clone();
+        let answer = service_fn(move |mut request: Request<Incoming>| {
+            request.extensions_mut().insert(Peer(peer));
+            router.clone().oneshot(request)
+        });
+        let connection = builder.serve_connection(stream, answer);
         let connection = graceful.watch(connection);
         tokio::spawn(async move {
             if let Err(error) = connection.await {
@@ -65,14 +71,14 @@ pub(crate) async fn serve(
 async fn accept(
     listener: &TcpListener,
     places: &Arc<Semaphore>,
-) -> Option<(tokio::net::TcpStream, tokio::sync::OwnedSemaphorePermit)> {
+) -> Option<(tokio::net::TcpStream, SocketAddr, tokio::sync::OwnedSemaphorePermit)> {
     // Place first: beyond the bound, connections wait in the system's queue and cost no memory here.
     let place = places.clone().acquire_owned().await.ok()?;
     match listener.accept().await {
-        Ok((stream, _)) => {
+        Ok((stream, peer)) => {
             // Answers are small and whole; waiting to fill a packet only delays them.
             drop(stream.set_nodelay(true));
-            Some((stream, place))
+            Some((stream, peer, place))
         }
         Err(error) => {
             tracing::warn!(%error, "accept");
@@ -91,7 +97,7 @@ mod tests {
         routing::get,
     };
     use futures::{StreamExt, stream};
-    use std::{convert::Infallible, net::SocketAddr};
+    use std::convert::Infallible;
     use tokio::{
         io::{AsyncReadExt, AsyncWriteExt},
         net::TcpStream,

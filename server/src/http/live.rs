@@ -5,10 +5,11 @@ use super::{
     error::ApiError,
     extract::{PathParams, name},
 };
+use crate::identity::Principal;
 use crate::store::kind::Kind;
 use crate::store::{StoreError, maps, robots};
 use axum::{
-    Json,
+    Extension, Json,
     extract::State,
     http::header,
     response::{
@@ -100,6 +101,7 @@ async fn trajectories(
 async fn events(
     State(app): State<AppState>,
     PathParams(map): PathParams<String>,
+    Extension(principal): Extension<Principal>,
 ) -> Result<Sse<impl Stream<Item = Result<Event, Infallible>>>, ApiError> {
     let place = app.stream_place()?;
     let events = BroadcastStream::new(app.live.events());
@@ -113,7 +115,7 @@ async fn events(
         };
         std::future::ready(shown.map(Ok))
     });
-    Ok(Sse::new(events.take_until(app.stopped())).keep_alive(KeepAlive::default()))
+    Ok(Sse::new(events.take_until(app.ended_for(principal))).keep_alive(KeepAlive::default()))
 }
 
 fn shown(event: &LiveEvent) -> Option<Event> {

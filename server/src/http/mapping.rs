@@ -2,11 +2,15 @@
 
 use super::{
     App, AppState,
+    authorise::check_robot,
     error::ApiError,
     extract::{Body, PathParams, name},
 };
-use crate::store::{maps, robots, walls};
-use axum::{Json, extract::State, http::StatusCode};
+use crate::{
+    identity::Principal,
+    store::{maps, robots, walls},
+};
+use axum::{Extension, Json, extract::State, http::StatusCode};
 use engine::{
     mapping::{MappingError, MappingProgress, MappingStage, Walls},
     panics::Edge,
@@ -65,9 +69,11 @@ fn shown(progress: MappingProgress) -> MappingProgressBody {
 async fn begin(
     State(app): State<AppState>,
     PathParams(map): PathParams<String>,
+    Extension(principal): Extension<Principal>,
     Body(new): Body<NewMapping>,
 ) -> Result<(StatusCode, Json<MappingProgressBody>), ApiError> {
     maps::get(app.store.reads(), &map).await?;
+    check_robot(&app, &principal, &new.robot)?;
     let row = robots::get(app.store.reads(), &new.robot).await?;
     if row.map != map {
         let detail = format!("robot {} stands on map {}", row.name, row.map);

@@ -2,15 +2,19 @@
 
 use super::{
     AppState,
-    answers::{page, row_major},
+    answers::{page, row_major, visible_rows},
+    authorise::check_map,
     error::{ApiError, out_of_range},
     extract::{Body, PathParams, QueryParams, after_name, name, page_limit},
 };
-use crate::store::{
-    map_locations::{self, MapLocation},
-    maps::{self, MapRow},
+use crate::{
+    identity::Principal,
+    store::{
+        map_locations::{self, MapLocation},
+        maps::{self, MapRow},
+    },
 };
-use axum::{Json, extract::State, http::StatusCode};
+use axum::{Extension, Json, extract::State, http::StatusCode};
 use map::{
     map_links::MapLink,
     map_links::relation,
@@ -56,14 +60,15 @@ fn parent_shown(link: &MapLink<String>) -> Parent {
     }
 }
 
-/// A map and where it is.
-fn map_shown(row: MapRow, found: MapLocation) -> Map {
+/// A map and where it is. The map that it lies in is named only to those who may see that.
+fn map_shown(row: MapRow, found: MapLocation, principal: &Principal) -> Map {
+    let link = found.link.filter(|link| principal.may_see(&link.parent));
     Map {
         name: row.name,
         version: row.version,
         landmarks: row.landmarks,
         distance: row.distance.into(),
-        parent: found.link.as_ref().map(parent_shown),
+        parent: link.as_ref().map(parent_shown),
         site: found.site,
         building: found.building,
         floor: found.floor,
@@ -96,6 +101,7 @@ fn unknown_parent(error: ApiError) -> ApiError {
     (status = 422, body = Problem, description = "bad_name, invalid_value, out_of_range")))]
 async fn create(
     State(app): State<AppState>,
+    Extension(principal): Extension<Principal>,
     Body(new): Body<NewMap>,
 ) -> Result<(StatusCode, Json<Map>), ApiError> {
     let (name, distance, max) = (name("name", new.name)?, new.distance.into(), app.config.limits.maps);
@@ -113,7 +119,7 @@ async fn create(
         })
     });
     let (row, found) = write.await.map_err(|e| unknown_parent(e.into()))?;
-    Ok((StatusCode::CREATED, Json(map_shown(row, found))))
+    Ok((StatusCode::CREATED, Json(map_shown(row, found, &principal))))
 }
 
 /// Lists maps by name.
@@ -121,9 +127,19 @@ async fn create(
 async fn list(
     State(app): State<AppState>,
     QueryParams(query): QueryParams<PageQuery>,
+    Extension(principal): Extension<Principal>,
 ) -> Result<Json<Page<Map>>, ApiError> {
     let limit = page_limit(&query, app.config.limits.page)?;
-    let rows = maps::page(app.store.reads(), &after_name(&query), limit + 1).await?;
+    let rows = visible_rows(
+        (after_name(&query), limit),
+        |after| {
+            let app = app.clone();
+            async move { maps::page(app.store.reads(), &after, limit + 1).await }
+        },
+        |row| &row.name,
+        |row| principal.may_see(&row.name),
+    );
+    let rows = rows.await?;
     let known = map_locations::all(app.store.reads()).await?;
     let found = |name: &str| known.get(name).cloned().unwrap_or_default();
     Ok(Json(page(
@@ -132,7 +148,7 @@ async fn list(
         |r| r.name.clone(),
         |r| {
             let found = found(&r.name);
-            map_shown(r, found)
+            map_shown(r, found, &principal)
         },
     )))
 }
@@ -143,10 +159,11 @@ async fn list(
 async fn get(
     State(app): State<AppState>,
     PathParams(map): PathParams<String>,
+    Extension(principal): Extension<Principal>,
 ) -> Result<Json<Map>, ApiError> {
     let row = maps::get(app.store.reads(), &map).await?;
     let found = map_locations::all(app.store.reads()).await?.remove(&map).unwrap_or_default();
-    Ok(Json(map_shown(row, found)))
+    Ok(Json(map_shown(row, found, &principal)))
 }
 
 /// Changes a map's name, site, building, floor or position.
@@ -158,6 +175,7 @@ async fn get(
 async fn patch(
     State(app): State<AppState>,
     PathParams(map): PathParams<String>,
+    Extension(principal): Extension<Principal>,
     Body(changes): Body<MapPatch>,
 ) -> Result<Json<Map>, ApiError> {
     let new_name = changes.name.map(|new| name("name", new)).transpose()?;
@@ -166,6 +184,9 @@ async fn patch(
     let floor = changed("floor", changes.floor)?;
     let parent = changes.parent.map(|parent| parent.map(link).transpose()).transpose()?;
     maps::get(app.store.reads(), &map).await?;
+    if let Some(Some(link)) = &parent {
+        check_map(&principal, &link.parent).map_err(unknown_parent)?;
+    }
     let write = app.store.write(move |tx| {
         Box::pin(async move {
             let found = map_locations::set(tx, &map, |old| MapLocation {
@@ -181,7 +202,7 @@ async fn patch(
         })
     });
     let (row, found) = write.await.map_err(|e| unknown_parent(e.into()))?;
-    Ok(Json(map_shown(row, found)))
+    Ok(Json(map_shown(row, found, &principal)))
 }
 
 /// Deletes a map and all that is in it.
@@ -210,8 +231,10 @@ async fn transform(
     State(app): State<AppState>,
     PathParams(map): PathParams<String>,
     QueryParams(query): QueryParams<TransformQuery>,
+    Extension(principal): Extension<Principal>,
 ) -> Result<Json<TransformResponse>, ApiError> {
     maps::get(app.store.reads(), &map).await?;
+    check_map(&principal, &query.to).map_err(|e| e.field("to"))?;
     maps::get(app.store.reads(), &query.to).await.map_err(|e| ApiError::from(e).field("to"))?;
     let links: std::collections::BTreeMap<String, MapLink<String>> =
         map_locations::links(&map_locations::all(app.store.reads()).await?);
@@ -226,7 +249,7 @@ async fn transform(
         _ => return Err(ApiError::invalid("missing", "query", "x_m, y_m and theta_rad go together")),
     };
     Ok(Json(TransformResponse {
-        via: found.via,
+        via: found.via.into_iter().filter(|map| principal.may_see(map)).collect(),
         to_from_map: pose_shown(&found.to_from_map),
         level_m: found.level_m,
         pose: pose.as_ref().map(pose_shown),

@@ -4,7 +4,9 @@
 //! pages. Handlers parse, call the store, the jobs or the engine, and shape the answer; they decide nothing.
 
 mod answers;
+mod authorise;
 mod cameras;
+mod cookie;
 mod error;
 mod examples;
 mod extract;
@@ -17,6 +19,7 @@ mod live;
 mod mapping;
 mod maps;
 mod modalities;
+mod page_session;
 mod pages;
 mod recognise;
 mod reference_runs;
@@ -24,6 +27,8 @@ mod relocalisation;
 mod robots;
 mod ros2;
 mod router;
+mod security;
+mod tokens;
 mod underlay;
 mod upload;
 mod views;
@@ -36,12 +41,25 @@ mod tests;
 
 pub(crate) use router::router;
 
-use crate::{config::Config, gather::Gatherer, jobs::Jobs, publication::Catalogue, ros2::Ros2};
+use crate::{
+    config::Config,
+    gather::Gatherer,
+    identity::{Principal, Sessions},
+    jobs::Jobs,
+    publication::Catalogue,
+    ros2::Ros2,
+    store::now_ms,
+};
 use axum::http::StatusCode;
 use engine::{live::LiveHub, motion::MotionTracker, panics::Edge, relocalise::Relocalisers, workers::Engine};
 use error::ApiError;
-use std::{sync::Arc, time::Duration};
+use std::{path::PathBuf, sync::Arc, time::Duration};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, SemaphorePermit, watch};
+
+/// Where the API lives.
+const API: &str = "/api/v1";
+/// Longest time between two looks at the token of an event stream.
+const STREAM_CHECK: Duration = Duration::from_mins(1);
 
 /// What every handler shares.
 #[derive(Debug)]
@@ -59,6 +77,10 @@ pub(crate) struct App {
     pub(crate) searches: Arc<Relocalisers>,
     /// Robots of ROS 2.
     pub(crate) ros2: Arc<Ros2>,
+    /// Sessions of the page.
+    pub(crate) sessions: Arc<Sessions>,
+    /// Where the local token is, absolute.
+    pub(crate) local_token_file: Option<PathBuf>,
     /// Becomes true when the server stops; ends event streams.
     pub(crate) stopping: watch::Receiver<bool>,
     /// Places for vision work asked for over HTTP: as many as there are vision threads.
@@ -75,6 +97,8 @@ pub(crate) struct Services {
     pub(crate) jobs: Arc<Jobs>,
     pub(crate) gatherer: Arc<Gatherer>,
     pub(crate) ros2: Arc<Ros2>,
+    pub(crate) sessions: Arc<Sessions>,
+    pub(crate) local_token_file: Option<PathBuf>,
 }
 
 /// The state of the router.
@@ -84,7 +108,7 @@ impl App {
     pub(crate) fn new(
         config: Arc<Config>,
         store: Catalogue,
-        Services { jobs, gatherer, ros2 }: Services,
+        Services { jobs, gatherer, ros2, sessions, local_token_file }: Services,
         engine: &Engine,
         stopping: watch::Receiver<bool>,
     ) -> Self {
@@ -102,6 +126,8 @@ impl App {
             motion,
             searches,
             ros2,
+            sessions,
+            local_token_file,
             stopping,
             vision,
             streams,
@@ -146,6 +172,27 @@ impl App {
             let detail = format!("all {} event streams are in use", self.config.limits.streams);
             ApiError::new(StatusCode::SERVICE_UNAVAILABLE, "too_many_streams", detail)
         })
+    }
+
+    /// Ends when the server stops, or the principal's token is revoked, expires or is for other maps.
+    fn ended_for(&self, principal: Principal) -> impl Future<Output = ()> + Send + use<> {
+        let (tokens, stopped) = (self.store.tokens().clone(), self.stopped());
+        let denied = async move {
+            let mut changes = tokens.changes();
+            while tokens.principal(principal.token, now_ms()).as_ref() == Ok(&principal) {
+                let left = principal.expires_ms.map_or(STREAM_CHECK, |end| {
+                    Duration::from_millis(end.saturating_sub(now_ms()).max(1) as u64).min(STREAM_CHECK)
+                });
+                // Either way, one more look.
+                drop(tokio::time::timeout(left, changes.changed()).await);
+            }
+        };
+        async move {
+            tokio::select! {
+                () = stopped => {}
+                () = denied => {}
+            }
+        }
     }
 
     /// Ends when the server stops.

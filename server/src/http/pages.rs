@@ -4,7 +4,7 @@ use super::AppState;
 use axum::{Router, http::header, response::IntoResponse, routing::get};
 
 /// Path, media type, content.
-const FILES: [(&str, &str, &str); 11] = [
+const FILES: [(&str, &str, &str); 12] = [
     ("/", "text/html; charset=utf-8", include_str!("../../../web/index.html")),
     ("/app.js", "text/javascript; charset=utf-8", include_str!("../../../web/app.js")),
     ("/first-map.js", "text/javascript; charset=utf-8", include_str!("../../../web/first-map.js")),
@@ -14,6 +14,7 @@ const FILES: [(&str, &str, &str); 11] = [
     ("/gather.js", "text/javascript; charset=utf-8", include_str!("../../../web/gather.js")),
     ("/modalities.js", "text/javascript; charset=utf-8", include_str!("../../../web/modalities.js")),
     ("/hypotheses.js", "text/javascript; charset=utf-8", include_str!("../../../web/hypotheses.js")),
+    ("/session.js", "text/javascript; charset=utf-8", include_str!("../../../web/session.js")),
     ("/setting.js", "text/javascript; charset=utf-8", include_str!("../../../web/setting.js")),
     ("/style.css", "text/css; charset=utf-8", include_str!("../../../web/style.css")),
 ];

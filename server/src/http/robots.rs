@@ -2,12 +2,16 @@
 
 use super::{
     AppState,
-    answers::{page, row_major},
+    answers::{page, row_major, visible_rows},
+    authorise::check_map,
     error::ApiError,
     extract::{Body, PathParams, QueryParams, after_name, name, page_limit},
 };
-use crate::store::robots::{self, RobotRow};
-use axum::{Json, extract::State, http::StatusCode};
+use crate::{
+    identity::Principal,
+    store::robots::{self, RobotRow},
+};
+use axum::{Extension, Json, extract::State, http::StatusCode};
 use engine::{
     epochs::Conflict,
     live::LiveHub,
@@ -81,8 +85,10 @@ fn corrections_shown(found: Corrections) -> CorrectionsBody {
 async fn put(
     State(app): State<AppState>,
     PathParams(robot): PathParams<String>,
+    Extension(principal): Extension<Principal>,
     Body(to): Body<RobotAssignment>,
 ) -> Result<Json<Robot>, ApiError> {
+    check_map(&principal, &to.map)?;
     let (robot, max) = (name("robot", robot)?, app.config.limits.robots);
     let write = app
         .store
@@ -97,9 +103,19 @@ async fn put(
 async fn list(
     State(app): State<AppState>,
     QueryParams(query): QueryParams<PageQuery>,
+    Extension(principal): Extension<Principal>,
 ) -> Result<Json<Page<Robot>>, ApiError> {
     let limit = page_limit(&query, app.config.limits.page)?;
-    let rows = robots::page(app.store.reads(), &after_name(&query), limit + 1).await?;
+    let rows = visible_rows(
+        (after_name(&query), limit),
+        |after| {
+            let app = app.clone();
+            async move { robots::page(app.store.reads(), &after, limit + 1).await }
+        },
+        |row| &row.name,
+        |row| principal.may_see(&row.map),
+    );
+    let rows = rows.await?;
     Ok(Json(page(rows, limit, |r| r.name.clone(), |r| robot_shown(r, &app.motion, &app.live))))
 }
 
@@ -142,7 +158,10 @@ async fn delete(
 async fn corrections(
     State(app): State<AppState>,
     PathParams(robot): PathParams<String>,
+    Extension(principal): Extension<Principal>,
 ) -> Result<Json<CorrectionsBody>, ApiError> {
     robots::get(app.store.reads(), &robot).await?;
-    Ok(Json(corrections_shown(app.motion.corrections(&name("robot", robot)?))))
+    let mut found = app.motion.corrections(&name("robot", robot)?);
+    found.corrections.retain(|correction| principal.may_see(&correction.map));
+    Ok(Json(corrections_shown(found)))
 }

@@ -1,9 +1,13 @@
 //! Every route, with the layers around them and the OpenAPI document made from them.
 
 use super::{
-    App, AppState, cameras, error::ApiError, examples::with_examples, gathering, guard, health, landmarks,
-    learning, live, mapping, maps, modalities, pages, recognise, reference_runs, relocalisation, robots,
-    ros2, underlay, views, visibility, visibility_settings, walls,
+    API, App, AppState, authorise, cameras,
+    error::{ApiError, method_not_allowed, not_found},
+    examples::with_examples,
+    gathering, guard, health, landmarks, learning, live, mapping, maps, modalities, page_session, pages,
+    recognise, reference_runs, relocalisation, robots, ros2,
+    security::with_security,
+    tokens, underlay, views, visibility, visibility_settings, walls,
 };
 use crate::config::Limits;
 use axum::{
@@ -19,9 +23,6 @@ use tower_http::catch_panic::CatchPanicLayer;
 use utoipa::{OpenApi, openapi};
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_swagger_ui::SwaggerUi;
-
-/// Where the API lives.
-const API: &str = "/api/v1";
 
 #[derive(OpenApi)]
 #[openapi(info(
@@ -51,6 +52,8 @@ fn api(limits: &Limits) -> OpenApiRouter<AppState> {
         .merge(ros2::router())
         .merge(cameras::router())
         .merge(live::router())
+        .merge(tokens::router())
+        .merge(page_session::api())
         .merge(health::router())
 }
 
@@ -58,7 +61,7 @@ fn api(limits: &Limits) -> OpenApiRouter<AppState> {
 fn parts(limits: &Limits) -> (Router<AppState>, openapi::OpenApi) {
     let (routes, document) =
         OpenApiRouter::with_openapi(Document::openapi()).nest(API, api(limits)).split_for_parts();
-    (routes, with_examples(document, API))
+    (routes, with_security(with_examples(document, API), API))
 }
 
 /// The whole service.
@@ -70,24 +73,17 @@ pub(crate) fn router(app: App) -> Router {
     let config = utoipa_swagger_ui::Config::from(format!("{API}/openapi.json"));
     let docs: Router<AppState> = SwaggerUi::new("/api/docs").config(config).into();
     routes
+        .route_layer(from_fn_with_state(app.clone(), authorise::authorise))
         .route(&format!("{API}/openapi.json"), get(move || async move { Json(document) }))
         .merge(health)
         .merge(pages::router())
+        .merge(page_session::router())
         .merge(docs)
-        .fallback(not_found)
-        .method_not_allowed_fallback(method_not_allowed)
+        .fallback(async || not_found())
+        .method_not_allowed_fallback(async || method_not_allowed())
         .layer(CatchPanicLayer::custom(move |cause: Box<dyn Any + Send>| panicked(&panics, cause.as_ref())))
         .layer(from_fn_with_state(app.clone(), guard::guard))
         .with_state(app)
-}
-
-async fn not_found() -> ApiError {
-    ApiError::new(StatusCode::NOT_FOUND, "not_found", "there is nothing at this path").field("path")
-}
-
-async fn method_not_allowed() -> ApiError {
-    ApiError::new(StatusCode::METHOD_NOT_ALLOWED, "method_not_allowed", "this path does not take this method")
-        .field("method")
 }
 
 fn panicked(panics: &Panics, cause: &(dyn Any + Send)) -> Response {

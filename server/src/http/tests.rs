@@ -1,12 +1,15 @@
 //! The routes without a network: requests go straight to the router.
 
+mod authorisation;
 mod earlier_build;
 mod openapi;
+mod page_sessions;
 mod teaching;
 
 use super::*;
 use crate::{
     config::{Limits, RawConfig},
+    identity::{Secret, TokenText},
     publication::CatalogueTasks,
     store::{StoreError, maps},
 };
@@ -26,6 +29,8 @@ struct Service {
     router: Router,
     store: Catalogue,
     engine: Engine,
+    /// Text of the local token.
+    local: String,
     _writer: CatalogueTasks,
     _stop: watch::Sender<bool>,
     _data: tempfile::TempDir,
@@ -55,14 +60,31 @@ impl Service {
         let app = App::new(
             config,
             store.clone(),
-            Services { jobs, gatherer, ros2: Arc::default() },
+            Services {
+                jobs,
+                gatherer,
+                ros2: Arc::default(),
+                sessions: Arc::default(),
+                local_token_file: Some("/data/local-token".into()),
+            },
             &engine,
             stopping,
         );
-        Self { router: router(app), store, engine, _writer: writer, _stop: stop, _data: data }
+        let secret = Secret::random().unwrap();
+        store.tokens().set_local(&secret);
+        let local = TokenText::local(80, &secret);
+        Self { router: router(app), store, engine, local, _writer: writer, _stop: stop, _data: data }
     }
 
-    fn ask(&self, request: Request<Body>) -> impl Future<Output = Response<Body>> + Send + 'static {
+    /// Asks with the local token, unless the request says who asks.
+    fn ask(&self, mut request: Request<Body>) -> impl Future<Output = Response<Body>> + Send + 'static {
+        let local = format!("Bearer {}", self.local).parse().unwrap();
+        request.headers_mut().entry(header::AUTHORIZATION).or_insert(local);
+        self.ask_as_it_is(request)
+    }
+
+    /// Asks without more credentials than the request has.
+    fn ask_as_it_is(&self, request: Request<Body>) -> impl Future<Output = Response<Body>> + Send + 'static {
         let router = self.router.clone();
         async move { router.oneshot(request).await.unwrap() }
     }

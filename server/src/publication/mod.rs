@@ -12,6 +12,7 @@ mod visibility_areas;
 
 use crate::{
     config::Config,
+    identity::TokenRegistry,
     store::{OpenError, Store, WriterTask},
 };
 use engine::{snapshot::Snapshots, vitals::Vitals};
@@ -24,6 +25,7 @@ use tokio::{sync::watch, task::JoinHandle};
 pub(crate) struct Catalogue {
     store: Store,
     snapshots: Arc<Snapshots>,
+    tokens: Arc<TokenRegistry>,
 }
 
 impl Deref for Catalogue {
@@ -63,17 +65,24 @@ impl Catalogue {
     /// Opens the store and publishes every map.
     pub(crate) async fn open(config: &Config) -> Result<(Self, CatalogueTasks), OpenError> {
         let (snapshots, vitals) = (Arc::new(Snapshots::default()), Arc::new(Vitals::default()));
-        let publisher = Publisher::new(snapshots.clone(), config.params.clone(), vitals.clone());
+        let tokens = Arc::<TokenRegistry>::default();
+        let publisher =
+            Publisher::new(snapshots.clone(), tokens.clone(), config.params.clone(), vitals.clone());
         let wake = publisher.derive.clone();
         let (store, writer) = Store::open(config, Arc::new(publisher), vitals.clone()).await?;
         let (stop, stopping) = watch::channel(false);
         let deriver = tokio::spawn(derive::run(snapshots.clone(), vitals, wake, stopping));
-        Ok((Self { store, snapshots }, CatalogueTasks { writer, deriver, stop }))
+        Ok((Self { store, snapshots, tokens }, CatalogueTasks { writer, deriver, stop }))
     }
 
     /// What the workers read.
     pub(crate) fn snapshots(&self) -> &Arc<Snapshots> {
         &self.snapshots
+    }
+
+    /// The tokens that requests are checked with.
+    pub(crate) fn tokens(&self) -> &Arc<TokenRegistry> {
+        &self.tokens
     }
 }
 

@@ -4,7 +4,10 @@
 //! name the map, and the next write to it tries again.
 
 use super::build;
-use crate::store::{CommittedChange, OnCommit, StoreError, map_locations, map_rows, robots};
+use crate::{
+    identity::{PublishedToken, TokenRegistry},
+    store::{CommittedChange, OnCommit, StoreError, map_locations, map_rows, robots, tokens},
+};
 use engine::{panics::Edge, snapshot::Snapshots, vitals::Vitals};
 use futures::{FutureExt, future::BoxFuture};
 use sqlx::SqliteConnection;
@@ -19,6 +22,7 @@ const PAGE: usize = 500;
 #[derive(Debug)]
 pub(super) struct Publisher {
     snapshots: Arc<Snapshots>,
+    tokens: Arc<TokenRegistry>,
     params: Arc<Params>,
     vitals: Arc<Vitals>,
     /// Notified when a version has data to derive.
@@ -26,8 +30,13 @@ pub(super) struct Publisher {
 }
 
 impl Publisher {
-    pub(super) fn new(snapshots: Arc<Snapshots>, params: Arc<Params>, vitals: Arc<Vitals>) -> Self {
-        Self { snapshots, params, vitals, derive: Arc::default() }
+    pub(super) fn new(
+        snapshots: Arc<Snapshots>,
+        tokens: Arc<TokenRegistry>,
+        params: Arc<Params>,
+        vitals: Arc<Vitals>,
+    ) -> Self {
+        Self { snapshots, tokens, params, vitals, derive: Arc::default() }
     }
 
     async fn all(&self, conn: &mut SqliteConnection) -> Result<(), StoreError> {
@@ -38,6 +47,7 @@ impl Publisher {
             }
         }
         self.links(conn).await?;
+        self.tokens(conn).await?;
         let mut after = String::new();
         loop {
             let page = robots::page(&mut *conn, &after, PAGE).await?;
@@ -51,6 +61,13 @@ impl Publisher {
 
     async fn links(&self, conn: &mut SqliteConnection) -> Result<(), StoreError> {
         self.snapshots.set_links(map_locations::links(&map_locations::all(conn).await?));
+        Ok(())
+    }
+
+    async fn tokens(&self, conn: &mut SqliteConnection) -> Result<(), StoreError> {
+        let all = tokens::page(conn, 0, tokens::MAX_TOKENS).await?;
+        let published = |row: tokens::TokenRow| PublishedToken { token: row.token, sha256: row.sha256 };
+        self.tokens.publish(all.into_iter().map(published));
         Ok(())
     }
 
@@ -111,6 +128,7 @@ impl OnCommit for Publisher {
                     self.vitals.published(&name);
                 }
                 CommittedChange::Links => self.links(conn).await?,
+                CommittedChange::Tokens => self.tokens(conn).await?,
                 CommittedChange::Robot { name, map } => self.snapshots.set_robot(&name, map.as_deref()),
                 // The writer tells the jobs itself.
                 CommittedChange::Jobs => {}

@@ -16,6 +16,7 @@ pub(crate) enum Kind {
     Track,
     ReferenceRun,
     Underlay,
+    Token,
 }
 
 impl fmt::Display for Kind {
@@ -32,6 +33,7 @@ impl fmt::Display for Kind {
             Self::Track => "track",
             Self::ReferenceRun => "reference run",
             Self::Underlay => "underlay of map",
+            Self::Token => "token",
         })
     }
 }

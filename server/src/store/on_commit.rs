@@ -13,6 +13,8 @@ pub(crate) enum CommittedChange {
     MapRemoved(String),
     /// The map links have changed.
     Links,
+    /// Tokens, or the maps that they are for.
+    Tokens,
     /// A job is queued.
     Jobs,
     /// The robot is on this map, or is gone.

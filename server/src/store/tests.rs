@@ -22,6 +22,7 @@ async fn every_statement_prepares_on_the_migrated_schema() {
         track_acceptance::ALL,
         modality_stats::ALL,
         robots::ALL,
+        tokens::ALL,
         jobs::ALL,
         map_rows::ALL,
     ];

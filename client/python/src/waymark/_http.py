@@ -94,6 +94,11 @@ OPERATIONS: dict[str, tuple[str, str]] = {
     "relocalisation": ("GET", "/robots/{robot}/relocalisation"),
     "ros2_status": ("GET", "/robots/{robot}/ros2"),
     "trajectories": ("GET", "/robots/{robot}/trajectories"),
+    "create_token": ("POST", "/tokens"),
+    "tokens": ("GET", "/tokens"),
+    "revoke_token": ("DELETE", "/tokens/{token}"),
+    "whoami": ("GET", "/whoami"),
+    "page_link": ("POST", "/session/links"),
     "set_underlay": ("PUT", "/maps/{map}/underlay"),
     "underlay": ("GET", "/maps/{map}/underlay"),
     "underlay_image": ("GET", "/maps/{map}/underlay/image"),
@@ -138,8 +143,8 @@ def request_of(call: str, at: Sequence[str | int]) -> tuple[str, str]:
     return method, made
 
 
-def refusal(response: httpx.Response) -> Refused:
-    """What an answer of an error says."""
+def refusal(response: httpx.Response, reason: str = "") -> Refused:
+    """What an answer of an error says. `reason` is added to its sentence."""
     try:
         problem = response.json()
     except ValueError:
@@ -148,7 +153,7 @@ def refusal(response: httpx.Response) -> Refused:
         problem = {}
     known = {"type", "title", "status", "code", "field", "detail"}
     return Refused(
-        problem.get("detail") or f"status {response.status_code} from {response.url}",
+        (problem.get("detail") or f"status {response.status_code} from {response.url}") + reason,
         code=problem.get("code") or "unknown",
         field=problem.get("field") or "",
         status=response.status_code,

@@ -3,12 +3,14 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
 import httpx
 
+from waymark import _local_token
 from waymark._http import TIMEOUT_S, EventParser, parsed, parsed_items, refusal, request_of, unreachable
 
 T = TypeVar("T")
@@ -17,9 +19,14 @@ T = TypeVar("T")
 class Base:
     """Sends requests."""
 
-    def __init__(self, server: str = "http://127.0.0.1:8080") -> None:
-        """A client of the server at this address. Nothing is sent yet."""
+    def __init__(self, server: str = "http://127.0.0.1:8080", token: str | None = None) -> None:
+        """A client of the server at this address, with a token of `waymark token create`. Nothing is sent yet.
+
+        Without a token, that of a server on this machine is taken once it is asked for.
+        """
         self._base = server.rstrip("/")
+        self._token = token
+        self._local_port = _local_token.local_port(self._base) if token is None else None
         # Ignores proxies of the environment: the server is in the robot's own network.
         self._http = httpx.Client(base_url=self._base, timeout=TIMEOUT_S, trust_env=False)
 
@@ -33,14 +40,43 @@ class Base:
     def _checked(self, call: str, at: Sequence[str | int], is_stream: bool = False, **parts: Any) -> httpx.Response:
         method, path = request_of(call, at)
         try:
-            request = self._http.build_request(method, path, **parts)
-            response = self._http.send(request, stream=is_stream)
+            self._find_local_token(parts)
+            sent = self._token
+            response = self._sent(method, path, is_stream, parts)
+            reason = ""
+            if response.status_code == 401:
+                try:
+                    if self._take_local_token(response) != sent:
+                        response.close()
+                        response = self._sent(method, path, is_stream, parts)
+                except _local_token.NotUsedError as error:
+                    reason = f" (the local token is not used: {error})"
             if response.is_error:
                 response.read()
-                raise refusal(response)
+                raise refusal(response, reason)
             return response
         except httpx.HTTPError as error:
             raise unreachable(self._base, error) from error
+
+    def _find_local_token(self, parts: dict[str, Any]) -> None:
+        """Finds the token of the server on this machine before a body is sent: a refusal may break off a large one."""
+        is_large = "files" in parts or (self._token is None and "json" in parts)
+        if self._local_port is not None and is_large:
+            response = self._sent(*request_of("whoami", ()), is_stream=False, parts={})
+            with contextlib.suppress(_local_token.NotUsedError):
+                self._take_local_token(response)
+
+    def _sent(self, method: str, path: str, is_stream: bool, parts: dict[str, Any]) -> httpx.Response:
+        headers = {"Authorization": f"Bearer {self._token}"} if self._token is not None else None
+        request = self._http.build_request(method, path, headers=headers, **parts)
+        return self._http.send(request, stream=is_stream)
+
+    def _take_local_token(self, response: httpx.Response) -> str | None:
+        """The token of the server on this machine, if a 401 names its file; else the one that there is."""
+        file = _local_token.named_file(response)
+        if file is not None and self._local_port is not None:
+            self._token = _local_token.read(file, self._local_port)
+        return self._token
 
     def _send(self, kind: type[T], call: str, *at: str | int, **parts: Any) -> T:
         found: T = parsed(kind, self._checked(call, at, **parts))

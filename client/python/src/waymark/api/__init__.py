@@ -94,6 +94,13 @@ from waymark.api.robots import (
     UploadedView,
     UploadedViews,
 )
+from waymark.api.tokens import (
+    CreatedToken,
+    PageLink,
+    Role,
+    Token,
+    Whoami,
+)
 from waymark.api.visibility import (
     CoverageGapBody,
     CoverageResponse,
@@ -127,6 +134,7 @@ __all__ = [
     "CoverageGapBody",
     "CoverageResponse",
     "CoverageSampleBody",
+    "CreatedToken",
     "Distance",
     "EpochConflictBody",
     "ErrorModelBody",
@@ -166,6 +174,7 @@ __all__ = [
     "MultiPolygon",
     "NamedAreaBody",
     "ObservedPlaceBody",
+    "PageLink",
     "Parent",
     "Place",
     "PlaceSigma",
@@ -178,8 +187,10 @@ __all__ = [
     "RelocalisationStatus",
     "Robot",
     "RobotPose",
+    "Role",
     "Ros2Status",
     "Size",
+    "Token",
     "TrackSummary",
     "TrainingView",
     "TrajectoriesBody",
@@ -198,4 +209,5 @@ __all__ = [
     "VisibleResponse",
     "WallBody",
     "WallsBody",
+    "Whoami",
 ]

@@ -1,0 +1,116 @@
+//! The file `local-token` in the data directory: an administrator's token for programs of this user on this machine.
+//! It is written anew at each start, readable by its owner alone, and removed at the end.
+
+use super::secret::{NoRandomness, Secret, TokenText};
+use std::{
+    fs::{self, File, OpenOptions},
+    io::{self, Write as _},
+    path::{Path, PathBuf},
+};
+
+/// Name of the file in the data directory; clients read no other.
+pub(crate) const FILE: &str = "local-token";
+
+/// Why there is no local token.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum LocalTokenError {
+    /// The file cannot be written.
+    #[error("the local token cannot be written to {path}: {source}")]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// There is no secret.
+    #[error(transparent)]
+    Randomness(#[from] NoRandomness),
+}
+
+/// The file with the token of this start.
+#[derive(Debug)]
+pub(crate) struct LocalToken {
+    /// Absolute.
+    path: PathBuf,
+    secret: Secret<32>,
+    port: u16,
+}
+
+impl LocalToken {
+    /// Writes a fresh token for the server on this port.
+    pub(crate) fn write(data: &Path, port: u16) -> Result<Self, LocalTokenError> {
+        let secret = Secret::random()?;
+        let text = TokenText::local(port, &secret);
+        let at = |path: &Path| {
+            let path = path.to_owned();
+            |source| LocalTokenError::File { path, source }
+        };
+        let path = data.canonicalize().map_err(at(data))?.join(FILE);
+        let draft = path.with_extension("new");
+        // One that a crash has left behind; its mode is not known.
+        match fs::remove_file(&draft) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(at(&draft)(error)),
+            _ => {}
+        }
+        let mut file = private(&draft).map_err(at(&draft))?;
+        let written = writeln!(file, "{text}").and_then(|()| file.sync_all());
+        written.and_then(|()| fs::rename(&draft, &path)).map_err(at(&path))?;
+        Ok(Self { path, secret, port })
+    }
+
+    /// Where it is, absolute.
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Its secret.
+    pub(crate) fn secret(&self) -> &Secret<32> {
+        &self.secret
+    }
+
+    /// Removes the file, if it still has this token.
+    pub(crate) fn remove(&self) {
+        let is_own = fs::read_to_string(&self.path)
+            .is_ok_and(|text| text.trim() == TokenText::local(self.port, &self.secret));
+        if is_own && let Err(error) = fs::remove_file(&self.path) {
+            let follows = "it is not valid any more; the next start replaces it";
+            tracing::warn!(%error, path = %self.path.display(), follows, "local_token_not_removed");
+        }
+    }
+}
+
+/// A new file that nobody else can read, not even for a moment.
+fn private(path: &Path) -> io::Result<File> {
+    let mut options = OpenOptions::new();
+    options.write(true).create_new(true);
+    #[cfg(unix)]
+    std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
+    options.open(path)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[cfg(unix)]
+    #[test]
+    fn the_file_is_private_fresh_at_each_start_and_removed_by_its_owner_alone() {
+        use std::os::unix::fs::PermissionsExt as _;
+        let data = tempfile::tempdir().unwrap();
+        let first = LocalToken::write(data.path(), 8080).unwrap();
+        let read = || fs::read_to_string(data.path().join(FILE)).unwrap();
+        let text = read();
+        assert!(text.starts_with("wmk_local-8080_") && TokenText::parse(text.trim()).is_some());
+        assert!(!format!("{first:?}").contains(text.trim()));
+        let mode = fs::metadata(first.path()).unwrap().permissions().mode();
+        assert_eq!((mode & 0o777, first.path().is_absolute()), (0o600, true));
+        // A draft of a crash with another mode does not matter.
+        fs::write(data.path().join("local-token.new"), "x").unwrap();
+        let second = LocalToken::write(data.path(), 8080).unwrap();
+        assert_ne!(read(), text);
+        first.remove();
+        assert!(second.path().exists(), "it is another's");
+        second.remove();
+        assert_eq!(fs::read_dir(data.path()).unwrap().count(), 0);
+    }
+}

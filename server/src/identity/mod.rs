@@ -1,0 +1,53 @@
+//! Who asks and what they may do. In: credentials of a request. Out: a [`Principal`], or the reason why there is none.
+//!
+//! A principal is known by a token (of the database, or the local one of this start) or by a session of the page, which
+//! stands for the token that opened it. Tokens are read from memory ([`registry`]); the publication fills it after each
+//! commit, so a revoked token is refused by the next request.
+
+pub(crate) mod authorisation;
+pub(crate) mod local_token;
+mod registry;
+mod secret;
+mod sessions;
+
+pub(crate) use registry::{Denial, PublishedToken, TokenRegistry};
+pub(crate) use secret::{Secret, TokenText};
+pub(crate) use sessions::{CODE_VALID, SESSION_VALID, Sessions};
+
+use protos::api::Role;
+use std::collections::BTreeSet;
+
+/// Which token a principal has shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum TokenId {
+    /// That of the file in the data directory.
+    Local,
+    /// One of the database.
+    Stored(i64),
+}
+
+/// Who asks.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Principal {
+    pub(crate) token: TokenId,
+    /// Name of the token.
+    pub(crate) name: String,
+    pub(crate) role: Role,
+    /// Names of the maps that it is for; `None` for all maps and what is above maps.
+    pub(crate) maps: Option<BTreeSet<String>>,
+    /// ms since the Unix epoch.
+    pub(crate) expires_ms: Option<i64>,
+}
+
+impl Principal {
+    /// Whoever reads the local token: this user of this machine.
+    fn local() -> Self {
+        let name = "local".to_owned();
+        Self { token: TokenId::Local, name, role: Role::Admin, maps: None, expires_ms: None }
+    }
+
+    /// Whether this map is shown to it.
+    pub(crate) fn may_see(&self, map: &str) -> bool {
+        self.maps.as_ref().is_none_or(|maps| maps.contains(map))
+    }
+}
