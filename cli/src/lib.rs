@@ -63,7 +63,7 @@ enum Command {
     Map(map::Args),
     /// Landmarks: teach, list, show, place, size, rename, delete, accept.
     Landmark(landmark::Args),
-    /// Training views of a landmark: list, show, delete.
+    /// Training views of a landmark: list, show, image, delete.
     View(view::Args),
     /// Robots that may send frames: add, list, show, remove.
     Robot(robot::Args),

@@ -8,7 +8,7 @@ use crate::{
     jobs::Jobs,
     publication::{Catalogue, CatalogueTasks},
     ros2::Ros2,
-    store::{OpenError, landmarks},
+    store::{OpenError, landmarks, pictures},
 };
 use engine::{
     decode::ImageLimits,
@@ -95,6 +95,7 @@ struct Tasks {
     jobs: JoinHandle<()>,
     findings: JoinHandle<()>,
     gather: JoinHandle<()>,
+    pictures: JoinHandle<()>,
     writer: CatalogueTasks,
     watch: JoinHandle<()>,
 }
@@ -128,6 +129,7 @@ impl Server {
         engine.motion.mappings().resume_in(config.data.join("mapping"), is_on);
         let pulse = vitals.begin("the task that stores findings");
         let findings = tokio::spawn(store_findings(store.clone(), found, pulse));
+        let pictures = tokio::spawn(pictures::check_all((*store).clone(), stopping.clone()));
         let (live, slots) = (engine.live.clone(), engine.slots.clone());
         let to = receivers(&config, &engine);
         let bus = Bus::open(&config, to.clone()).await?;
@@ -146,7 +148,7 @@ impl Server {
             drop(pulse);
         });
         let watch = tokio::spawn(vitals.clone().watch());
-        let tasks = Tasks { workers, bus, http, jobs: jobs_task, findings, gather, writer, watch };
+        let tasks = Tasks { workers, bus, http, jobs: jobs_task, findings, gather, pictures, writer, watch };
         Ok(RunningServer { http_addr, zenoh_endpoint, snapshots, live, slots, ros2, stop, vitals, tasks })
     }
 }
@@ -221,7 +223,7 @@ impl RunningServer {
     pub async fn stop(self) {
         self.vitals.stop();
         self.stop.send_replace(true);
-        let Tasks { workers, bus, http, jobs, findings, gather, writer, watch } = self.tasks;
+        let Tasks { workers, bus, http, jobs, findings, gather, pictures, writer, watch } = self.tasks;
         watch.abort();
         // Workers first: what they have in work is still answered over the open bus.
         let workers = tokio::task::spawn_blocking(move || workers.stop());
@@ -230,7 +232,14 @@ impl RunningServer {
         }
         self.ros2.close().await;
         bus.close().await;
-        for (what, task) in [("HTTP", http), ("jobs", jobs), ("findings", findings), ("gathering", gather)] {
+        let others = [
+            ("HTTP", http),
+            ("jobs", jobs),
+            ("findings", findings),
+            ("gathering", gather),
+            ("the check of the pictures", pictures),
+        ];
+        for (what, task) in others {
             if let Err(error) = task.await {
                 tracing::error!(%error, what, "task_panicked");
             }

@@ -14,7 +14,7 @@ const SERVER: &[&str] = &["--server", "--json"];
 const MAP: &[&str] = &["--map", "--server", "--json"];
 
 /// Options that each command must name in its help, beside those of its group.
-const OPTIONS: [(&str, &[&str], &[&str]); 47] = [
+const OPTIONS: [(&str, &[&str], &[&str]); 50] = [
     ("", &[], &["--log", "--version", "Exit status"]),
     ("demo", &[], &["--robots", "--rate-hz", "--legs", "--seed", "--http", "--data", "--stay", "--json"]),
     ("serve", &[], &["--config", "--data", "--http", "--zenoh", "--fleet", "--workers", "--insecure"]),
@@ -132,6 +132,7 @@ const OPTIONS: [(&str, &[&str], &[&str]); 47] = [
     ("landmark accept", MAP, &["<GATHERING>", "<NUMBER[=NAME]>"]),
     ("view list", MAP, &["<LANDMARK>"]),
     ("view show", MAP, &["<LANDMARK>", "<VIEW>", "--out"]),
+    ("view image", MAP, &["<LANDMARK>", "<VIEW>", "--out"]),
     ("view delete", MAP, &["<LANDMARK>", "<VIEWS>", "--yes"]),
     ("robot add", SERVER, &["<ROBOT>", "--map"]),
     ("robot list", SERVER, &[]),

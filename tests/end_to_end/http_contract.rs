@@ -120,6 +120,7 @@ const ROWS: &[Row<'_>] = &[
     ("GET", "/maps/nowhere/landmarks/p1", "", 404, "unknown_map", "map"),
     ("GET", "/maps/hall/landmarks/nothing", "", 404, "unknown_landmark", "landmark"),
     ("GET", "/maps/hall/landmarks/p1/views/7/icon", "", 404, "unknown_view", "view"),
+    ("GET", "/maps/hall/landmarks/p1/views/7/image", "", 404, "unknown_view", "view"),
     ("DELETE", "/maps/hall/landmarks/p1/views/7", "", 404, "unknown_view", "view"),
     ("GET", "/robots/nobody", "", 404, "unknown_robot", "robot"),
     ("GET", "/robots/r1/cameras/front/frame", "", 404, "unknown_camera", "camera"),

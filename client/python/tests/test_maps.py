@@ -185,6 +185,7 @@ def test_landmarks_are_placed_taught_and_learnt(server: Server) -> None:
         views = maps.views("lessons", "poster")
         assert {first.id, third.id} <= {view.id for view in views}
         assert maps.view_icon("lessons", "poster", first.id).startswith(b"\x89PNG")
+        assert maps.view_image("lessons", "poster", third.id) == whole
         maps.delete_view("lessons", "poster", third.id)
 
         states: list[str] = []

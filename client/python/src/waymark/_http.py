@@ -102,6 +102,7 @@ OPERATIONS: dict[str, tuple[str, str]] = {
     "views": ("GET", "/maps/{map}/landmarks/{landmark}/views"),
     "delete_view": ("DELETE", "/maps/{map}/landmarks/{landmark}/views/{view}"),
     "view_icon": ("GET", "/maps/{map}/landmarks/{landmark}/views/{view}/icon"),
+    "view_image": ("GET", "/maps/{map}/landmarks/{landmark}/views/{view}/image"),
     "visible": ("POST", "/maps/{map}/visible"),
     "coverage": ("POST", "/maps/{map}/coverage"),
     "gaze_ranking": ("POST", "/maps/{map}/gaze"),

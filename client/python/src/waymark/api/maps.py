@@ -116,11 +116,13 @@ class Health:
 
 @dataclass(frozen=True, slots=True)
 class Readiness:
-    """`ready`, or `degraded`: everything runs, but some maps use an earlier version, or none."""
+    """`ready`, or `degraded`: everything runs, but some maps use an earlier version, or none, or stored pictures are
+    damaged."""
 
     status: str
     maps_not_in_use: dict[str, str]
     panics: dict[str, int]
+    damaged_pictures: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
