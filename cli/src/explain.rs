@@ -49,6 +49,7 @@ pub(crate) async fn explained(failure: Failure, maps: Option<&MapClient>, map: O
         "unknown_track" => failure.advised("waymark gathering show GATHERING lists the tracks."),
         "unknown_view" => failure.advised("waymark view list LANDMARK shows the numbers."),
         "unknown_reference_run" => failure.advised("waymark run list shows the numbers."),
+        "unknown_backup" => failure.advised("GET /api/v1/backups lists them."),
         "unknown_camera" => failure.advised("waymark camera list ROBOT shows the cameras."),
         "not_recording" => failure.advised("Begin a recording: waymark run start ROBOT"),
         "exists" => failure.advised("Choose another name, or delete the other one first."),

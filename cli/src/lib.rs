@@ -3,6 +3,7 @@
 
 mod answers;
 pub mod arg_parsers;
+mod backup;
 mod camera;
 mod camera_arg;
 pub mod clock;
@@ -20,6 +21,7 @@ pub mod parameters;
 pub mod pictures;
 mod recognise;
 mod recording;
+mod restore;
 mod robot;
 mod run;
 pub mod scratch;
@@ -59,6 +61,20 @@ enum Command {
     Serve(serve::Serve),
     /// Whether a server does its work: status.
     Server(server_status::Args),
+    /// Write the whole state of a running server to one file
+    ///
+    /// Maps, pictures, models, robots and jobs, as they were at one moment; the server goes on meanwhile. The file is
+    /// verified before it gets its name. For example:
+    ///   waymark backup office.waymark
+    #[command(verbatim_doc_comment)]
+    Backup(backup::Args),
+    /// Put a backup in the place of the data of a stopped server
+    ///
+    /// The backup is verified first: digests, integrity, schema. What was there stays in a folder beside it. For example:
+    ///   waymark restore office.waymark --dry-run
+    ///   waymark restore office.waymark --data waymark-data
+    #[command(verbatim_doc_comment)]
+    Restore(restore::Args),
     /// Maps: create, list, show, locate, delete; walls from laser logs, grids and plans.
     Map(map::Args),
     /// Landmarks: teach, list, show, place, size, rename, delete, accept.
@@ -153,6 +169,8 @@ pub fn main() -> ExitCode {
         Command::Demo(args) => run(demo::run(args)),
         Command::Serve(serve) => run(serve.clone().run()).map(done),
         Command::Server(args) => run(server_status::run(args)).map(done),
+        Command::Backup(args) => run(backup::run(args)).map(done),
+        Command::Restore(args) => run(restore::run(args)).map(done),
         Command::Map(args) => run(map::run(args)).map(done),
         Command::Landmark(args) => run(landmark::run(args)).map(done),
         Command::View(args) => run(view::run(args)).map(done),

@@ -7,7 +7,7 @@ use super::{
 };
 use client::{
     ClientError,
-    api::{Readiness, Version},
+    api::{BackupHealth, Readiness, Version},
 };
 use serde_json::json;
 
@@ -60,6 +60,8 @@ async fn status(session: &Session) -> anyhow::Result<()> {
         "The server is degraded: not every map is in use."
     } else if !readiness.damaged_pictures.is_empty() {
         "The server is degraded: stored pictures are damaged."
+    } else if readiness.status == "degraded" {
+        "The server is degraded: the last scheduled backup failed."
     } else {
         return Ok(());
     };
@@ -83,6 +85,12 @@ fn text(version: &Version, readiness: &Readiness, counts: &Counts) -> String {
         format!("  {} with {}", counted(counts.maps, "map"), counted(counts.landmarks, "landmark")),
         format!("  {}, {} connected", counted(counts.robots, "robot"), counts.connected),
     ];
+    let BackupHealth { newest, failed, every_hours, .. } = &readiness.backup;
+    lines.extend(newest.iter().map(|name| format!("  newest backup {name} (UTC)")));
+    if newest.is_none() && *every_hours > 0 {
+        lines.push("  no backup yet".to_owned());
+    }
+    lines.extend(failed.iter().map(|why| format!("  the last backup failed: {why}")));
     let unused = readiness.maps_not_in_use.iter();
     lines.extend(unused.map(|(map, why)| format!("  map {map} is not in use: {why}")));
     let damaged = readiness.damaged_pictures.iter();
@@ -109,6 +117,12 @@ mod tests {
             status: "degraded".into(),
             maps_not_in_use: [("office".to_owned(), "damaged".to_owned())].into(),
             damaged_pictures: vec!["view 3 of landmark door, map office".into()],
+            backup: BackupHealth {
+                every_hours: 24,
+                newest: Some("20261123-140530".into()),
+                newest_ms: Some(0),
+                failed: Some("no space".into()),
+            },
             panics: [("a frame".to_owned(), 2), ("a write".to_owned(), 0)].into(),
         };
         let counts = Counts { maps: 1, landmarks: 2, robots: 0, connected: 0 };
@@ -118,6 +132,10 @@ mod tests {
             "{lines}"
         );
         assert!(lines.contains("map office is not in use: damaged"), "{lines}");
+        assert!(
+            lines.contains("newest backup 20261123-140530 (UTC)\n  the last backup failed: no space"),
+            "{lines}"
+        );
         assert!(lines.contains("damaged picture: view 3 of landmark door, map office; "), "{lines}");
         assert!(lines.ends_with("2 faults of the program caught in a frame: see its log"), "{lines}");
     }

@@ -4,6 +4,7 @@
 //! zenoh appears only in `bus` and `ros2`, sqlx only in `store`, axum only in `http`.
 
 pub mod config;
+pub mod backup;
 pub mod bus;
 pub mod ros2;
 mod store;

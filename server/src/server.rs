@@ -1,6 +1,7 @@
 //! Starts everything in order and stops it in the opposite order: store, jobs, engine, bus, HTTP.
 
 use crate::{
+    backup::Backups,
     bus::{Bus, BusError, Receivers},
     config::Config,
     gather::{self, Gatherer, GatheringTap},
@@ -96,6 +97,7 @@ struct Tasks {
     findings: JoinHandle<()>,
     gather: JoinHandle<()>,
     pictures: JoinHandle<()>,
+    backups: JoinHandle<()>,
     writer: CatalogueTasks,
     watch: JoinHandle<()>,
 }
@@ -139,7 +141,8 @@ impl Server {
         vitals.probe("the outbox", move || outbox.is_running());
         let workers = Workers::start(&engine, config.workers, &publisher).map_err(StartError::Threads)?;
         let zenoh_endpoint = bus.endpoint().to_owned();
-        let services = Services { jobs, gatherer, ros2: ros2.clone() };
+        let (backups, backups_task) = Backups::start(&config, vitals.panics().clone(), stopping.clone());
+        let services = Services { jobs, gatherer, ros2: ros2.clone(), backups };
         let app = App::new(config.clone(), store, services, &engine, stopping.clone());
         let pulse = vitals.begin("the HTTP listener");
         let router = http::router(app);
@@ -148,7 +151,18 @@ impl Server {
             drop(pulse);
         });
         let watch = tokio::spawn(vitals.clone().watch());
-        let tasks = Tasks { workers, bus, http, jobs: jobs_task, findings, gather, pictures, writer, watch };
+        let tasks = Tasks {
+            workers,
+            bus,
+            http,
+            jobs: jobs_task,
+            findings,
+            gather,
+            pictures,
+            backups: backups_task,
+            writer,
+            watch,
+        };
         Ok(RunningServer { http_addr, zenoh_endpoint, snapshots, live, slots, ros2, stop, vitals, tasks })
     }
 }
@@ -223,7 +237,8 @@ impl RunningServer {
     pub async fn stop(self) {
         self.vitals.stop();
         self.stop.send_replace(true);
-        let Tasks { workers, bus, http, jobs, findings, gather, pictures, writer, watch } = self.tasks;
+        let Tasks { workers, bus, http, jobs, findings, gather, pictures, backups, writer, watch } =
+            self.tasks;
         watch.abort();
         // Workers first: what they have in work is still answered over the open bus.
         let workers = tokio::task::spawn_blocking(move || workers.stop());
@@ -238,6 +253,7 @@ impl RunningServer {
             ("findings", findings),
             ("gathering", gather),
             ("the check of the pictures", pictures),
+            ("the timetable of backups", backups),
         ];
         for (what, task) in others {
             if let Err(error) = task.await {

@@ -60,6 +60,8 @@ const OPTIONS: [(&str, &[&str], &[&str]); 50] = [
     ("completions", &[], &["<SHELL>", "bash", "fish"]),
     ("man", &[], &["<FOLDER>"]),
     ("server status", SERVER, &[]),
+    ("backup", SERVER, &["[FILE]"]),
+    ("restore", &[], &["<FILE>", "--data", "--dry-run", "--yes", "--json"]),
     ("map create", SERVER, &["--distance", "--site", "--building", "--floor", "<MAP>"]),
     ("map list", SERVER, &[]),
     ("map show", SERVER, &["<MAP>"]),

@@ -128,6 +128,9 @@ const ROWS: &[Row<'_>] = &[
     ("GET", "/jobs/ninety", "", 404, "not_found", "path"),
     ("PUT", "/robots/r2", r#"{"map": "nowhere"}"#, 404, "unknown_map", "map"),
     ("PUT", "/robots/R2", r#"{"map": "hall"}"#, 422, "bad_name", "robot"),
+    ("GET", "/backups/20200101-000000", "", 404, "unknown_backup", "backup"),
+    ("GET", "/backups/..%2Fwaymark.sqlite/file", "", 404, "unknown_backup", "backup"),
+    ("DELETE", "/backups/20200101-000000", "", 404, "unknown_backup", "backup"),
     ("GET", "/nothing/here", "", 404, "not_found", "path"),
     ("PUT", "/maps", "{}", 405, "method_not_allowed", "method"),
     // Pages.

@@ -97,6 +97,7 @@ impl From<StoreError> for ApiError {
                     Kind::Track => ("unknown_track", "track"),
                     Kind::ReferenceRun => ("unknown_reference_run", "run"),
                     Kind::Underlay => ("unknown_underlay", "underlay"),
+                    Kind::Backup => ("unknown_backup", "backup"),
                     Kind::Model | Kind::Picture => ("not_found", "path"),
                 };
                 Self::new(StatusCode::NOT_FOUND, code, detail).field(field)

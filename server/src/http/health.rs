@@ -30,11 +30,13 @@ async fn readyz(State(app): State<AppState>) -> Result<Json<Readiness>, ApiError
     crate::store::maps::page(app.store.reads(), "", 1).await?;
     let maps_not_in_use = vitals.all_unpublished();
     let damaged_pictures = crate::store::pictures::damaged(app.store.reads()).await?;
-    let is_degraded = !maps_not_in_use.is_empty() || !damaged_pictures.is_empty();
+    let backup = app.backups.health();
+    let scheduled_failed = backup.every_hours > 0 && backup.failed.is_some();
+    let is_degraded = !maps_not_in_use.is_empty() || !damaged_pictures.is_empty() || scheduled_failed;
     let status = if is_degraded { "degraded" } else { "ready" };
     let panics =
         Edge::ALL.into_iter().map(|edge| (edge.name().to_owned(), vitals.panics().at(edge))).collect();
-    Ok(Json(Readiness { status: status.to_owned(), maps_not_in_use, damaged_pictures, panics }))
+    Ok(Json(Readiness { status: status.to_owned(), maps_not_in_use, damaged_pictures, backup, panics }))
 }
 
 fn not_ready(failure: &Failure) -> ApiError {

@@ -4,6 +4,7 @@
 //! pages. Handlers parse, call the store, the jobs or the engine, and shape the answer; they decide nothing.
 
 mod answers;
+mod backups;
 mod cameras;
 mod error;
 mod examples;
@@ -36,7 +37,9 @@ mod tests;
 
 pub(crate) use router::router;
 
-use crate::{config::Config, gather::Gatherer, jobs::Jobs, publication::Catalogue, ros2::Ros2};
+use crate::{
+    backup::Backups, config::Config, gather::Gatherer, jobs::Jobs, publication::Catalogue, ros2::Ros2,
+};
 use axum::http::StatusCode;
 use engine::{live::LiveHub, motion::MotionTracker, panics::Edge, relocalise::Relocalisers, workers::Engine};
 use error::ApiError;
@@ -59,6 +62,8 @@ pub(crate) struct App {
     pub(crate) searches: Arc<Relocalisers>,
     /// Robots of ROS 2.
     pub(crate) ros2: Arc<Ros2>,
+    /// Backups.
+    pub(crate) backups: Arc<Backups>,
     /// Becomes true when the server stops; ends event streams.
     pub(crate) stopping: watch::Receiver<bool>,
     /// Places for vision work asked for over HTTP: as many as there are vision threads.
@@ -75,6 +80,7 @@ pub(crate) struct Services {
     pub(crate) jobs: Arc<Jobs>,
     pub(crate) gatherer: Arc<Gatherer>,
     pub(crate) ros2: Arc<Ros2>,
+    pub(crate) backups: Arc<Backups>,
 }
 
 /// The state of the router.
@@ -84,7 +90,7 @@ impl App {
     pub(crate) fn new(
         config: Arc<Config>,
         store: Catalogue,
-        Services { jobs, gatherer, ros2 }: Services,
+        Services { jobs, gatherer, ros2, backups }: Services,
         engine: &Engine,
         stopping: watch::Receiver<bool>,
     ) -> Self {
@@ -102,6 +108,7 @@ impl App {
             motion,
             searches,
             ros2,
+            backups,
             stopping,
             vision,
             streams,

@@ -1,9 +1,9 @@
 //! Every route, with the layers around them and the OpenAPI document made from them.
 
 use super::{
-    App, AppState, cameras, error::ApiError, examples::with_examples, gathering, guard, health, landmarks,
-    learning, live, mapping, maps, modalities, pages, recognise, reference_runs, relocalisation, robots,
-    ros2, underlay, views, visibility, visibility_settings, walls,
+    App, AppState, backups, cameras, error::ApiError, examples::with_examples, gathering, guard, health,
+    landmarks, learning, live, mapping, maps, modalities, pages, recognise, reference_runs, relocalisation,
+    robots, ros2, underlay, views, visibility, visibility_settings, walls,
 };
 use crate::config::Limits;
 use axum::{
@@ -50,6 +50,7 @@ fn api(limits: &Limits) -> OpenApiRouter<AppState> {
         .merge(relocalisation::router())
         .merge(ros2::router())
         .merge(cameras::router())
+        .merge(backups::router())
         .merge(live::router())
         .merge(health::router())
 }

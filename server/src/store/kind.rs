@@ -17,6 +17,7 @@ pub(crate) enum Kind {
     Track,
     ReferenceRun,
     Underlay,
+    Backup,
 }
 
 impl fmt::Display for Kind {
@@ -34,6 +35,7 @@ impl fmt::Display for Kind {
             Self::Track => "track",
             Self::ReferenceRun => "reference run",
             Self::Underlay => "underlay of map",
+            Self::Backup => "backup",
         })
     }
 }

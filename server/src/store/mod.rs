@@ -16,6 +16,8 @@ pub(crate) mod maps;
 pub(crate) mod map_locations;
 pub(crate) mod landmarks;
 pub(crate) mod underlays;
+pub(crate) mod copies;
+pub(crate) mod restored;
 pub(crate) mod pictures;
 pub(crate) mod views;
 pub(crate) mod models;
