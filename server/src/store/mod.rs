@@ -152,3 +152,5 @@ fn within(count: i64, max: usize, what: &'static str) -> Result<(), StoreError> 
 
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod upgrades;
