@@ -53,6 +53,7 @@ pub(crate) async fn explained(failure: Failure, maps: Option<&MapClient>, map: O
         "unauthenticated" => {
             failure.advised("Sign in with a token: waymark login, or give it with WAYMARK_TOKEN.")
         }
+        "unknown_backup" => failure.advised("GET /api/v1/backups lists them."),
         "unknown_camera" => failure.advised("waymark camera list ROBOT shows the cameras."),
         "not_recording" => failure.advised("Begin a recording: waymark run start ROBOT"),
         "exists" => failure.advised("Choose another name, or delete the other one first."),

@@ -3,6 +3,7 @@
 
 mod answers;
 pub mod arg_parsers;
+mod backup;
 mod camera;
 mod camera_arg;
 pub mod clock;
@@ -21,6 +22,7 @@ pub mod parameters;
 pub mod pictures;
 mod recognise;
 mod recording;
+mod restore;
 mod robot;
 mod run;
 pub mod scratch;
@@ -72,11 +74,25 @@ enum Command {
     Logout(identity::login::Args),
     /// A link that opens the page once, with your rights, within ten minutes.
     Open(identity::open::Args),
+    /// Write the whole state of a running server to one file
+    ///
+    /// Maps, pictures, models, robots and jobs, as they were at one moment; the server goes on meanwhile. The file is
+    /// verified before it gets its name. For example:
+    ///   waymark backup office.waymark
+    #[command(verbatim_doc_comment)]
+    Backup(backup::Args),
+    /// Put a backup in the place of the data of a stopped server
+    ///
+    /// The backup is verified first: digests, integrity, schema. What was there stays in a folder beside it. For example:
+    ///   waymark restore office.waymark --dry-run
+    ///   waymark restore office.waymark --data waymark-data
+    #[command(verbatim_doc_comment)]
+    Restore(restore::Args),
     /// Maps: create, list, show, locate, delete; walls from laser logs, grids and plans.
     Map(map::Args),
     /// Landmarks: teach, list, show, place, size, rename, delete, accept.
     Landmark(landmark::Args),
-    /// Training views of a landmark: list, show, delete.
+    /// Training views of a landmark: list, show, image, delete.
     View(view::Args),
     /// Robots that may send frames: add, list, show, remove.
     Robot(robot::Args),
@@ -170,6 +186,8 @@ pub fn main() -> ExitCode {
         Command::Login(args) => run(identity::login::login(args)).map(done),
         Command::Logout(args) => identity::login::logout(args).map(done),
         Command::Open(args) => run(identity::open::run(args)).map(done),
+        Command::Backup(args) => run(backup::run(args)).map(done),
+        Command::Restore(args) => run(restore::run(args)).map(done),
         Command::Map(args) => run(map::run(args)).map(done),
         Command::Landmark(args) => run(landmark::run(args)).map(done),
         Command::View(args) => run(view::run(args)).map(done),

@@ -7,7 +7,7 @@ use super::{
 };
 use client::{
     ClientError,
-    api::{Readiness, Version},
+    api::{BackupHealth, Readiness, Version},
 };
 use serde_json::json;
 
@@ -56,10 +56,16 @@ async fn status(session: &Session) -> anyhow::Result<()> {
     let shown = json!({ "version": version, "readiness": readiness, "maps": counts.maps, "landmarks": counts.landmarks,
         "robots": counts.robots, "robots_connected": counts.connected });
     session.show(&shown, &text(&version, &readiness, &counts))?;
-    if readiness.maps_not_in_use.is_empty() {
+    let sentence = if !readiness.maps_not_in_use.is_empty() {
+        "The server is degraded: not every map is in use."
+    } else if !readiness.damaged_pictures.is_empty() {
+        "The server is degraded: stored pictures are damaged."
+    } else if readiness.status == "degraded" {
+        "The server is degraded: the last scheduled backup failed."
+    } else {
         return Ok(());
-    }
-    Err(Failure::new(Class::Failed, "degraded", "The server is degraded: not every map is in use.").into())
+    };
+    Err(Failure::new(Class::Failed, "degraded", sentence).into())
 }
 
 /// What is on a server.
@@ -79,8 +85,16 @@ fn text(version: &Version, readiness: &Readiness, counts: &Counts) -> String {
         format!("  {} with {}", counted(counts.maps, "map"), counted(counts.landmarks, "landmark")),
         format!("  {}, {} connected", counted(counts.robots, "robot"), counts.connected),
     ];
+    let BackupHealth { newest, failed, every_hours, .. } = &readiness.backup;
+    lines.extend(newest.iter().map(|name| format!("  newest backup {name} (UTC)")));
+    if newest.is_none() && *every_hours > 0 {
+        lines.push("  no backup yet".to_owned());
+    }
+    lines.extend(failed.iter().map(|why| format!("  the last backup failed: {why}")));
     let unused = readiness.maps_not_in_use.iter();
     lines.extend(unused.map(|(map, why)| format!("  map {map} is not in use: {why}")));
+    let damaged = readiness.damaged_pictures.iter();
+    lines.extend(damaged.map(|what| format!("  damaged picture: {what}; teach the same photograph again")));
     let panics = readiness.panics.iter().filter(|(_, n)| **n > 0);
     lines.extend(panics.map(|(at, n)| format!("  {n} faults of the program caught in {at}: see its log")));
     lines.join("\n")
@@ -102,6 +116,13 @@ mod tests {
         let readiness = Readiness {
             status: "degraded".into(),
             maps_not_in_use: [("office".to_owned(), "damaged".to_owned())].into(),
+            damaged_pictures: vec!["view 3 of landmark door, map office".into()],
+            backup: BackupHealth {
+                every_hours: 24,
+                newest: Some("20261123-140530".into()),
+                newest_ms: Some(0),
+                failed: Some("no space".into()),
+            },
             panics: [("a frame".to_owned(), 2), ("a write".to_owned(), 0)].into(),
         };
         let counts = Counts { maps: 1, landmarks: 2, robots: 0, connected: 0 };
@@ -111,6 +132,11 @@ mod tests {
             "{lines}"
         );
         assert!(lines.contains("map office is not in use: damaged"), "{lines}");
+        assert!(
+            lines.contains("newest backup 20261123-140530 (UTC)\n  the last backup failed: no space"),
+            "{lines}"
+        );
+        assert!(lines.contains("damaged picture: view 3 of landmark door, map office; "), "{lines}");
         assert!(lines.ends_with("2 faults of the program caught in a frame: see its log"), "{lines}");
     }
 }

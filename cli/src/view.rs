@@ -34,6 +34,16 @@ enum Verb {
         #[arg(long, value_name = "FILE")]
         out: Option<PathBuf>,
     },
+    /// Write the photograph as it was taught, PNG or JPEG.
+    Image {
+        /// The landmark.
+        landmark: String,
+        /// Number of the view.
+        view: i64,
+        /// Where to; left out, LANDMARK-VIEW-photo.png or .jpg here.
+        #[arg(long, value_name = "FILE")]
+        out: Option<PathBuf>,
+    },
     /// Delete training views. The model stays until the landmark is taught again.
     Delete {
         /// The landmark.
@@ -76,6 +86,17 @@ async fn on_map(session: &Session, verb: &Verb) -> anyhow::Result<()> {
             let path = out.clone().unwrap_or_else(|| Path::new(&format!("{landmark}-{view}.png")).to_owned());
             std::fs::write(&path, png).with_context(|| path.display().to_string())?;
             session.show(&serde_json::json!({ "file": path }), &format!("view {view} in {}", path.display()))
+        }
+        Verb::Image { landmark, view, out } => {
+            let picture = maps.view_image(map, landmark, *view).await?;
+            let ending = if picture.starts_with(b"\x89PNG") { "png" } else { "jpg" };
+            let usual = || PathBuf::from(format!("{landmark}-{view}-photo.{ending}"));
+            let path = out.clone().unwrap_or_else(usual);
+            std::fs::write(&path, picture).with_context(|| path.display().to_string())?;
+            session.show(
+                &serde_json::json!({ "file": path }),
+                &format!("photograph of view {view} in {}", path.display()),
+            )
         }
         Verb::Delete { landmark, views, consent } => {
             consent.ask(&format!("Delete {} of {landmark}?", counted(views.len() as u64, "view")))?;

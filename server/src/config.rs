@@ -4,8 +4,11 @@
 //! Precedence, weakest first: defaults, TOML file, `WAYMARK_...` variables (`WAYMARK_LIMITS__FRAME_BYTES=100000`),
 //! command line.
 
+mod backup;
 mod ros2;
 
+pub use backup::BackupSettings;
+pub(crate) use backup::MAX_KEPT;
 pub use ros2::{
     MAX_DOMAIN, MAX_KEY_PREFIX_BYTES, MAX_ROS2_ROBOTS, MAX_TRANSFORM_TOLERANCE_S, Middleware, PoseSource,
     RawRos2, RawRos2Camera, RawRos2Robot, Ros2Outputs, Ros2Robot,
@@ -78,6 +81,8 @@ pub struct RawConfig {
     pub search_every_frame: bool,
     /// Allows plain-text listeners beyond loopback.
     pub insecure: bool,
+    /// Backups.
+    pub backup: BackupSettings,
     /// Robots of ROS 2.
     pub ros2: RawRos2,
     /// Every bound.
@@ -96,6 +101,7 @@ impl Default for RawConfig {
             workers: 0,
             search_every_frame: true,
             insecure: false,
+            backup: BackupSettings::default(),
             ros2: RawRos2::default(),
             limits: Limits::default(),
             algorithm: Params::default(),
@@ -253,6 +259,8 @@ pub struct Config {
     pub workers: usize,
     /// Whether every frame is searched for all landmarks of its map.
     pub search_every_frame: bool,
+    /// Backups.
+    pub backup: BackupSettings,
     /// Robots of ROS 2.
     pub ros2: Vec<Ros2Robot>,
     /// Every bound.
@@ -315,6 +323,7 @@ impl TryFrom<RawConfig> for Config {
             fleet,
             workers: if raw.workers == 0 { cores } else { raw.workers },
             search_every_frame: raw.search_every_frame,
+            backup: backup::checked(raw.backup)?,
             ros2: ros2::checked(raw.ros2)?,
             limits: raw.limits,
             params: Arc::new(raw.algorithm),

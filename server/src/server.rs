@@ -1,6 +1,7 @@
 //! Starts everything in order and stops it in the opposite order: store, jobs, engine, bus, HTTP.
 
 use crate::{
+    backup::Backups,
     bus::{Bus, BusError, Receivers},
     config::Config,
     gather::{self, Gatherer, GatheringTap},
@@ -9,7 +10,7 @@ use crate::{
     jobs::Jobs,
     publication::{Catalogue, CatalogueTasks},
     ros2::Ros2,
-    store::{OpenError, landmarks},
+    store::{OpenError, landmarks, pictures},
 };
 use engine::{
     decode::ImageLimits,
@@ -106,6 +107,8 @@ struct Tasks {
     jobs: JoinHandle<()>,
     findings: JoinHandle<()>,
     gather: JoinHandle<()>,
+    pictures: JoinHandle<()>,
+    backups: JoinHandle<()>,
     writer: CatalogueTasks,
     watch: JoinHandle<()>,
 }
@@ -143,6 +146,7 @@ impl Server {
         engine.motion.mappings().resume_in(config.data.join("mapping"), is_on);
         let pulse = vitals.begin("the task that stores findings");
         let findings = tokio::spawn(store_findings(store.clone(), found, pulse));
+        let pictures = tokio::spawn(pictures::check_all((*store).clone(), stopping.clone()));
         let (live, slots) = (engine.live.clone(), engine.slots.clone());
         let to = receivers(&config, &engine);
         let bus = Bus::open(&config, to.clone()).await?;
@@ -152,11 +156,13 @@ impl Server {
         vitals.probe("the outbox", move || outbox.is_running());
         let workers = Workers::start(&engine, config.workers, &publisher).map_err(StartError::Threads)?;
         let zenoh_endpoint = bus.endpoint().to_owned();
+        let (backups, backups_task) = Backups::start(&config, vitals.panics().clone(), stopping.clone());
         let services = Services {
             jobs,
             gatherer,
             ros2: ros2.clone(),
             sessions: sessions.clone(),
+            backups,
             local_token_file: Some(local_token.path().to_owned()),
         };
         let app = App::new(config.clone(), store, services, &engine, stopping.clone());
@@ -167,7 +173,18 @@ impl Server {
             drop(pulse);
         });
         let watch = tokio::spawn(vitals.clone().watch());
-        let tasks = Tasks { workers, bus, http, jobs: jobs_task, findings, gather, writer, watch };
+        let tasks = Tasks {
+            workers,
+            bus,
+            http,
+            jobs: jobs_task,
+            findings,
+            gather,
+            pictures,
+            backups: backups_task,
+            writer,
+            watch,
+        };
         Ok(RunningServer {
             http_addr,
             zenoh_endpoint,
@@ -271,7 +288,8 @@ impl RunningServer {
         self.vitals.stop();
         self.local_token.remove();
         self.stop.send_replace(true);
-        let Tasks { workers, bus, http, jobs, findings, gather, writer, watch } = self.tasks;
+        let Tasks { workers, bus, http, jobs, findings, gather, pictures, backups, writer, watch } =
+            self.tasks;
         watch.abort();
         // Workers first: what they have in work is still answered over the open bus.
         let workers = tokio::task::spawn_blocking(move || workers.stop());
@@ -280,7 +298,15 @@ impl RunningServer {
         }
         self.ros2.close().await;
         bus.close().await;
-        for (what, task) in [("HTTP", http), ("jobs", jobs), ("findings", findings), ("gathering", gather)] {
+        let others = [
+            ("HTTP", http),
+            ("jobs", jobs),
+            ("findings", findings),
+            ("gathering", gather),
+            ("the check of the pictures", pictures),
+            ("the timetable of backups", backups),
+        ];
+        for (what, task) in others {
             if let Err(error) = task.await {
                 tracing::error!(%error, what, "task_panicked");
             }

@@ -218,6 +218,12 @@ async fn a_landmark_is_taught_changed_and_deleted() {
     let icon = desk.path("icon.png");
     desk.done(&format!("view show first 1 --out {icon}"));
     assert!(image::open(&icon).is_ok());
+    let photograph = desk.path("photograph");
+    desk.done(&format!("view image first 1 --out {photograph}"));
+    assert_eq!(
+        std::fs::read(photograph).expect("the photograph"),
+        std::fs::read(&first).expect("the original")
+    );
     let seen = desk.done(&format!("recognise {first}"));
     assert!(seen.starts_with(&first), "{seen}");
     desk.failed("landmark delete first second", 2, "not_confirmed");

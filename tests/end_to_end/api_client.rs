@@ -160,6 +160,7 @@ async fn landmarks_are_placed_patched_taught_and_learnt() {
     assert_eq!((second.outcome, placing.reason.as_deref()), (Some(UploadOutcomeBody::New), Some("by_hand")));
     let views = maps.views("hall", "poster").await.expect("views");
     assert_eq!(views.iter().map(|v| v.id).collect::<Vec<_>>(), [first.id, second.id]);
+    assert_eq!(maps.view_image("hall", "poster", first.id).await.expect("picture"), picture(1));
     let icon = maps.view_icon("hall", "poster", first.id).await.expect("icon");
     assert!(icon.starts_with(b"\x89PNG"));
     maps.delete_view("hall", "poster", second.id).await.expect("deleted");

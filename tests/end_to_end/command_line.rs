@@ -14,7 +14,7 @@ const SERVER: &[&str] = &["--server", "--token", "--json"];
 const MAP: &[&str] = &["--map", "--server", "--token", "--json"];
 
 /// Options that each command must name in its help, beside those of its group.
-const OPTIONS: [(&str, &[&str], &[&str]); 53] = [
+const OPTIONS: [(&str, &[&str], &[&str]); 56] = [
     ("", &[], &["--log", "--version", "Exit status"]),
     ("demo", &[], &["--robots", "--rate-hz", "--legs", "--seed", "--http", "--data", "--stay", "--json"]),
     ("serve", &[], &["--config", "--data", "--http", "--zenoh", "--fleet", "--workers", "--insecure"]),
@@ -66,6 +66,8 @@ const OPTIONS: [(&str, &[&str], &[&str]); 53] = [
     ("login", SERVER, &[]),
     ("logout", SERVER, &[]),
     ("open", SERVER, &[]),
+    ("backup", SERVER, &["[FILE]"]),
+    ("restore", &[], &["<FILE>", "--data", "--dry-run", "--yes", "--json"]),
     ("map create", SERVER, &["--distance", "--site", "--building", "--floor", "<MAP>"]),
     ("map list", SERVER, &[]),
     ("map show", SERVER, &["<MAP>"]),
@@ -138,6 +140,7 @@ const OPTIONS: [(&str, &[&str], &[&str]); 53] = [
     ("landmark accept", MAP, &["<GATHERING>", "<NUMBER[=NAME]>"]),
     ("view list", MAP, &["<LANDMARK>"]),
     ("view show", MAP, &["<LANDMARK>", "<VIEW>", "--out"]),
+    ("view image", MAP, &["<LANDMARK>", "<VIEW>", "--out"]),
     ("view delete", MAP, &["<LANDMARK>", "<VIEWS>", "--yes"]),
     ("robot add", SERVER, &["<ROBOT>", "--map"]),
     ("robot list", SERVER, &[]),

@@ -74,6 +74,11 @@ fn the_commands_of_ros2_work() {
 }
 
 #[test]
+fn the_commands_of_back_up_and_restore_work() {
+    run("backup");
+}
+
+#[test]
 fn the_commands_of_deploy_work() {
     run("deploy");
 }

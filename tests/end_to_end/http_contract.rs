@@ -120,6 +120,7 @@ const ROWS: &[Row<'_>] = &[
     ("GET", "/maps/nowhere/landmarks/p1", "", 404, "unknown_map", "map"),
     ("GET", "/maps/hall/landmarks/nothing", "", 404, "unknown_landmark", "landmark"),
     ("GET", "/maps/hall/landmarks/p1/views/7/icon", "", 404, "unknown_view", "view"),
+    ("GET", "/maps/hall/landmarks/p1/views/7/image", "", 404, "unknown_view", "view"),
     ("DELETE", "/maps/hall/landmarks/p1/views/7", "", 404, "unknown_view", "view"),
     ("GET", "/robots/nobody", "", 404, "unknown_robot", "robot"),
     ("GET", "/robots/r1/cameras/front/frame", "", 404, "unknown_camera", "camera"),
@@ -127,6 +128,9 @@ const ROWS: &[Row<'_>] = &[
     ("GET", "/jobs/ninety", "", 404, "not_found", "path"),
     ("PUT", "/robots/r2", r#"{"map": "nowhere"}"#, 404, "unknown_map", "map"),
     ("PUT", "/robots/R2", r#"{"map": "hall"}"#, 422, "bad_name", "robot"),
+    ("GET", "/backups/20200101-000000", "", 404, "unknown_backup", "backup"),
+    ("GET", "/backups/..%2Fwaymark.sqlite/file", "", 404, "unknown_backup", "backup"),
+    ("DELETE", "/backups/20200101-000000", "", 404, "unknown_backup", "backup"),
     ("GET", "/nothing/here", "", 404, "not_found", "path"),
     ("PUT", "/maps", "{}", 405, "method_not_allowed", "method"),
     // Pages.

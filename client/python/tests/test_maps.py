@@ -126,6 +126,21 @@ def test_the_server_says_how_it_is(server: Server) -> None:
         assert (version.name, version.api, version.protocol) == ("waymark", "v1", "1")
 
 
+def test_backups_are_made_saved_and_deleted(server: Server, tmp_path: Path) -> None:
+    with server.maps() as maps:
+        made = maps.make_backup()
+        until = time.monotonic() + SOON_S
+        while made.state == "running" and time.monotonic() < until:
+            time.sleep(0.1)
+            made = maps.backup(made.name)
+        assert made.state == "complete" and made.manifest is not None and made in maps.backups()
+        assert maps.backup_file(made.name, tmp_path / "all.waymark") == made.bytes
+        assert (tmp_path / "all.waymark").read_bytes().startswith(b"SQLite format 3")
+        health = maps.readiness().backup
+        assert health is not None and health.newest == made.name
+        maps.delete_backup(made.name)
+
+
 def test_maps_are_stored_with_all_their_fields(server: Server) -> None:
     with server.maps() as maps:
         hall(maps, "ground")
@@ -187,6 +202,7 @@ def test_landmarks_are_placed_taught_and_learnt(server: Server) -> None:
         views = maps.views("lessons", "poster")
         assert {first.id, third.id} <= {view.id for view in views}
         assert maps.view_icon("lessons", "poster", first.id).startswith(b"\x89PNG")
+        assert maps.view_image("lessons", "poster", third.id) == whole
         maps.delete_view("lessons", "poster", third.id)
 
         states: list[str] = []

@@ -30,7 +30,7 @@ WORDS = [
     (r"__aenter__", "__enter__"),
     (r"__aexit__", "__exit__"),
     (r"__aiter__", "__iter__"),
-    (r"aiter_lines", "iter_lines"),
+    (r"aiter_(?=lines|bytes)", "iter_"),
     (r"aclose", "close"),
     (r"aread", "read"),
     (r"asyncio\.sleep", "time.sleep"),

@@ -1,6 +1,7 @@
 //! The teacher's and the administrator's side, over HTTP: one method for each operation of the API, a file for each
 //! resource. In and out: the types of [`protos::api`].
 
+mod backups;
 mod cameras;
 mod events;
 mod gathering;
@@ -24,6 +25,7 @@ mod visibility;
 mod visibility_settings;
 mod walls;
 
+pub use backups::BackupFile;
 pub use cameras::CameraFrame;
 pub use learning::JobEvents;
 pub use live::LiveEvents;
@@ -34,6 +36,7 @@ pub use views::{LandmarkRegion, NewView};
 /// Every operation that [`MapClient`] has a method for.
 pub fn operations() -> impl Iterator<Item = &'static Operation> {
     let all = [
+        backups::OPERATIONS,
         cameras::OPERATIONS,
         gathering::OPERATIONS,
         health::OPERATIONS,

@@ -11,6 +11,7 @@ operations! {
     LIST: GET "/maps/{map}/landmarks/{landmark}/views" => views,
     DELETE: DELETE "/maps/{map}/landmarks/{landmark}/views/{view}" => delete_view,
     ICON: GET "/maps/{map}/landmarks/{landmark}/views/{view}/icon" => view_icon,
+    IMAGE: GET "/maps/{map}/landmarks/{landmark}/views/{view}/image" => view_image,
 }
 
 /// The part of an uploaded image that shows the landmark.
@@ -102,6 +103,11 @@ impl MapClient {
     /// Deletes a view. The model stays until the landmark is learnt again.
     pub async fn delete_view(&self, map: &str, landmark: &str, view: i64) -> Result<(), ClientError> {
         self.done(self.ask(&DELETE, &[&map, &landmark, &view])?).await
+    }
+
+    /// The photograph of a view as it was uploaded, PNG or JPEG.
+    pub async fn view_image(&self, map: &str, landmark: &str, view: i64) -> Result<Vec<u8>, ClientError> {
+        self.bytes(self.ask(&IMAGE, &[&map, &landmark, &view])?).await
     }
 
     /// The icon of a view, PNG.

@@ -1,5 +1,6 @@
 //! `/healthz`, `/readyz`, `/version`.
 
+use super::backups::BackupHealth;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -15,11 +16,19 @@ pub struct Health {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct Readiness {
-    /// `ready`, or `degraded`: everything runs, but maps are named in `maps_not_in_use`.
+    /// `ready`, or `degraded`: everything runs, but something is named in `maps_not_in_use` or
+    /// `damaged_pictures`, or the last scheduled backup failed.
     pub status: String,
     /// Maps whose stored version cannot be made ready, with the reason: an earlier version is used, or none since the
     /// server started. A later change of the map tries again.
     pub maps_not_in_use: BTreeMap<String, String>,
+    /// Views, tracks and underlays whose stored picture is damaged, at most 100. The picture is not used; the same
+    /// photograph, uploaded again, mends it.
+    #[serde(default)]
+    pub damaged_pictures: Vec<String>,
+    /// The newest backup, and why the last attempt failed.
+    #[serde(default)]
+    pub backup: BackupHealth,
     /// Panics caught since the start, by where: what they met was refused or dropped, everything else went on. Each is in
     /// the log. Anything but 0 is a fault of the program.
     pub panics: BTreeMap<String, u64>,

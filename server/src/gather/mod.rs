@@ -27,7 +27,6 @@ use engine::{panics::Edge, picture};
 use frame_tap::{ActiveGatherings, lock};
 use map::tracks::{GatherParams, StoredTrack, TrackOutcome, ViewTracker};
 use protos::convert::Encoding;
-use sha2::{Digest, Sha256};
 use std::{collections::BTreeMap, sync::Arc};
 use tokio::sync::mpsc::Receiver;
 use vision::{
@@ -288,7 +287,7 @@ fn new_view(
         }
     };
     Some(NewView {
-        image_sha256: Sha256::digest(&image).into(),
+        image_sha256: crate::store::pictures::digest(&image),
         image,
         image_kind,
         size_px: [grey.width(), grey.height()],

@@ -1,7 +1,12 @@
-//! Parts of answers: pages of lists, covariances.
+//! Parts of answers: pages of lists, covariances, stored pictures.
 
 use super::error::ApiError;
 use crate::store::StoreError;
+use crate::store::pictures::{self, Digest};
+use axum::{
+    http::header,
+    response::{IntoResponse, Response},
+};
 use nalgebra::Matrix3;
 use protos::api::Page;
 
@@ -41,4 +46,19 @@ pub(super) fn page<R, T>(
     rows.truncate(limit);
     let next = if more { rows.last().map(key) } else { None };
     Page { items: rows.into_iter().map(item).collect(), next }
+}
+
+/// A stored picture as it was uploaded; its digest is its `ETag`.
+pub(super) fn picture_answer(
+    kind: &str,
+    sha256: &Digest,
+    cache_control: &'static str,
+    image: Vec<u8>,
+) -> Response {
+    let headers = [
+        (header::CONTENT_TYPE, format!("image/{kind}")),
+        (header::ETAG, format!("\"{}\"", pictures::hex(sha256))),
+        (header::CACHE_CONTROL, cache_control.to_owned()),
+    ];
+    (headers, image).into_response()
 }

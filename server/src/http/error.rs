@@ -98,7 +98,8 @@ impl From<StoreError> for ApiError {
                     Kind::ReferenceRun => ("unknown_reference_run", "run"),
                     Kind::Underlay => ("unknown_underlay", "underlay"),
                     Kind::Token => ("unknown_token", "token"),
-                    Kind::Model => ("not_found", "path"),
+                    Kind::Backup => ("unknown_backup", "backup"),
+                    Kind::Model | Kind::Picture => ("not_found", "path"),
                 };
                 Self::new(StatusCode::NOT_FOUND, code, detail).field(field)
             }
@@ -128,6 +129,10 @@ impl From<StoreError> for ApiError {
             }
             StoreError::Changed | StoreError::Busy => {
                 Self::new(StatusCode::SERVICE_UNAVAILABLE, "busy", StoreError::Busy.to_string())
+            }
+            StoreError::PictureDamaged { .. } => {
+                tracing::error!(%detail, "picture_not_answered");
+                Self::new(StatusCode::INTERNAL_SERVER_ERROR, "picture_damaged", detail)
             }
             StoreError::Damaged { .. } | StoreError::Database { .. } | StoreError::Panicked => {
                 Self::internal(&error)

@@ -29,10 +29,14 @@ async fn readyz(State(app): State<AppState>) -> Result<Json<Readiness>, ApiError
     }
     crate::store::maps::page(app.store.reads(), "", 1).await?;
     let maps_not_in_use = vitals.all_unpublished();
-    let status = if maps_not_in_use.is_empty() { "ready" } else { "degraded" };
+    let damaged_pictures = crate::store::pictures::damaged(app.store.reads()).await?;
+    let backup = app.backups.health();
+    let scheduled_failed = backup.every_hours > 0 && backup.failed.is_some();
+    let is_degraded = !maps_not_in_use.is_empty() || !damaged_pictures.is_empty() || scheduled_failed;
+    let status = if is_degraded { "degraded" } else { "ready" };
     let panics =
         Edge::ALL.into_iter().map(|edge| (edge.name().to_owned(), vitals.panics().at(edge))).collect();
-    Ok(Json(Readiness { status: status.to_owned(), maps_not_in_use, panics }))
+    Ok(Json(Readiness { status: status.to_owned(), maps_not_in_use, damaged_pictures, backup, panics }))
 }
 
 fn not_ready(failure: &Failure) -> ApiError {

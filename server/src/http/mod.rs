@@ -5,6 +5,7 @@
 
 mod answers;
 mod authorise;
+mod backups;
 mod cameras;
 mod cookie;
 mod error;
@@ -42,6 +43,7 @@ mod tests;
 pub(crate) use router::router;
 
 use crate::{
+    backup::Backups,
     config::Config,
     gather::Gatherer,
     identity::{Principal, Sessions},
@@ -81,6 +83,8 @@ pub(crate) struct App {
     pub(crate) sessions: Arc<Sessions>,
     /// Where the local token is, absolute.
     pub(crate) local_token_file: Option<PathBuf>,
+    /// Backups.
+    pub(crate) backups: Arc<Backups>,
     /// Becomes true when the server stops; ends event streams.
     pub(crate) stopping: watch::Receiver<bool>,
     /// Places for vision work asked for over HTTP: as many as there are vision threads.
@@ -99,6 +103,7 @@ pub(crate) struct Services {
     pub(crate) ros2: Arc<Ros2>,
     pub(crate) sessions: Arc<Sessions>,
     pub(crate) local_token_file: Option<PathBuf>,
+    pub(crate) backups: Arc<Backups>,
 }
 
 /// The state of the router.
@@ -108,7 +113,7 @@ impl App {
     pub(crate) fn new(
         config: Arc<Config>,
         store: Catalogue,
-        Services { jobs, gatherer, ros2, sessions, local_token_file }: Services,
+        Services { jobs, gatherer, ros2, sessions, local_token_file, backups }: Services,
         engine: &Engine,
         stopping: watch::Receiver<bool>,
     ) -> Self {
@@ -128,6 +133,7 @@ impl App {
             ros2,
             sessions,
             local_token_file,
+            backups,
             stopping,
             vision,
             streams,

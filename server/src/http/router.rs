@@ -1,7 +1,7 @@
 //! Every route, with the layers around them and the OpenAPI document made from them.
 
 use super::{
-    API, App, AppState, authorise, cameras,
+    API, App, AppState, authorise, backups, cameras,
     error::{ApiError, method_not_allowed, not_found},
     examples::with_examples,
     gathering, guard, health, landmarks, learning, live, mapping, maps, modalities, page_session, pages,
@@ -51,6 +51,7 @@ fn api(limits: &Limits) -> OpenApiRouter<AppState> {
         .merge(relocalisation::router())
         .merge(ros2::router())
         .merge(cameras::router())
+        .merge(backups::router())
         .merge(live::router())
         .merge(tokens::router())
         .merge(page_session::api())

@@ -54,6 +54,8 @@ impl Service {
         let (jobs, _) = Jobs::start(store.clone(), config.clone(), stopping.clone()).await.unwrap();
         let (tap, frames) = crate::gather::gathering_tap();
         let (gatherer, _) = Gatherer::start(store.clone(), &config, &tap, frames).await.unwrap();
+        let (backups, _) =
+            crate::backup::Backups::start(&config, store.vitals().panics().clone(), stopping.clone());
         let hall = Arc::new(MapSnapshot::empty("hall", 1));
         let engine =
             Engine { vitals: store.vitals().clone(), frame_tap: Arc::new(tap), ..scene::engine(&[hall]) };
@@ -66,6 +68,7 @@ impl Service {
                 ros2: Arc::default(),
                 sessions: Arc::default(),
                 local_token_file: Some("/data/local-token".into()),
+                backups,
             },
             &engine,
             stopping,

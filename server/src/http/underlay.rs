@@ -2,20 +2,21 @@
 
 use super::{
     App, AppState,
+    answers::picture_answer,
     error::{ApiError, out_of_range},
     extract::{self, PathParams},
     upload::{FORM_OVERHEAD, Form},
 };
 use crate::store::{
-    maps,
+    maps, pictures,
     underlays::{self, UnderlayRow},
 };
 use axum::{
     Json,
     body::Bytes,
     extract::{DefaultBodyLimit, Request, State},
-    http::{StatusCode, header},
-    response::{IntoResponse, Response},
+    http::StatusCode,
+    response::Response,
 };
 use engine::picture;
 use map::check::{MAX_COORDINATE_M, OutOfRange};
@@ -76,6 +77,7 @@ async fn put(
     let theta_rad = coordinate("theta_rad", TAU)?;
     let (image, size_px) = app.clone().on_vision_thread(move |app: &App| decoded(app, bytes)).await??;
     let row = UnderlayRow {
+        image_sha256: pictures::digest(&image),
         image_kind: picture::kind(&image).unwrap_or_default().to_owned(),
         size_px,
         metres_per_pixel: scale.unwrap_or_default(),
@@ -124,8 +126,6 @@ async fn image(
 ) -> Result<Response, ApiError> {
     let map = maps::get(app.store.reads(), &map).await?;
     let row = underlays::get(app.store.reads(), (map.id, &map.name)).await?;
-    let image = underlays::image(app.store.reads(), (map.id, &map.name)).await?;
-    let kind = format!("image/{}", row.image_kind);
-    Ok(([(header::CONTENT_TYPE, kind), (header::CACHE_CONTROL, "no-cache".to_owned())], image)
-        .into_response())
+    let image = pictures::read(&app.store, &row.image_sha256).await?;
+    Ok(picture_answer(&row.image_kind, &row.image_sha256, "no-cache", image))
 }

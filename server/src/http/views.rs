@@ -2,7 +2,7 @@
 
 use super::{
     App, AppState,
-    answers::page,
+    answers::{page, picture_answer},
     error::ApiError,
     extract::{self, PathParams, QueryParams, after_number, page_limit},
     landmarks::checked_size,
@@ -12,7 +12,7 @@ use crate::store::{
     StoreError,
     kind::Kind,
     landmark_placement::{PlacementReport, StoredCapture},
-    landmarks, maps,
+    landmarks, maps, pictures,
     teaching::{self, Teaching},
     views::{self, NewView, QuadCrop, UploadOutcome, ViewRow},
 };
@@ -32,7 +32,6 @@ use protos::api::{
     UploadOutcomeBody,
 };
 use serde_json::json;
-use sha2::{Digest, Sha256};
 use utoipa_axum::{router::OpenApiRouter, routes};
 use vision::{
     frame::GrayImage,
@@ -50,6 +49,7 @@ pub(super) fn router(upload_bytes: usize) -> OpenApiRouter<AppState> {
         .routes(routes!(list))
         .routes(routes!(delete))
         .routes(routes!(show_icon))
+        .routes(routes!(show_image))
 }
 
 fn view_shown(row: ViewRow) -> TrainingView {
@@ -210,7 +210,7 @@ fn prepare(
         |corners: &Corners| Some(QuadCrop { corners_px: *corners, icon: icon_of(&image, corners, p).ok()? });
     let view = NewView {
         image: bytes.to_vec(),
-        image_sha256: Sha256::digest(bytes).into(),
+        image_sha256: pictures::digest(bytes),
         image_kind: picture::kind(bytes).unwrap_or_default(),
         size_px: [image.width(), image.height()],
         crop: QuadCrop { corners_px, icon },
@@ -301,4 +301,19 @@ async fn show_icon(
     let headers =
         [(header::CONTENT_TYPE, "image/png"), (header::CACHE_CONTROL, "private, max-age=86400, immutable")];
     Ok((headers, png).into_response())
+}
+
+/// The photograph as it was uploaded, PNG or JPEG. `ETag` is its SHA-256.
+#[utoipa::path(get, path = "/maps/{map}/landmarks/{landmark}/views/{view}/image", tag = "landmarks",
+    params(("map" = String, Path), ("landmark" = String, Path), ("view" = i64, Path)),
+    responses((status = 200, content_type = "image/jpeg"), (status = 404, body = Problem),
+    (status = 500, body = Problem, description = "picture_damaged")))]
+async fn show_image(
+    State(app): State<AppState>,
+    PathParams((map, landmark, view)): PathParams<(String, String, i64)>,
+) -> Result<Response, ApiError> {
+    let (sha256, kind) = views::picture(app.store.reads(), &map, &landmark, view).await?;
+    let image = pictures::read(&app.store, &sha256).await?;
+    // A view never changes; its number never comes to mean another.
+    Ok(picture_answer(&kind, &sha256, "private, max-age=86400, immutable", image))
 }

@@ -24,7 +24,8 @@ use crate::{
         kind::Kind,
         maps::{self, MapRow},
         models,
-        views::{self, Digest, QuadCrop, TrainingViewRow},
+        pictures::Digest,
+        views::{self, QuadCrop, TrainingViewRow},
     },
 };
 use engine::{panics::Edge, snapshot::MapSnapshot};

@@ -1,7 +1,10 @@
 //! Negatives of a lesson: icons of every other landmark, evenly chosen, and distractors of the pictures. They are collected
 //! once for the whole lesson, ordered by landmark, so that the icons of one landmark are one range.
 
-use crate::store::views::{Digest, QuadCrop, TrainingViewRow};
+use crate::store::{
+    pictures::Digest,
+    views::{QuadCrop, TrainingViewRow},
+};
 use std::{collections::BTreeSet, ops::Range};
 use vision::{
     geometry::{Corners, polygon::intersection_area},

@@ -4,7 +4,7 @@ use super::negatives::spread;
 use crate::{
     config::Config,
     publication::Catalogue,
-    store::views::{self as stored_views, TrainingViewRow},
+    store::{pictures as stored, views::TrainingViewRow},
 };
 use engine::{decode::ImageLimits, picture};
 use vision::{
@@ -27,7 +27,7 @@ impl Pictures {
 
     /// The picture of a view; `None`, with a log entry, if it cannot be read.
     pub(super) fn of(&self, view: &TrainingViewRow) -> Option<GrayImage> {
-        let image = self.runtime.block_on(stored_views::image(self.store.reads(), view.view));
+        let image = self.runtime.block_on(stored::read(&self.store, &view.image_sha256));
         let decoded = image
             .map_err(|e| e.to_string())
             .and_then(|bytes| picture::decode(&bytes, self.upload).map_err(|e| e.to_string()));

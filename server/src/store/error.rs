@@ -75,6 +75,14 @@ pub(crate) enum StoreError {
         /// What is wrong.
         reason: String,
     },
+    /// The bytes of a stored picture are not those that were stored.
+    #[error("picture {picture} is damaged: {reason}; upload the same photograph again, or delete the view")]
+    PictureDamaged {
+        /// Its digest, hexadecimal.
+        picture: String,
+        /// What is wrong.
+        reason: String,
+    },
     /// Any other error of the database, with the operation that met it.
     #[error("{operation} failed")]
     Database {
@@ -98,6 +106,11 @@ const SQLITE_NOTADB: i32 = 26;
 fn primary_code(error: &sqlx::Error) -> Option<i32> {
     let code = error.as_database_error()?.code()?.parse::<i32>().ok()?;
     Some(code & 0xff)
+}
+
+/// Whether the content of the file is wrong at the place that was read. Reading it again gives the same.
+pub(super) fn is_damage(error: &sqlx::Error) -> bool {
+    matches!(primary_code(error), Some(SQLITE_CORRUPT | SQLITE_NOTADB))
 }
 
 impl StoreError {

@@ -4,7 +4,7 @@
 use super::{
     StoreError, Tx,
     kind::Kind,
-    landmarks, maps, now_ms, robots,
+    landmarks, maps, now_ms, pictures, robots,
     statements::statements,
     views::{self, NewView, QuadCrop},
     within,
@@ -41,11 +41,12 @@ statements! {
     TRACKS = "SELECT t.number, t.landmark_id, l.name AS landmark, t.state, t.sightings, t.known, \
               (SELECT count(*) FROM track_views v WHERE v.gathering_id = t.gathering_id AND v.track = t.number) AS views \
               FROM tracks t LEFT JOIN landmarks l ON l.id = t.landmark_id WHERE t.gathering_id = ?1 ORDER BY t.number";
-    INSERT_VIEW = "INSERT INTO track_views (gathering_id, track, image_sha256, image_kind, image, width_px, height_px, \
+    INSERT_VIEW = "INSERT INTO track_views (gathering_id, track, image_sha256, image_kind, width_px, height_px, \
                    corners_px, icon_side, icon, icon_scale, created_ms, capture) \
-                   VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13) ON CONFLICT DO NOTHING";
+                   VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12) ON CONFLICT DO NOTHING";
     COUNT_VIEWS = "SELECT count(*) FROM track_views WHERE gathering_id = ?1 AND track = ?2";
-    BYTES = "SELECT coalesce(sum(length(image)), 0) FROM track_views WHERE gathering_id = ?1";
+    BYTES = "SELECT coalesce(sum(length(bytes)), 0) FROM pictures WHERE sha256 IN \
+             (SELECT image_sha256 FROM track_views WHERE gathering_id = ?1)";
     VIEWS = "SELECT id, image_sha256, width_px, height_px, corners_px, icon_side, icon, icon_scale, capture FROM track_views \
              WHERE gathering_id = ?1 AND track = ?2 ORDER BY id";
     DISCARD = "UPDATE tracks SET state = 'discarded' WHERE gathering_id = ?1 AND number = ?2 AND state = 'open'";
@@ -132,7 +133,7 @@ pub(crate) struct TrackRow {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct TrackView {
     pub(crate) id: i64,
-    pub(crate) image_sha256: views::Digest,
+    pub(crate) image_sha256: pictures::Digest,
     pub(crate) size_px: [usize; 2],
     pub(crate) crop: QuadCrop,
     /// JSON of a `landmark_placement::StoredCapture`.
@@ -262,12 +263,12 @@ pub(crate) async fn add_view(
     }
     let tracks = sqlx::query_scalar(COUNT_TRACKS).bind(id).fetch_one(&mut tx.conn).await.map_err(at())?;
     within(tracks, limits.tracks, "tracks of a gathering")?;
+    pictures::put(tx, &new.image_sha256, &new.image).await?;
     sqlx::query(INSERT_VIEW)
         .bind(id)
         .bind(track.number)
         .bind(&new.image_sha256[..])
         .bind(new.image_kind)
-        .bind(&new.image)
         .bind(new.size_px[0] as i64)
         .bind(new.size_px[1] as i64)
         .bind(views::corners_bytes(&new.crop.corners_px))

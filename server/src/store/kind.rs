@@ -9,6 +9,7 @@ pub(crate) enum Kind {
     Landmark,
     Model,
     View,
+    Picture,
     Robot,
     Camera,
     Job,
@@ -17,6 +18,7 @@ pub(crate) enum Kind {
     ReferenceRun,
     Underlay,
     Token,
+    Backup,
 }
 
 impl fmt::Display for Kind {
@@ -26,6 +28,7 @@ impl fmt::Display for Kind {
             Self::Landmark => "landmark",
             Self::Model => "model of landmark",
             Self::View => "view",
+            Self::Picture => "picture",
             Self::Robot => "robot",
             Self::Camera => "camera",
             Self::Job => "job",
@@ -34,6 +37,7 @@ impl fmt::Display for Kind {
             Self::ReferenceRun => "reference run",
             Self::Underlay => "underlay of map",
             Self::Token => "token",
+            Self::Backup => "backup",
         })
     }
 }

@@ -27,6 +27,7 @@ const FILES: &[(&str, &str)] = files![
     "0013_health",
     "0014_looks_like",
     "0015_underlay",
+    "0016_pictures",
     "0017_tokens",
 ];
 

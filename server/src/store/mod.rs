@@ -7,7 +7,7 @@
 mod error;
 pub(crate) mod kind;
 pub(crate) mod migrations;
-mod open;
+pub(crate) mod open;
 mod writer;
 mod statements;
 pub(crate) mod map_rows;
@@ -16,6 +16,9 @@ pub(crate) mod maps;
 pub(crate) mod map_locations;
 pub(crate) mod landmarks;
 pub(crate) mod underlays;
+pub(crate) mod copies;
+pub(crate) mod restored;
+pub(crate) mod pictures;
 pub(crate) mod views;
 pub(crate) mod models;
 pub(crate) mod walls;
@@ -150,3 +153,5 @@ fn within(count: i64, max: usize, what: &'static str) -> Result<(), StoreError> 
 
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod upgrades;

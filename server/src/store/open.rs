@@ -11,7 +11,7 @@ use std::{
     time::Duration,
 };
 
-use super::{StoreError, migrations};
+use super::{StoreError, migrations, pictures, restored};
 
 /// First version without the write-ahead-log corruption of 3.7.0 to 3.51.2 (sqlite.org/wal.html#walresetbug).
 pub(crate) const SQLITE_MIN: (u32, u32, u32) = (3, 51, 3);
@@ -87,21 +87,16 @@ pub(super) struct Opened {
 
 pub(super) async fn open(data: &Path) -> Result<Opened, OpenError> {
     let lock = lock(data)?;
-    let options = SqliteConnectOptions::new()
-        .filename(data.join(FILE))
-        .journal_mode(SqliteJournalMode::Wal)
-        .synchronous(SqliteSynchronous::Full)
-        .foreign_keys(true)
-        .busy_timeout(BUSY_TIMEOUT)
-        .pragma("mmap_size", "0")
-        .pragma("trusted_schema", "OFF")
-        .pragma("cell_size_check", "ON")
-        .disable_statement_logging();
+    restored::put_in_place(data, FILE)
+        .map_err(|source| OpenError::Directory { path: data.to_owned(), source })?;
+    let options =
+        options(&data.join(FILE)).journal_mode(SqliteJournalMode::Wal).synchronous(SqliteSynchronous::Full);
     let mut writer = options.clone().create_if_missing(true).connect().await.map_err(OpenError::Open)?;
     check_version(&mut writer).await?;
     check_pragmas(&mut writer).await?;
     check_integrity(&mut writer).await?;
     migrations::migrator().run(&mut writer).await.map_err(OpenError::Migrate)?;
+    pictures::move_underlays(&mut writer).await.map_err(OpenError::Open)?;
     let reads = SqlitePoolOptions::new()
         .max_connections(READERS)
         .acquire_timeout(BUSY_TIMEOUT)
@@ -112,7 +107,25 @@ pub(super) async fn open(data: &Path) -> Result<Opened, OpenError> {
     Ok(Opened { writer, reads, lock })
 }
 
-fn lock(data: &Path) -> Result<File, OpenError> {
+/// What every connection has.
+fn options(file: &Path) -> SqliteConnectOptions {
+    SqliteConnectOptions::new()
+        .filename(file)
+        .foreign_keys(true)
+        .busy_timeout(BUSY_TIMEOUT)
+        .pragma("mmap_size", "0")
+        .pragma("trusted_schema", "OFF")
+        .pragma("cell_size_check", "ON")
+        .disable_statement_logging()
+}
+
+/// A connection that only reads.
+pub(super) fn read_options(file: &Path) -> SqliteConnectOptions {
+    options(file).read_only(true)
+}
+
+/// Takes the data directory, which is made if it is not there: nobody else uses it while the file is held.
+pub(crate) fn lock(data: &Path) -> Result<File, OpenError> {
     let at = |source| OpenError::Directory { path: data.to_owned(), source };
     std::fs::create_dir_all(data).map_err(at)?;
     let file = File::options().create(true).truncate(false).write(true).open(data.join(LOCK)).map_err(at)?;
@@ -147,12 +160,23 @@ async fn check_pragmas(conn: &mut SqliteConnection) -> Result<(), OpenError> {
     Ok(())
 }
 
+/// Checks every table but the pictures, which are most of a large file. Each picture has a digest, which is compared whenever
+/// it is read, and once by `pictures::check_all` after the start.
 async fn check_integrity(conn: &mut SqliteConnection) -> Result<(), OpenError> {
-    let said: String = sqlx::query_scalar("SELECT quick_check FROM pragma_quick_check")
-        .fetch_one(conn)
-        .await
-        .map_err(OpenError::Open)?;
-    if said == "ok" { Ok(()) } else { Err(OpenError::Damaged(said)) }
+    let tables = "SELECT name FROM sqlite_schema WHERE type = 'table' AND name <> 'pictures'";
+    let tables: Vec<String> =
+        sqlx::query_scalar(tables).fetch_all(&mut *conn).await.map_err(OpenError::Open)?;
+    for table in std::iter::once("sqlite_schema").chain(tables.iter().map(String::as_str)) {
+        let said: String = sqlx::query_scalar("SELECT quick_check FROM pragma_quick_check(?1)")
+            .bind(table)
+            .fetch_one(&mut *conn)
+            .await
+            .map_err(OpenError::Open)?;
+        if said != "ok" {
+            return Err(OpenError::Damaged(format!("table {table}: {said}")));
+        }
+    }
+    Ok(())
 }
 
 #[cfg(test)]

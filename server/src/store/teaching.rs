@@ -7,7 +7,7 @@ use super::{
     kind::Kind,
     landmark_placement::{self, PlacementOutcome, PlacementReport},
     landmarks::{self, LandmarkGeometry},
-    maps,
+    maps, pictures,
     statements::statements,
     views::{self, NewView, QuadCrop, UploadOutcome, ViewRow},
     walls,
@@ -259,6 +259,7 @@ async fn write(
     let Teaching { map, landmark, view, max, .. } = new;
     let (of_map, number) = landmark_for(tx, new, &prepared).await?;
     if let Some(row) = views::same(tx, number, view).await? {
+        pictures::mend(tx, &view.image_sha256, &view.image).await?;
         return Ok((row, UploadOutcome::Duplicate, None));
     }
     if let Some(id) = prepared.near_duplicate {

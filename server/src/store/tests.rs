@@ -12,6 +12,8 @@ async fn every_statement_prepares_on_the_migrated_schema() {
         map_locations::ALL,
         visibility_settings::ALL,
         landmarks::ALL,
+        copies::ALL,
+        pictures::ALL,
         views::ALL,
         models::ALL,
         walls::ALL,

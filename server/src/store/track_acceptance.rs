@@ -10,10 +10,10 @@ use super::{
     landmark_placement::{self, PlacementOutcome, PlacementReport},
     landmarks::{self, LandmarkGeometry},
     maps,
+    pictures::Digest,
     statements::statements,
     teaching::{ATTEMPTS, Stamp, computed, stamp, wall_segments},
-    views::{self, Digest},
-    walls, within,
+    views, walls, within,
 };
 use map::segments::LaserSegment;
 use sqlx::{Row, sqlite::SqliteRow};
@@ -21,9 +21,9 @@ use std::{collections::BTreeMap, sync::Arc};
 use vision::geometry::Corners;
 
 statements! {
-    MOVE = "INSERT INTO views (landmark_id, image_sha256, image_kind, image, width_px, height_px, corners_px, icon_side, \
-            icon, icon_scale, created_ms, capture) SELECT ?3, image_sha256, image_kind, image, width_px, height_px, \
-            corners_px, icon_side, icon, icon_scale, created_ms, capture FROM track_views \
+    MOVE = "INSERT INTO views (landmark_id, image_sha256, image_kind, width_px, height_px, corners_px, icon_side, \
+            icon, icon_scale, created_ms, capture) SELECT ?3, image_sha256, image_kind, width_px, height_px, corners_px, \
+            icon_side, icon, icon_scale, created_ms, capture FROM track_views \
             WHERE gathering_id = ?1 AND track = ?2 ORDER BY id ON CONFLICT DO NOTHING";
     COUNT = "SELECT count(*) FROM views WHERE landmark_id = ?1";
     HELD = "SELECT image_sha256, corners_px, capture FROM views WHERE landmark_id = ?1 ORDER BY id";

@@ -1,20 +1,30 @@
 //! The picture that is shown under a map: at most one, replaced as a whole.
 
-use super::{StoreError, Tx, kind::Kind, maps, now_ms, statements::statements};
+use super::{
+    StoreError, Tx,
+    kind::Kind,
+    maps, now_ms,
+    pictures::{self, Digest},
+    statements::statements,
+    views,
+};
 use sqlx::{Row, SqliteExecutor};
 
 statements! {
-    PUT = "INSERT OR REPLACE INTO underlays (map_id, image, image_kind, width_px, height_px, metres_per_pixel, x_m, y_m, \
-           theta_rad, created_ms) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10)";
-    GET = "SELECT image_kind, width_px, height_px, metres_per_pixel, x_m, y_m, theta_rad, created_ms FROM underlays \
+    PUT = "INSERT INTO underlays (map_id, image_sha256, image_kind, width_px, height_px, metres_per_pixel, x_m, y_m, \
+           theta_rad, created_ms) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10) ON CONFLICT (map_id) DO UPDATE SET \
+           image_sha256 = excluded.image_sha256, image_kind = excluded.image_kind, width_px = excluded.width_px, \
+           height_px = excluded.height_px, metres_per_pixel = excluded.metres_per_pixel, x_m = excluded.x_m, \
+           y_m = excluded.y_m, theta_rad = excluded.theta_rad, created_ms = excluded.created_ms";
+    GET = "SELECT image_sha256, image_kind, width_px, height_px, metres_per_pixel, x_m, y_m, theta_rad, created_ms FROM underlays \
            WHERE map_id = ?1";
-    IMAGE = "SELECT image FROM underlays WHERE map_id = ?1";
     DELETE = "DELETE FROM underlays WHERE map_id = ?1";
 }
 
 /// An underlay without its picture.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct UnderlayRow {
+    pub(crate) image_sha256: Digest,
     /// `png` or `jpeg`.
     pub(crate) image_kind: String,
     /// Width and height of the upright picture.
@@ -39,9 +49,10 @@ pub(crate) async fn put(
     let map = maps::get(&mut tx.conn, map).await?;
     row.created_ms = now_ms();
     let ([width_px, height_px], [x_m, y_m, theta_rad]) = (row.size_px, row.map_from_picture);
+    pictures::put(tx, &row.image_sha256, image).await?;
     sqlx::query(PUT)
         .bind(map.id)
-        .bind(image)
+        .bind(&row.image_sha256[..])
         .bind(&row.image_kind)
         .bind(width_px)
         .bind(height_px)
@@ -65,8 +76,10 @@ pub(crate) async fn get(
     let at = || StoreError::during("read underlay");
     let row = sqlx::query(GET).bind(map).fetch_optional(db).await.map_err(at())?;
     let row = row.ok_or_else(|| none_of(name))?;
+    let image_sha256 = views::digest_of(&row)?;
     let read = || {
         Ok(UnderlayRow {
+            image_sha256,
             image_kind: row.try_get("image_kind")?,
             size_px: [row.try_get("width_px")?, row.try_get("height_px")?],
             metres_per_pixel: row.try_get("metres_per_pixel")?,
@@ -75,15 +88,6 @@ pub(crate) async fn get(
         })
     };
     read().map_err(at())
-}
-
-/// The picture, as it was uploaded.
-pub(crate) async fn image(
-    db: impl SqliteExecutor<'_>,
-    (map, name): (i64, &str),
-) -> Result<Vec<u8>, StoreError> {
-    let image = sqlx::query_scalar(IMAGE).bind(map).fetch_optional(db).await;
-    image.map_err(StoreError::during("read underlay"))?.ok_or_else(|| none_of(name))
 }
 
 /// Deletes the underlay of a map.

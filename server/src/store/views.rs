@@ -1,6 +1,13 @@
 //! Training views of landmarks with their pictures, and the distractors beside the landmarks in those pictures.
 
-use super::{StoreError, Tx, kind::Kind, landmarks, now_ms, statements::statements, within};
+use super::{
+    StoreError, Tx,
+    kind::Kind,
+    landmarks, now_ms,
+    pictures::{self, Digest},
+    statements::statements,
+    within,
+};
 use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
 use vision::{geometry::Corners, icon::Icon, model::LandmarkId};
 
@@ -8,9 +15,9 @@ statements! {
     COUNT = "SELECT count(*) FROM views WHERE landmark_id = ?1";
     SAME = "SELECT id, image_kind, width_px, height_px, corners_px, created_ms FROM views \
             WHERE landmark_id = ?1 AND image_sha256 = ?2 AND corners_px = ?3";
-    INSERT = "INSERT INTO views (landmark_id, image_sha256, image_kind, image, width_px, height_px, corners_px, \
+    INSERT = "INSERT INTO views (landmark_id, image_sha256, image_kind, width_px, height_px, corners_px, \
               icon_side, icon, icon_scale, created_ms, capture) \
-              VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12) \
+              VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11) \
               RETURNING id";
     PAGE = "SELECT id, image_kind, width_px, height_px, corners_px, created_ms FROM views \
             WHERE landmark_id = ?1 AND id > ?2 ORDER BY id LIMIT ?3";
@@ -21,7 +28,8 @@ statements! {
     CROPS = "SELECT id, corners_px, icon_side, icon, icon_scale FROM views WHERE landmark_id = ?1 ORDER BY id";
     OF_MAP = "SELECT v.id, v.landmark_id, v.image_sha256, v.width_px, v.height_px, v.corners_px, v.icon_side, v.icon, \
               v.icon_scale FROM views v JOIN landmarks l ON l.id = v.landmark_id WHERE l.map_id = ?1 ORDER BY v.id";
-    IMAGE = "SELECT image FROM views WHERE id = ?1";
+    PICTURE = "SELECT v.image_sha256, v.image_kind FROM views v JOIN landmarks l ON l.id = v.landmark_id \
+               JOIN maps m ON m.id = l.map_id WHERE m.name = ?1 AND l.name = ?2 AND v.id = ?3";
     COUNT_DISTRACTORS = "SELECT count(*) FROM strangers WHERE map_id = ?1";
     INSERT_DISTRACTOR = "INSERT INTO strangers (map_id, image_sha256, corners_px, icon_side, icon, icon_scale) \
                        VALUES (?1, ?2, ?3, ?4, ?5, ?6) ON CONFLICT DO NOTHING";
@@ -31,9 +39,6 @@ statements! {
 
 /// Distractors of one map; further ones are not stored.
 pub(crate) const MAX_DISTRACTORS: usize = 1_000;
-
-/// SHA-256 of a picture.
-pub(crate) type Digest = [u8; 32];
 
 /// A quad of a picture: its corners (px) and its icon.
 #[derive(Debug, Clone, PartialEq)]
@@ -178,13 +183,13 @@ pub(super) async fn add(
     new: &NewView,
     max: usize,
 ) -> Result<ViewRow, StoreError> {
+    pictures::put(tx, &new.image_sha256, &new.image).await?;
     let corners = corners_bytes(&new.crop.corners_px);
     let created_ms = now_ms();
     let id = sqlx::query_scalar(INSERT)
         .bind(landmark)
         .bind(&new.image_sha256[..])
         .bind(new.image_kind)
-        .bind(&new.image)
         .bind(new.size_px[0] as i64)
         .bind(new.size_px[1] as i64)
         .bind(&corners)
@@ -282,14 +287,18 @@ pub(crate) async fn of_map(
     rows.iter().map(view).collect()
 }
 
-/// The picture of a view, as it was uploaded.
-pub(crate) async fn image(db: impl SqliteExecutor<'_>, view: i64) -> Result<Vec<u8>, StoreError> {
-    let image = sqlx::query_scalar(IMAGE)
-        .bind(view)
-        .fetch_optional(db)
-        .await
-        .map_err(StoreError::during("read picture"))?;
-    image.ok_or_else(|| StoreError::NotFound { what: Kind::View, name: view.to_string() })
+/// Digest and kind (`png` or `jpeg`) of the picture of a view.
+pub(crate) async fn picture(
+    db: impl SqliteExecutor<'_>,
+    map: &str,
+    landmark: &str,
+    view: i64,
+) -> Result<(Digest, String), StoreError> {
+    let at = || StoreError::during("read view");
+    let row = sqlx::query(PICTURE).bind(map).bind(landmark).bind(view).fetch_optional(db).await;
+    let row = row.map_err(at())?;
+    let row = row.ok_or_else(|| StoreError::NotFound { what: Kind::View, name: view.to_string() })?;
+    Ok((digest_of(&row)?, row.try_get("image_kind").map_err(at())?))
 }
 
 /// The distractors of a map, each with the digest of its picture.

@@ -5,6 +5,8 @@ from __future__ import annotations
 import contextlib
 from collections.abc import AsyncIterator, Sequence
 from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 import httpx
@@ -88,6 +90,20 @@ class AsyncBase:
 
     async def _bytes(self, call: str, *at: str | int) -> bytes:
         return (await self._checked(call, at)).content
+
+    async def _save(self, path: str | PathLike[str], call: str, *at: str | int) -> int:
+        """Writes the answer to a new file; returns its size."""
+        response = await self._checked(call, at, is_stream=True)
+        size = 0
+        try:
+            with Path(path).open("xb") as file:
+                async for part in response.aiter_bytes():
+                    size += file.write(part)
+        except httpx.HTTPError as error:
+            raise unreachable(self._base, error) from error
+        finally:
+            await response.aclose()
+        return size
 
     async def _all(self, kind: type[T], call: str, *at: str | int) -> tuple[T, ...]:
         """Every page of a list."""

@@ -108,6 +108,10 @@ class AsyncLandmarks(AsyncBase):
         """The rectified picture of a view, PNG."""
         return await self._bytes("view_icon", map, landmark, view)
 
+    async def view_image(self, map: str, landmark: str, view: int) -> bytes:
+        """The photograph of a view as it was uploaded, PNG or JPEG."""
+        return await self._bytes("view_image", map, landmark, view)
+
     async def learn(self, map: str, landmarks: Iterable[str] | None = None, generated_views: int | None = None) -> Job:
         """Starts to learn: these landmarks, or all that have views. `generated_views` warped views are made of each
         photograph, 0 to 100; the server chooses where it is not given."""

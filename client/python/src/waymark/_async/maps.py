@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from os import PathLike
 
 from waymark._async.base import AsyncBase, AsyncEvents, AsyncStream
 from waymark._http import live_event, picture_part
 from waymark._values import UNSET, Unset, given, present, to_json
 from waymark.api import (
+    Backup,
     CoverageResponse,
     Distance,
     GazeRankingBody,
@@ -54,6 +56,26 @@ class AsyncMaps(AsyncBase):
     async def version(self) -> Version:
         """Version of the server."""
         return await self._send(Version, "version")
+
+    async def make_backup(self) -> Backup:
+        """Begins a backup in the server's data directory; `backup` tells how far it is."""
+        return await self._send(Backup, "make_backup")
+
+    async def backups(self) -> tuple[Backup, ...]:
+        """All backups in the server's data directory, by time."""
+        return await self._all(Backup, "backups")
+
+    async def backup(self, backup: str) -> Backup:
+        """One backup: how far it is, and what it holds."""
+        return await self._send(Backup, "backup", backup)
+
+    async def backup_file(self, backup: str, path: str | PathLike[str]) -> int:
+        """Writes a complete backup to a new file, for `waymark restore`; returns its size."""
+        return await self._save(path, "backup_file", backup)
+
+    async def delete_backup(self, backup: str) -> None:
+        """Deletes a complete backup."""
+        await self._done("delete_backup", backup)
 
     async def create_map(
         self,

@@ -6,6 +6,8 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 import httpx
@@ -87,6 +89,20 @@ class Base:
 
     def _bytes(self, call: str, *at: str | int) -> bytes:
         return (self._checked(call, at)).content
+
+    def _save(self, path: str | PathLike[str], call: str, *at: str | int) -> int:
+        """Writes the answer to a new file; returns its size."""
+        response = self._checked(call, at, is_stream=True)
+        size = 0
+        try:
+            with Path(path).open("xb") as file:
+                for part in response.iter_bytes():
+                    size += file.write(part)
+        except httpx.HTTPError as error:
+            raise unreachable(self._base, error) from error
+        finally:
+            response.close()
+        return size
 
     def _all(self, kind: type[T], call: str, *at: str | int) -> tuple[T, ...]:
         """Every page of a list."""

@@ -109,6 +109,10 @@ class Landmarks(Base):
         """The rectified picture of a view, PNG."""
         return self._bytes("view_icon", map, landmark, view)
 
+    def view_image(self, map: str, landmark: str, view: int) -> bytes:
+        """The photograph of a view as it was uploaded, PNG or JPEG."""
+        return self._bytes("view_image", map, landmark, view)
+
     def learn(self, map: str, landmarks: Iterable[str] | None = None, generated_views: int | None = None) -> Job:
         """Starts to learn: these landmarks, or all that have views. `generated_views` warped views are made of each
         photograph, 0 to 100; the server chooses where it is not given."""

@@ -4,11 +4,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from os import PathLike
 
 from waymark._http import live_event, picture_part
 from waymark._sync.base import Base, Events, Stream
 from waymark._values import UNSET, Unset, given, present, to_json
 from waymark.api import (
+    Backup,
     CoverageResponse,
     Distance,
     GazeRankingBody,
@@ -55,6 +57,26 @@ class Maps(Base):
     def version(self) -> Version:
         """Version of the server."""
         return self._send(Version, "version")
+
+    def make_backup(self) -> Backup:
+        """Begins a backup in the server's data directory; `backup` tells how far it is."""
+        return self._send(Backup, "make_backup")
+
+    def backups(self) -> tuple[Backup, ...]:
+        """All backups in the server's data directory, by time."""
+        return self._all(Backup, "backups")
+
+    def backup(self, backup: str) -> Backup:
+        """One backup: how far it is, and what it holds."""
+        return self._send(Backup, "backup", backup)
+
+    def backup_file(self, backup: str, path: str | PathLike[str]) -> int:
+        """Writes a complete backup to a new file, for `waymark restore`; returns its size."""
+        return self._save(path, "backup_file", backup)
+
+    def delete_backup(self, backup: str) -> None:
+        """Deletes a complete backup."""
+        self._done("delete_backup", backup)
 
     def create_map(
         self,

@@ -6,6 +6,7 @@ the Unix epoch; the last part of a field's name is its unit. Covariances are ove
 quads and poses of the wire are in `waymark.wire`.
 """
 
+from waymark.api.backups import Backup, BackupHealth, BackupManifest, BackupMap, BackupState
 from waymark.api.gathering import (
     AcceptanceBody,
     AcceptedTrackBody,
@@ -122,6 +123,11 @@ __all__ = [
     "AdviceBody",
     "AreaBody",
     "AreaStatsBody",
+    "Backup",
+    "BackupHealth",
+    "BackupManifest",
+    "BackupMap",
+    "BackupState",
     "CalibrationConstraintsBody",
     "CalibrationReport",
     "CalibrationViewReport",

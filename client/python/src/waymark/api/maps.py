@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from waymark.api.backups import BackupHealth
+
 Distance = Literal["both", "correlation", "hausdorff"]
 JobState = Literal["queued", "running", "done", "failed", "cancelled"]
 Point2 = tuple[float, float]
@@ -116,11 +118,14 @@ class Health:
 
 @dataclass(frozen=True, slots=True)
 class Readiness:
-    """`ready`, or `degraded`: everything runs, but some maps use an earlier version, or none."""
+    """`ready`, or `degraded`: everything runs, but some maps use an earlier version, or none, stored pictures are
+    damaged, or the last scheduled backup failed."""
 
     status: str
     maps_not_in_use: dict[str, str]
     panics: dict[str, int]
+    damaged_pictures: tuple[str, ...] = ()
+    backup: BackupHealth | None = None
 
 
 @dataclass(frozen=True, slots=True)
