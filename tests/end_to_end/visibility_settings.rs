@@ -9,7 +9,9 @@ use std::{f64::consts::FRAC_PI_2, time::Duration};
 use tests::{Child, command::waymark};
 
 async fn call(server: &Child, method: Method, path: &str, body: Option<Value>) -> (StatusCode, Value) {
-    let request = Client::new().request(method, format!("{}/api/v1/maps/hall{path}", server.url));
+    let request = Client::new()
+        .request(method, format!("{}/api/v1/maps/hall{path}", server.url))
+        .header("if-match", "*");
     let request = match body {
         Some(body) => request.json(&body),
         None => request,

@@ -1,9 +1,15 @@
 //! A connection to the server's HTTP interface: sends requests, reads answers, turns refusals into errors.
 
-use super::operation::{Operation, PathValue, path_of, query_of};
+use super::{
+    creation::{KEY, execute, fresh_key},
+    operation::{Operation, PathValue, path_of, query_of},
+};
 use crate::ClientError;
 use protos::api::{Page, PageQuery, Problem};
-use reqwest::{RequestBuilder, Response};
+use reqwest::{
+    RequestBuilder, Response,
+    header::{ETAG, IF_MATCH},
+};
 use serde::{Serialize, de::DeserializeOwned};
 use std::time::Duration;
 
@@ -15,6 +21,17 @@ const REQUEST_TIMEOUT: Duration = Duration::from_mins(1);
 pub struct MapClient {
     http: reqwest::Client,
     base: String,
+    key: Option<String>,
+    revision: Option<String>,
+}
+
+/// What was read, with its revision for [`MapClient::if_match`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct Revised<T> {
+    /// What was read.
+    pub value: T,
+    /// Another one after every edit or lesson, the same after what robots do by themselves.
+    pub revision: String,
 }
 
 impl MapClient {
@@ -23,7 +40,31 @@ impl MapClient {
         // Ignores proxies of the environment: the server is in the robot's own network.
         let http = reqwest::Client::builder().no_proxy().timeout(REQUEST_TIMEOUT).build();
         let http = http.map_err(|e| ClientError::Http { url: base.to_owned(), detail: e.to_string() })?;
-        Ok(Self { http, base: base.trim_end_matches('/').to_owned() })
+        Ok(Self { http, base: base.trim_end_matches('/').to_owned(), key: None, revision: None })
+    }
+
+    /// The same with this key for its next creation, in place of a fresh one: a program that repeats a creation by itself, also
+    /// after its own restart, gives the same key again. The server makes it once, and answers with `idempotency_key_reused` if
+    /// the key was used for another one. 1 to 128 visible ASCII characters; kept for a day.
+    #[must_use]
+    pub fn with_idempotency_key(&self, key: &str) -> Self {
+        Self { key: Some(key.to_owned()), ..self.clone() }
+    }
+
+    /// The same for changes of what still has this revision: another one is refused with `changed_meanwhile` (status 412) and
+    /// changes nothing. Without it, changes are made whatever is there.
+    ///
+    /// ```no_run
+    /// # async fn example(maps: client::MapClient) -> Result<(), client::ClientError> {
+    /// let landmark = maps.landmark("hall", "poster").await?;
+    /// // ... a person looks at it ...
+    /// maps.if_match(&landmark.revision).delete_landmark("hall", "poster").await?;
+    /// # Ok(())
+    /// # }
+    /// ```
+    #[must_use]
+    pub fn if_match(&self, revision: &str) -> Self {
+        Self { revision: Some(revision.to_owned()), ..self.clone() }
     }
 
     /// A request of an operation; `at` are the parameters of its path, in order.
@@ -33,7 +74,15 @@ impl MapClient {
         at: &[PathValue<'_>],
     ) -> Result<RequestBuilder, ClientError> {
         let path = path_of(operation.path, at)?;
-        Ok(self.http.request(operation.method.clone(), format!("{}/api/v1{path}", self.base)))
+        let mut request = self.http.request(operation.method.clone(), format!("{}/api/v1{path}", self.base));
+        if operation.takes_key() {
+            request = request.header(KEY, self.key.clone().unwrap_or_else(fresh_key));
+        }
+        if operation.takes_revision() {
+            let known = self.revision.as_ref().map(|revision| format!("\"{revision}\""));
+            request = request.header(IF_MATCH, known.unwrap_or_else(|| "*".to_owned()));
+        }
+        Ok(request)
     }
 
     /// The same with a query.
@@ -73,6 +122,20 @@ impl MapClient {
         serde_json::from_slice(&bytes).map_err(|e| ClientError::Unexpected { url, detail: e.to_string() })
     }
 
+    /// Sends, and reads the answer with its revision.
+    pub(super) async fn revised<T: DeserializeOwned>(
+        &self,
+        request: RequestBuilder,
+    ) -> Result<Revised<T>, ClientError> {
+        let response = self.checked(request).await?;
+        let url = response.url().to_string();
+        let tag = response.headers().get(ETAG).and_then(|tag| tag.to_str().ok()?.split('"').nth(1));
+        let unexpected = |detail: String| ClientError::Unexpected { url: url.clone(), detail };
+        let revision = tag.map(str::to_owned).ok_or_else(|| unexpected("no revision in ETag".to_owned()))?;
+        let value = serde_json::from_slice(&whole(response).await?).map_err(|e| unexpected(e.to_string()))?;
+        Ok(Revised { value, revision })
+    }
+
     /// Sends; the answer is empty.
     pub(super) async fn done(&self, request: RequestBuilder) -> Result<(), ClientError> {
         self.checked(request).await.map(drop)
@@ -85,10 +148,11 @@ impl MapClient {
 
     /// Sends, and turns refusals into errors.
     pub(super) async fn checked(&self, request: RequestBuilder) -> Result<Response, ClientError> {
-        let response = request.send().await.map_err(|e| {
+        let failed = |e: reqwest::Error| {
             let url = e.url().map_or_else(|| self.base.clone(), ToString::to_string);
             ClientError::Http { url, detail: reason(&e) }
-        })?;
+        };
+        let response = execute(&self.http, request.build().map_err(failed)?).await.map_err(failed)?;
         let status = response.status();
         if status.is_success() {
             return Ok(response);

@@ -2,7 +2,9 @@
 //! resource. In and out: the types of [`protos::api`].
 
 mod cameras;
+mod creation;
 mod events;
+mod form;
 mod gathering;
 mod health;
 mod landmarks;
@@ -25,7 +27,7 @@ mod walls;
 pub use cameras::CameraFrame;
 pub use learning::JobEvents;
 pub use live::LiveEvents;
-pub use map_client::MapClient;
+pub use map_client::{MapClient, Revised};
 pub use operation::Operation;
 pub use views::{LandmarkRegion, NewView};
 

@@ -156,6 +156,10 @@ pub struct ObservedPlaceBody {
 pub struct Landmark {
     /// `[a-z0-9_-]{1,64}`, unique in the map.
     pub name: String,
+    /// Another one after every edit of name, size, place, views or, by a person, health, and after every lesson of its model;
+    /// the same after what robots do by themselves. `If-Match` takes it, in quotes.
+    #[serde(default)]
+    pub revision: String,
     /// How far it has come.
     pub status: LandmarkStatus,
     /// Why it is not matched; empty unless it is inactive.

@@ -2,9 +2,10 @@
 
 use super::{
     App, AppState,
-    answers::page,
+    answers::{created, page},
     error::{ApiError, out_of_range},
     extract::{Body, PathParams, QueryParams, after_name, name, page_limit},
+    revision::{IfMatch, Revised},
 };
 use crate::{
     failed_gates::{self, Evidence, Refusal, StoredLookAlike},
@@ -12,6 +13,7 @@ use crate::{
     store::{
         landmarks::{self, LandmarkGeometry, LandmarkRow},
         maps,
+        revisions::{self, Subject},
     },
 };
 use axum::{Json, extract::State, http::StatusCode};
@@ -160,6 +162,7 @@ fn landmark_shown(row: LandmarkRow, context: &Context<'_>) -> Landmark {
         health: health_shown(row.health),
         finding: row.finding.and_then(|f| serde_json::from_str(&f).ok()),
         name: row.name,
+        revision: row.revision,
         status,
         failed_gates,
         views: row.views,
@@ -208,7 +211,8 @@ async fn create(
     let write = app.store.write(move |tx| {
         Box::pin(async move { landmarks::create(tx, &map, name.as_str(), geometry, max).await })
     });
-    Ok((StatusCode::CREATED, Json(landmark_shown(write.await?, &Context::default()))))
+    let shown = |row: &LandmarkRow| (StatusCode::CREATED, landmark_shown(row.clone(), &Context::default()));
+    created(shown, write).await
 }
 
 /// Lists the landmarks of a map by name.
@@ -233,10 +237,10 @@ async fn list(
 async fn get(
     State(app): State<AppState>,
     PathParams((map, landmark)): PathParams<(String, String)>,
-) -> Result<Json<Landmark>, ApiError> {
+) -> Result<Revised<Landmark>, ApiError> {
     maps::get(app.store.reads(), &map).await?;
     let row = landmarks::get(app.store.reads(), &map, &landmark).await?;
-    Ok(Json(shown(&app, &app.jobs.learning(&map).await?, &map, row)))
+    Ok(Revised(row.revision.clone(), shown(&app, &app.jobs.learning(&map).await?, &map, row)))
 }
 
 /// Renames it; sets or forgets size and place; sets how far it is trusted. Everything that belongs to it follows the name.
@@ -248,14 +252,16 @@ async fn get(
 async fn patch(
     State(app): State<AppState>,
     PathParams((map, landmark)): PathParams<(String, String)>,
+    IfMatch(is): IfMatch,
     Body(changes): Body<LandmarkPatch>,
-) -> Result<Json<Landmark>, ApiError> {
+) -> Result<Revised<Landmark>, ApiError> {
     let checked = geometry(changes.size.flatten(), changes.place.flatten())?;
     let new_name = changes.name.map(|new| name("name", new)).transpose()?;
     let (size, place) = (changes.size.is_some(), changes.place.is_some());
     let (map_name, health) = (map.clone(), changes.health.map(health));
     let write = app.store.write(move |tx| {
         Box::pin(async move {
+            revisions::check(tx, &map, &Subject::Landmark(landmark.clone()), &is).await?;
             let landmark = match new_name {
                 Some(new) => landmarks::rename(tx, &map, &landmark, new.as_str()).await?,
                 None => landmark,
@@ -273,7 +279,8 @@ async fn patch(
         })
     });
     let changed = write.await?;
-    Ok(Json(shown(&app, &app.jobs.learning(&map_name).await?, &map_name, changed)))
+    let learning = app.jobs.learning(&map_name).await?;
+    Ok(Revised(changed.revision.clone(), shown(&app, &learning, &map_name, changed)))
 }
 
 /// Deletes a landmark with its views and its model.
@@ -283,7 +290,14 @@ async fn patch(
 async fn delete(
     State(app): State<AppState>,
     PathParams((map, landmark)): PathParams<(String, String)>,
+    IfMatch(is): IfMatch,
 ) -> Result<StatusCode, ApiError> {
-    app.store.write(move |tx| Box::pin(async move { landmarks::delete(tx, &map, &landmark).await })).await?;
+    let write = app.store.write(move |tx| {
+        Box::pin(async move {
+            revisions::check(tx, &map, &Subject::Landmark(landmark.clone()), &is).await?;
+            landmarks::delete(tx, &map, &landmark).await
+        })
+    });
+    write.await?;
     Ok(StatusCode::NO_CONTENT)
 }

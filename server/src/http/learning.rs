@@ -2,6 +2,7 @@
 
 use super::{
     AppState,
+    answers::created,
     error::ApiError,
     extract::{Body, PathParams},
 };
@@ -123,8 +124,8 @@ async fn submit(
             return Err(ApiError::new(StatusCode::CONFLICT, "no_views", detail).field("landmarks"));
         }
     }
-    let row = app.jobs.submit(map, &request).await?;
-    Ok((StatusCode::ACCEPTED, Json(job_shown(row, None))))
+    let shown = |row: &JobRow| (StatusCode::ACCEPTED, job_shown(row.clone(), None));
+    created(shown, app.jobs.submit(map, &request)).await
 }
 
 async fn read(app: &AppState, id: i64) -> Result<Job, StoreError> {

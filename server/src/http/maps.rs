@@ -2,13 +2,15 @@
 
 use super::{
     AppState,
-    answers::{page, row_major},
+    answers::{created, page, row_major},
     error::{ApiError, out_of_range},
     extract::{Body, PathParams, QueryParams, after_name, name, page_limit},
+    revision::{IfMatch, Revised},
 };
 use crate::store::{
     map_locations::{self, MapLocation},
     maps::{self, MapRow},
+    revisions::{self, Subject},
 };
 use axum::{Json, extract::State, http::StatusCode};
 use map::{
@@ -61,6 +63,7 @@ fn map_shown(row: MapRow, found: MapLocation) -> Map {
     Map {
         name: row.name,
         version: row.version,
+        revision: row.revision,
         landmarks: row.landmarks,
         distance: row.distance.into(),
         parent: found.link.as_ref().map(parent_shown),
@@ -107,13 +110,14 @@ async fn create(
     };
     let write = app.store.write(move |tx| {
         Box::pin(async move {
-            let row = maps::create(tx, name.as_str(), distance, max).await?;
+            maps::create(tx, name.as_str(), distance, max).await?;
             let found = map_locations::set(tx, name.as_str(), |_| found).await?;
-            Ok((row, found))
+            Ok((maps::of(tx, name.as_str()).await?, found))
         })
     });
-    let (row, found) = write.await.map_err(|e| unknown_parent(e.into()))?;
-    Ok((StatusCode::CREATED, Json(map_shown(row, found))))
+    let shown =
+        |(row, found): &(MapRow, MapLocation)| (StatusCode::CREATED, map_shown(row.clone(), found.clone()));
+    created(shown, async { write.await.map_err(|e| unknown_parent(e.into())) }).await
 }
 
 /// Lists maps by name.
@@ -143,10 +147,10 @@ async fn list(
 async fn get(
     State(app): State<AppState>,
     PathParams(map): PathParams<String>,
-) -> Result<Json<Map>, ApiError> {
+) -> Result<Revised<Map>, ApiError> {
     let row = maps::get(app.store.reads(), &map).await?;
     let found = map_locations::all(app.store.reads()).await?.remove(&map).unwrap_or_default();
-    Ok(Json(map_shown(row, found)))
+    Ok(Revised(row.revision.clone(), map_shown(row, found)))
 }
 
 /// Changes a map's site, building, floor or position.
@@ -157,8 +161,9 @@ async fn get(
 async fn patch(
     State(app): State<AppState>,
     PathParams(map): PathParams<String>,
+    IfMatch(is): IfMatch,
     Body(changes): Body<MapPatch>,
-) -> Result<Json<Map>, ApiError> {
+) -> Result<Revised<Map>, ApiError> {
     let changed = |field, given: Option<Option<String>>| given.map(|text| word(field, text)).transpose();
     let (site, building) = (changed("site", changes.site)?, changed("building", changes.building)?);
     let floor = changed("floor", changes.floor)?;
@@ -166,6 +171,7 @@ async fn patch(
     maps::get(app.store.reads(), &map).await?;
     let write = app.store.write(move |tx| {
         Box::pin(async move {
+            revisions::check(tx, &map, &Subject::Map, &is).await?;
             let found = map_locations::set(tx, &map, |old| MapLocation {
                 site: site.unwrap_or(old.site),
                 building: building.unwrap_or(old.building),
@@ -177,7 +183,7 @@ async fn patch(
         })
     });
     let (row, found) = write.await.map_err(|e| unknown_parent(e.into()))?;
-    Ok(Json(map_shown(row, found)))
+    Ok(Revised(row.revision.clone(), map_shown(row, found)))
 }
 
 /// Deletes a map and all that is in it.
@@ -187,8 +193,15 @@ async fn patch(
 async fn delete(
     State(app): State<AppState>,
     PathParams(map): PathParams<String>,
+    IfMatch(is): IfMatch,
 ) -> Result<StatusCode, ApiError> {
-    app.store.write(move |tx| Box::pin(async move { maps::delete(tx, &map).await })).await?;
+    let write = app.store.write(move |tx| {
+        Box::pin(async move {
+            revisions::check(tx, &map, &Subject::Map, &is).await?;
+            maps::delete(tx, &map).await
+        })
+    });
+    write.await?;
     Ok(StatusCode::NO_CONTENT)
 }
 

@@ -5,6 +5,8 @@
 
 mod answers;
 mod cameras;
+mod creation;
+mod documented;
 mod error;
 mod examples;
 mod extract;
@@ -21,6 +23,7 @@ mod pages;
 mod recognise;
 mod reference_runs;
 mod relocalisation;
+mod revision;
 mod robots;
 mod ros2;
 mod router;
@@ -42,6 +45,9 @@ use engine::{live::LiveHub, motion::MotionTracker, panics::Edge, relocalise::Rel
 use error::ApiError;
 use std::{sync::Arc, time::Duration};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, SemaphorePermit, watch};
+
+/// Where the API lives.
+const API: &str = "/api/v1";
 
 /// What every handler shares.
 #[derive(Debug)]

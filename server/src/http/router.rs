@@ -1,9 +1,9 @@
 //! Every route, with the layers around them and the OpenAPI document made from them.
 
 use super::{
-    App, AppState, cameras, error::ApiError, examples::with_examples, gathering, guard, health, landmarks,
-    learning, live, mapping, maps, modalities, pages, recognise, reference_runs, relocalisation, robots,
-    ros2, underlay, views, visibility, visibility_settings, walls,
+    API, App, AppState, cameras, creation, documented, error::ApiError, examples::with_examples, gathering,
+    guard, health, landmarks, learning, live, mapping, maps, modalities, pages, recognise, reference_runs,
+    relocalisation, revision, robots, ros2, underlay, views, visibility, visibility_settings, walls,
 };
 use crate::config::Limits;
 use axum::{
@@ -19,9 +19,6 @@ use tower_http::catch_panic::CatchPanicLayer;
 use utoipa::{OpenApi, openapi};
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_swagger_ui::SwaggerUi;
-
-/// Where the API lives.
-const API: &str = "/api/v1";
 
 #[derive(OpenApi)]
 #[openapi(info(
@@ -55,10 +52,11 @@ fn api(limits: &Limits) -> OpenApiRouter<AppState> {
 }
 
 /// Routes and their OpenAPI document.
-fn parts(limits: &Limits) -> (Router<AppState>, openapi::OpenApi) {
+pub(super) fn parts(limits: &Limits) -> (Router<AppState>, openapi::OpenApi) {
     let (routes, document) =
         OpenApiRouter::with_openapi(Document::openapi()).nest(API, api(limits)).split_for_parts();
-    (routes, with_examples(document, API))
+    let document = creation::with_keys(with_examples(document, API));
+    (routes, documented::with_errors(revision::with_revisions(document)))
 }
 
 /// The whole service.
@@ -76,6 +74,7 @@ pub(crate) fn router(app: App) -> Router {
         .merge(docs)
         .fallback(not_found)
         .method_not_allowed_fallback(method_not_allowed)
+        .layer(from_fn_with_state(app.clone(), creation::keyed))
         .layer(CatchPanicLayer::custom(move |cause: Box<dyn Any + Send>| panicked(&panics, cause.as_ref())))
         .layer(from_fn_with_state(app.clone(), guard::guard))
         .with_state(app)

@@ -1,7 +1,9 @@
 //! The routes without a network: requests go straight to the router.
 
+mod creation;
 mod earlier_build;
 mod openapi;
+mod revision;
 mod teaching;
 
 use super::*;
@@ -74,7 +76,8 @@ impl Service {
 
 fn request(method: &str, path: &str, body: impl Into<Body>) -> Request<Body> {
     let request = Request::builder().method(method).uri(path).header(header::HOST, "localhost");
-    request.header(header::CONTENT_TYPE, "application/json").body(body.into()).unwrap()
+    let request = request.header(header::CONTENT_TYPE, "application/json").header(header::IF_MATCH, "*");
+    request.body(body.into()).unwrap()
 }
 
 async fn read(response: Response<Body>) -> (u16, Value) {

@@ -2,7 +2,7 @@
 
 use super::{
     App, AppState,
-    answers::page,
+    answers::{created, page},
     error::ApiError,
     extract::{self, PathParams, QueryParams, after_number, page_limit},
     landmarks::checked_size,
@@ -135,14 +135,17 @@ async fn add(
     let create = creates.then_some(app.config.limits.landmarks);
     let view = NewView { capture, ..new };
     let teaching = Teaching { map, landmark, view, max, novelty, size, create };
-    let (row, outcome, placing) = teaching::add(&app.store, teaching).await?;
+    created(added_shown, teaching::add(&app.store, teaching)).await
+}
+
+/// What came of a view.
+fn added_shown((row, outcome, placing): &teaching::Added) -> (StatusCode, TrainingView) {
     let view = TrainingView {
-        placing: placing.map(placement_shown),
-        outcome: Some(outcome_shown(outcome)),
-        ..view_shown(row)
+        placing: placing.clone().map(placement_shown),
+        outcome: Some(outcome_shown(*outcome)),
+        ..view_shown(row.clone())
     };
-    let status = if outcome == UploadOutcome::New { StatusCode::CREATED } else { StatusCode::OK };
-    Ok((status, Json(view)))
+    (if *outcome == UploadOutcome::New { StatusCode::CREATED } else { StatusCode::OK }, view)
 }
 
 /// A size by hand, checked. Both sides or none.

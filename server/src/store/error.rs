@@ -64,6 +64,20 @@ pub(crate) enum StoreError {
     /// What a write rests on changed after each preparation.
     #[error("others change the same things at this moment; try again")]
     Busy,
+    /// A change is meant for another revision.
+    #[error("somebody else has changed it since it was read: read it again, and change that")]
+    ChangedMeanwhile {
+        /// The present revision.
+        present: String,
+    },
+    /// A creation with this key is at work.
+    #[error("a request with this key is at work: repeat it when that has ended")]
+    KeyAtWork,
+    /// The key was used for another request.
+    #[error(
+        "this key was used for another request: take a fresh one for each creation, the same one to repeat it"
+    )]
+    KeyReused,
     /// The writer has stopped: after an I/O error nothing may be written any more.
     #[error("storage failed; the server stops: check the disk, then restart it")]
     Closed,

@@ -27,6 +27,8 @@ const FILES: &[(&str, &str)] = files![
     "0013_health",
     "0014_looks_like",
     "0015_underlay",
+    "0018_idempotency",
+    "0019_revisions",
 ];
 
 /// The steps in order.
@@ -62,7 +64,7 @@ mod tests {
         assert_eq!(files, FILES.iter().map(|(name, _)| (*name).to_owned()).collect::<Vec<_>>());
         let migrator = migrator();
         let versions: Vec<i64> = migrator.iter().map(|step| step.version).collect();
-        assert_eq!(versions, [1, 2, 5, 6, 7, 8, 10, 11, 12, 13, 14, 15]);
+        assert_eq!(versions, [1, 2, 5, 6, 7, 8, 10, 11, 12, 13, 14, 15, 18, 19]);
         // As databases of earlier builds have it: a checksum of the text alone.
         let first = migrator.iter().next().unwrap();
         assert_eq!((first.description.as_ref(), first.checksum.len()), ("initial", 48));

@@ -2,15 +2,30 @@
 
 from __future__ import annotations
 
+import asyncio
+import copy
 from collections.abc import AsyncIterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
 import httpx
 
-from waymark._http import TIMEOUT_S, EventParser, parsed, parsed_items, refusal, request_of, unreachable
+from waymark._http import (
+    TIMEOUT_S,
+    EventParser,
+    Revised,
+    headers_of,
+    parsed,
+    parsed_items,
+    pause_of,
+    refusal,
+    request_of,
+    revision_of,
+    unreachable,
+)
 
 T = TypeVar("T")
+B = TypeVar("B", bound="AsyncBase")
 
 
 class AsyncBase:
@@ -19,8 +34,26 @@ class AsyncBase:
     def __init__(self, server: str = "http://127.0.0.1:8080") -> None:
         """A client of the server at this address. Nothing is sent yet."""
         self._base = server.rstrip("/")
+        self._key: str | None = None
+        self._revision: str | None = None
         # Ignores proxies of the environment: the server is in the robot's own network.
         self._http = httpx.AsyncClient(base_url=self._base, timeout=TIMEOUT_S, trust_env=False)
+
+    def with_idempotency_key(self: B, key: str) -> B:
+        """The same with this key for its next creation, in place of a fresh one: a program that repeats a creation by
+        itself, also after its own restart, gives the same key again. The server makes it once, and answers with
+        `idempotency_key_reused` if the key was used for another one. 1 to 128 visible ASCII characters; kept for a
+        day."""
+        other = copy.copy(self)
+        other._key = key
+        return other
+
+    def if_match(self: B, revision: str) -> B:
+        """The same for changes of what still has this revision: another one is refused with `changed_meanwhile` and
+        changes nothing. Without it, changes are made whatever is there."""
+        other = copy.copy(self)
+        other._revision = revision
+        return other
 
     async def aclose(self) -> None:
         """Closes its connections."""
@@ -33,19 +66,37 @@ class AsyncBase:
         self, call: str, at: Sequence[str | int], is_stream: bool = False, **parts: Any
     ) -> httpx.Response:
         method, path = request_of(call, at)
+        headers = headers_of(call, self._key, self._revision)
+        answer = await self._answer(method, path, headers, is_stream, parts)
+        pause_s = pause_of(call, answer)
+        if pause_s is not None:
+            await asyncio.sleep(pause_s)
+            answer = await self._answer(method, path, headers, is_stream, parts)
+        if isinstance(answer, httpx.HTTPError):
+            raise unreachable(self._base, answer) from answer
+        if answer.is_error:
+            raise refusal(answer)
+        return answer
+
+    async def _answer(
+        self, method: str, path: str, headers: dict[str, str], is_stream: bool, parts: dict[str, Any]
+    ) -> httpx.Response | httpx.HTTPError:
         try:
-            request = self._http.build_request(method, path, **parts)
+            request = self._http.build_request(method, path, headers=headers, **parts)
             response = await self._http.send(request, stream=is_stream)
             if response.is_error:
                 await response.aread()
-                raise refusal(response)
             return response
         except httpx.HTTPError as error:
-            raise unreachable(self._base, error) from error
+            return error
 
     async def _send(self, kind: type[T], call: str, *at: str | int, **parts: Any) -> T:
         found: T = parsed(kind, await self._checked(call, at, **parts))
         return found
+
+    async def _revised(self, kind: type[T], call: str, *at: str | int) -> Revised[T]:
+        response = await self._checked(call, at)
+        return Revised(parsed(kind, response), revision_of(response))
 
     async def _done(self, call: str, *at: str | int) -> None:
         await self._checked(call, at)

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from waymark._async.base import AsyncBase
+from waymark._http import Revised
 from waymark._values import UNSET, Unset, given, present
 from waymark.api import (
     AcceptanceBody,
@@ -148,6 +149,10 @@ class AsyncRobots(AsyncBase):
     async def modalities(self, map: str) -> ModalityMapBody:
         """Modality statistics by pose cell from reference runs, and the fusion mode."""
         return await self._send(ModalityMapBody, "modalities", map)
+
+    async def modalities_revised(self, map: str) -> Revised[ModalityMapBody]:
+        """The same with the revision of the fusion mode and the named areas, for `if_match`."""
+        return await self._revised(ModalityMapBody, "modalities", map)
 
     async def set_modalities(
         self,

@@ -3,15 +3,30 @@
 
 from __future__ import annotations
 
+import copy
+import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
 import httpx
 
-from waymark._http import TIMEOUT_S, EventParser, parsed, parsed_items, refusal, request_of, unreachable
+from waymark._http import (
+    TIMEOUT_S,
+    EventParser,
+    Revised,
+    headers_of,
+    parsed,
+    parsed_items,
+    pause_of,
+    refusal,
+    request_of,
+    revision_of,
+    unreachable,
+)
 
 T = TypeVar("T")
+B = TypeVar("B", bound="Base")
 
 
 class Base:
@@ -20,8 +35,26 @@ class Base:
     def __init__(self, server: str = "http://127.0.0.1:8080") -> None:
         """A client of the server at this address. Nothing is sent yet."""
         self._base = server.rstrip("/")
+        self._key: str | None = None
+        self._revision: str | None = None
         # Ignores proxies of the environment: the server is in the robot's own network.
         self._http = httpx.Client(base_url=self._base, timeout=TIMEOUT_S, trust_env=False)
+
+    def with_idempotency_key(self: B, key: str) -> B:
+        """The same with this key for its next creation, in place of a fresh one: a program that repeats a creation by
+        itself, also after its own restart, gives the same key again. The server makes it once, and answers with
+        `idempotency_key_reused` if the key was used for another one. 1 to 128 visible ASCII characters; kept for a
+        day."""
+        other = copy.copy(self)
+        other._key = key
+        return other
+
+    def if_match(self: B, revision: str) -> B:
+        """The same for changes of what still has this revision: another one is refused with `changed_meanwhile` and
+        changes nothing. Without it, changes are made whatever is there."""
+        other = copy.copy(self)
+        other._revision = revision
+        return other
 
     def close(self) -> None:
         """Closes its connections."""
@@ -32,19 +65,37 @@ class Base:
 
     def _checked(self, call: str, at: Sequence[str | int], is_stream: bool = False, **parts: Any) -> httpx.Response:
         method, path = request_of(call, at)
+        headers = headers_of(call, self._key, self._revision)
+        answer = self._answer(method, path, headers, is_stream, parts)
+        pause_s = pause_of(call, answer)
+        if pause_s is not None:
+            time.sleep(pause_s)
+            answer = self._answer(method, path, headers, is_stream, parts)
+        if isinstance(answer, httpx.HTTPError):
+            raise unreachable(self._base, answer) from answer
+        if answer.is_error:
+            raise refusal(answer)
+        return answer
+
+    def _answer(
+        self, method: str, path: str, headers: dict[str, str], is_stream: bool, parts: dict[str, Any]
+    ) -> httpx.Response | httpx.HTTPError:
         try:
-            request = self._http.build_request(method, path, **parts)
+            request = self._http.build_request(method, path, headers=headers, **parts)
             response = self._http.send(request, stream=is_stream)
             if response.is_error:
                 response.read()
-                raise refusal(response)
             return response
         except httpx.HTTPError as error:
-            raise unreachable(self._base, error) from error
+            return error
 
     def _send(self, kind: type[T], call: str, *at: str | int, **parts: Any) -> T:
         found: T = parsed(kind, self._checked(call, at, **parts))
         return found
+
+    def _revised(self, kind: type[T], call: str, *at: str | int) -> Revised[T]:
+        response = self._checked(call, at)
+        return Revised(parsed(kind, response), revision_of(response))
 
     def _done(self, call: str, *at: str | int) -> None:
         self._checked(call, at)

@@ -117,9 +117,11 @@ class FindingBody:
 
 @dataclass(frozen=True, slots=True)
 class Landmark:
-    """A landmark. `failed_gates` is empty unless it is `inactive`."""
+    """A landmark. `failed_gates` is empty unless it is `inactive`; `revision` is another one after every edit or lesson
+    of it (`MapClient.if_match`)."""
 
     name: str
+    revision: str
     status: LandmarkStatus
     failed_gates: tuple[FailedGate, ...]
     views: int

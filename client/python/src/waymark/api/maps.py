@@ -25,10 +25,12 @@ class Parent:
 
 @dataclass(frozen=True, slots=True)
 class Map:
-    """A map. `version` counts up with every change that an answer could depend on."""
+    """A map. `version` counts up with every change that an answer could depend on; `revision` is another one
+    after every edit or lesson of it or of what is in it (`MapClient.if_match`)."""
 
     name: str
     version: int
+    revision: str
     landmarks: int
     distance: Distance
     site: str | None = None
