@@ -29,6 +29,7 @@ from waymark import (
     InvalidInput,
     JobFailed,
     JobTimeout,
+    Landmark,
     MapClient,
     Place,
     Pose2,
@@ -47,6 +48,8 @@ from waymark.api import (
     CalibrationConstraintsBody,
     CameraFrame,
     Job,
+    LandmarkDeletion,
+    NewLandmark,
     Parent,
     PoseBody,
     Ros2Status,
@@ -458,3 +461,26 @@ def cutting_relay(to: str) -> Iterator[str]:
     threading.Thread(target=run, daemon=True).start()
     with listener:
         yield f"http://127.0.0.1:{listener.getsockname()[1]}"
+
+
+def test_lists_have_filters_and_several_landmarks_are_made_at_once(server: Server) -> None:
+    with server.maps() as maps:
+        maps.create_map("several")
+        place = Place(1.0, 0.0, 1.5, 0.0)
+        new = [NewLandmark("door-1", place=place), NewLandmark("door-2"), NewLandmark("sign")]
+        assert maps.add_landmarks("several", new) == 3
+        with pytest.raises(Refused) as refused:
+            maps.add_landmarks("several", [NewLandmark("new"), NewLandmark("sign")])
+        assert (refused.value.code, refused.value.field) == ("exists", "landmarks[1].name")
+
+        def names(found: tuple[Landmark, ...]) -> list[str]:
+            return [landmark.name for landmark in found]
+
+        assert names(maps.find_landmarks("several", name="door", has_place=False)) == ["door-2"]
+        assert names(maps.find_landmarks("several", sort="-name")) == ["sign", "door-2", "door-1"]
+        assert names(maps.find_landmarks("several", status="active")) == []
+        assert [found.name for found in maps.find_maps(name="severa", sort="-changed")] == ["several"]
+        assert maps.find_robots(name="nobody-of-this-name") == ()
+        assert maps.jobs(map="several", state="queued") == ()
+        gone = [LandmarkDeletion("sign"), LandmarkDeletion("door-1", maps.landmark("several", "door-1").revision)]
+        assert maps.delete_landmarks("several", gone) == 2

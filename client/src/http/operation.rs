@@ -20,7 +20,8 @@ pub struct Operation {
 }
 
 /// Operations that create, and take a key.
-const CREATIONS: [&str; 8] = [
+const CREATIONS: [&str; 9] = [
+    "/maps/{map}/bulk/create-landmarks",
     "/maps",
     "/maps/{map}/landmarks",
     "/maps/{map}/landmarks/{landmark}/views",

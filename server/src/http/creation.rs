@@ -35,6 +35,7 @@ type LargestBody = fn(&Limits) -> usize;
 pub(super) const CREATIONS: &[(&str, LargestBody)] = &[
     ("/maps", json),
     ("/maps/{map}/landmarks", json),
+    ("/maps/{map}/bulk/create-landmarks", json),
     ("/maps/{map}/landmarks/{landmark}/views", |limits| limits.upload_bytes + FORM_OVERHEAD),
     ("/maps/{map}/landmarks/{landmark}/learn", json),
     ("/maps/{map}/learn", json),

@@ -135,6 +135,12 @@ impl From<StoreError> for ApiError {
                 Self::new(StatusCode::INTERNAL_SERVER_ERROR, "not_published", detail)
                     .with("may_be_done", Value::Bool(true))
             }
+            StoreError::At { index, source } => {
+                let error = Self::from(*source);
+                let field = error.field.as_deref().unwrap_or("name").to_owned();
+                let field = if field == "landmark" { "name".to_owned() } else { field };
+                error.field(format!("landmarks[{index}].{field}"))
+            }
             StoreError::ChangedMeanwhile { present } => {
                 let status = StatusCode::PRECONDITION_FAILED;
                 let error = Self::new(status, "changed_meanwhile", detail).field("if-match");

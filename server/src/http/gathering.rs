@@ -125,10 +125,11 @@ async fn list(
     PathParams(map): PathParams<String>,
     QueryParams(query): QueryParams<PageQuery>,
 ) -> Result<Json<Page<Gathering>>, ApiError> {
-    let (limit, after) = (page_limit(&query, app.config.limits.page)?, after_number(&query)?);
+    let (limit, after) = (page_limit(query.limit, app.config.limits.page)?, after_number(&query)?);
     let map = maps::get(app.store.reads(), &map).await?;
     let rows = gatherings::page(app.store.reads(), map.id, after, limit + 1).await?;
-    Ok(Json(page(rows, limit, |r| r.id.to_string(), |r| gathering_shown(&app, r))))
+    let total = gatherings::count(app.store.reads(), map.id).await?;
+    Ok(Json(page(rows, limit, total, |r| r.id.to_string(), |r| gathering_shown(&app, r))))
 }
 
 /// One gathering.

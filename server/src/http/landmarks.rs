@@ -2,9 +2,9 @@
 
 use super::{
     App, AppState,
-    answers::{created, page},
+    answers::{Listed, created, page, selected},
     error::{ApiError, out_of_range},
-    extract::{Body, PathParams, QueryParams, after_name, name, page_limit},
+    extract::{Body, PathParams, QueryParams, name, page_limit},
     revision::{IfMatch, Revised},
 };
 use crate::{
@@ -24,8 +24,8 @@ use map::{
 };
 use nalgebra::Vector3;
 use protos::api::{
-    FailedGate, Landmark, LandmarkHealthBody, LandmarkModelBody, LandmarkPatch, LandmarkStatus,
-    LookAlikeBody, NewLandmark, Page, PageQuery, Place, PlaceSigma, Problem, Size,
+    FailedGate, Landmark, LandmarkHealthBody, LandmarkModelBody, LandmarkPatch, LandmarkQuery,
+    LandmarkStatus, ListOrder, ListQuery, LookAlikeBody, NewLandmark, Page, Place, PlaceSigma, Problem, Size,
 };
 use serde_json::{Map, Value, json};
 use utoipa_axum::{router::OpenApiRouter, routes};
@@ -36,7 +36,7 @@ pub(super) fn router() -> OpenApiRouter<AppState> {
 }
 
 /// Size and place, checked. Either may be missing.
-fn geometry(size: Option<Size>, place: Option<Place>) -> Result<LandmarkGeometry, ApiError> {
+pub(super) fn geometry(size: Option<Size>, place: Option<Place>) -> Result<LandmarkGeometry, ApiError> {
     let size = size.map(|s| LandmarkSize { width_m: s.width_m, height_m: s.height_m });
     // A place is checked with some size, a size at some place: each has its own ranges.
     let stand_in = LandmarkSize { width_m: 1.0, height_m: 1.0 };
@@ -215,19 +215,45 @@ async fn create(
     created(shown, write).await
 }
 
-/// Lists the landmarks of a map by name.
-#[utoipa::path(get, path = "/maps/{map}/landmarks", tag = "landmarks", params(("map" = String, Path), PageQuery),
-    responses((status = 200, body = Page<Landmark>), (status = 404, body = Problem)))]
+impl Listed for LandmarkRow {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn changed_ms(&self) -> Option<i64> {
+        Some(self.changed_ms)
+    }
+}
+
+/// Lists the landmarks of a map.
+#[utoipa::path(get, path = "/maps/{map}/landmarks", tag = "landmarks", params(("map" = String, Path), LandmarkQuery),
+    responses((status = 200, body = Page<Landmark>), (status = 404, body = Problem),
+    (status = 422, body = Problem, description = "out_of_range, invalid_value")))]
 async fn list(
     State(app): State<AppState>,
     PathParams(map): PathParams<String>,
-    QueryParams(query): QueryParams<PageQuery>,
+    QueryParams(query): QueryParams<LandmarkQuery>,
 ) -> Result<Json<Page<Landmark>>, ApiError> {
-    let limit = page_limit(&query, app.config.limits.page)?;
+    let limits = &app.config.limits;
     let map = maps::get(app.store.reads(), &map).await?;
-    let rows = landmarks::page(app.store.reads(), map.id, &after_name(&query), limit + 1).await?;
     let learning = app.jobs.learning(&map.name).await?;
-    Ok(Json(page(rows, limit, |r| r.name.clone(), |r| shown(&app, &learning, &map.name, r))))
+    let shown = |row| shown(&app, &learning, &map.name, row);
+    let LandmarkQuery { limit, cursor, name, sort, status, health, has_place } = query;
+    let is_whole = status.is_none() && health.is_none() && has_place.is_none();
+    if is_whole && name.is_none() && sort.unwrap_or_default() == ListOrder::Name {
+        let limit = page_limit(limit, limits.page)?;
+        let after = cursor.unwrap_or_default();
+        let rows = landmarks::page(app.store.reads(), map.id, &after, limit + 1).await?;
+        return Ok(Json(page(rows, limit, map.landmarks, |r| r.name.clone(), shown)));
+    }
+    let mut rows = landmarks::page(app.store.reads(), map.id, "", limits.landmarks).await?;
+    rows.retain(|row| {
+        has_place.is_none_or(|wanted| row.geometry.place.is_some() == wanted)
+            && health.is_none_or(|wanted| health_shown(row.health) == wanted)
+            && status.is_none_or(|wanted| shown(row.clone()).status == wanted)
+    });
+    let Page { items, next, total } = selected(rows, &ListQuery { limit, cursor, name, sort }, limits.page)?;
+    Ok(Json(Page { items: items.into_iter().map(shown).collect(), next, total }))
 }
 
 /// One landmark.

@@ -2,13 +2,17 @@
 
 use super::{
     AppState,
-    answers::created,
+    answers::{created, page},
     error::ApiError,
-    extract::{Body, PathParams},
+    extract::{Body, PathParams, QueryParams, number_cursor, page_limit},
 };
 use crate::{
     jobs::{JobProgress, request},
-    store::{StoreError, jobs::JobRow, landmarks, maps},
+    store::{
+        StoreError,
+        jobs::{JobFilter, JobRow},
+        landmarks, maps,
+    },
 };
 use axum::{
     Json,
@@ -20,7 +24,7 @@ use axum::{
     },
 };
 use futures::{Stream, StreamExt, stream};
-use protos::api::{Job, JobState, LandmarkLesson, MapLesson, Problem};
+use protos::api::{Job, JobQuery, JobState, LandmarkLesson, MapLesson, Page, Problem};
 use std::convert::Infallible;
 use tokio_stream::wrappers::WatchStream;
 use utoipa_axum::{router::OpenApiRouter, routes};
@@ -29,6 +33,7 @@ pub(super) fn router() -> OpenApiRouter<AppState> {
     OpenApiRouter::new()
         .routes(routes!(learn_one))
         .routes(routes!(learn_map))
+        .routes(routes!(list))
         .routes(routes!(get, cancel))
         .routes(routes!(events))
 }
@@ -131,6 +136,21 @@ async fn submit(
 async fn read(app: &AppState, id: i64) -> Result<Job, StoreError> {
     let (row, progress) = app.jobs.get(id).await?;
     Ok(job_shown(row, progress.as_ref()))
+}
+
+/// Lists jobs, newest first: those that wait or run, and the last that have ended.
+#[utoipa::path(get, path = "/jobs", tag = "lessons", params(JobQuery),
+    responses((status = 200, body = Page<Job>), (status = 422, body = Problem, description = "out_of_range, invalid_value")))]
+async fn list(
+    State(app): State<AppState>,
+    QueryParams(query): QueryParams<JobQuery>,
+) -> Result<Json<Page<Job>>, ApiError> {
+    let limit = page_limit(query.limit, app.config.limits.page)?;
+    // Every number is less than that of the first page.
+    let before = number_cursor(query.cursor.as_deref())?.unwrap_or(i64::MAX);
+    let filter = JobFilter { state: query.state.map(JobState::as_str), map: query.map };
+    let (jobs, total) = app.jobs.page(&filter, before, limit + 1).await?;
+    Ok(Json(page(jobs, limit, total, |(row, _)| row.id.to_string(), |(row, p)| job_shown(row, p.as_ref()))))
 }
 
 /// One job.

@@ -2,9 +2,9 @@
 
 use super::{
     AppState,
-    answers::{created, page, row_major},
+    answers::{Listed, created, row_major, selected},
     error::{ApiError, out_of_range},
-    extract::{Body, PathParams, QueryParams, after_name, name, page_limit},
+    extract::{Body, PathParams, QueryParams, name},
     revision::{IfMatch, Revised},
 };
 use crate::store::{
@@ -20,7 +20,7 @@ use map::{
 };
 use nalgebra::{Matrix3, Vector3};
 use protos::api::{
-    Map, MapPatch, NewMap, Page, PageQuery, Parent, Problem, TransformQuery, TransformResponse,
+    ListQuery, Map, MapPatch, NewMap, Page, Parent, Problem, TransformQuery, TransformResponse,
     TransformedPose,
 };
 use utoipa_axum::{router::OpenApiRouter, routes};
@@ -120,25 +120,32 @@ async fn create(
     created(shown, async { write.await.map_err(|e| unknown_parent(e.into())) }).await
 }
 
-/// Lists maps by name.
-#[utoipa::path(get, path = "/maps", tag = "maps", params(PageQuery), responses((status = 200, body = Page<Map>)))]
+impl Listed for MapRow {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn changed_ms(&self) -> Option<i64> {
+        Some(self.changed_ms)
+    }
+}
+
+/// Lists maps.
+#[utoipa::path(get, path = "/maps", tag = "maps", params(ListQuery), responses((status = 200, body = Page<Map>),
+    (status = 422, body = Problem, description = "out_of_range, invalid_value")))]
 async fn list(
     State(app): State<AppState>,
-    QueryParams(query): QueryParams<PageQuery>,
+    QueryParams(query): QueryParams<ListQuery>,
 ) -> Result<Json<Page<Map>>, ApiError> {
-    let limit = page_limit(&query, app.config.limits.page)?;
-    let rows = maps::page(app.store.reads(), &after_name(&query), limit + 1).await?;
-    let known = map_locations::all(app.store.reads()).await?;
-    let found = |name: &str| known.get(name).cloned().unwrap_or_default();
-    Ok(Json(page(
-        rows,
-        limit,
-        |r| r.name.clone(),
-        |r| {
-            let found = found(&r.name);
-            map_shown(r, found)
-        },
-    )))
+    let limits = &app.config.limits;
+    let rows = maps::page(app.store.reads(), "", limits.maps).await?;
+    let mut known = map_locations::all(app.store.reads()).await?;
+    let Page { items, next, total } = selected(rows, &query, limits.page)?;
+    let shown = |row: MapRow| {
+        let found = known.remove(&row.name).unwrap_or_default();
+        map_shown(row, found)
+    };
+    Ok(Json(Page { items: items.into_iter().map(shown).collect(), next, total }))
 }
 
 /// One map.

@@ -177,7 +177,7 @@ async fn reference(
     let (on, way_m, cells) = (lent.recording.map.clone(), learnt.way_m, learnt.cells);
     let write = app.store.write(move |tx| {
         Box::pin(async move {
-            let row = modality_stats::add(tx, &on, &whose, way_m, cells).await?;
+            let row = modality_stats::add(tx, &on, &whose, way_m, &cells).await?;
             tx.after(move || lent.finish());
             Ok(row)
         })

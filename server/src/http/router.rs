@@ -1,9 +1,10 @@
 //! Every route, with the layers around them and the OpenAPI document made from them.
 
 use super::{
-    API, App, AppState, cameras, creation, documented, error::ApiError, examples::with_examples, gathering,
-    guard, health, landmarks, learning, live, mapping, maps, modalities, pages, recognise, reference_runs,
-    relocalisation, revision, robots, ros2, underlay, views, visibility, visibility_settings, walls,
+    API, App, AppState, bulk, cameras, creation, documented, error::ApiError, examples::with_examples,
+    gathering, guard, health, landmarks, learning, live, mapping, maps, modalities, pages, recognise,
+    reference_runs, relocalisation, revision, robots, ros2, underlay, views, visibility, visibility_settings,
+    walls,
 };
 use crate::config::Limits;
 use axum::{
@@ -21,11 +22,14 @@ use utoipa_axum::router::OpenApiRouter;
 use utoipa_swagger_ui::SwaggerUi;
 
 #[derive(OpenApi)]
-#[openapi(info(
-    title = "Waymark",
-    description = "Maps, landmarks, lessons and robots. Errors are application/problem+json with a stable `code` and \
+#[openapi(
+    components(schemas(protos::api::ListOrder)),
+    info(
+        title = "Waymark",
+        description = "Maps, landmarks, lessons and robots. Errors are application/problem+json with a stable `code` and \
                    the `field` at fault; lists come in pages."
-))]
+    )
+)]
 struct Document;
 
 fn api(limits: &Limits) -> OpenApiRouter<AppState> {
@@ -35,6 +39,7 @@ fn api(limits: &Limits) -> OpenApiRouter<AppState> {
         .merge(underlay::router(limits.upload_bytes))
         .merge(mapping::router())
         .merge(landmarks::router())
+        .merge(bulk::router())
         .merge(views::router(limits.upload_bytes))
         .merge(learning::router())
         .merge(gathering::router())

@@ -2,6 +2,7 @@
 
 mod creation;
 mod earlier_build;
+mod lists;
 mod openapi;
 mod revision;
 mod teaching;

@@ -267,12 +267,12 @@ async fn list(
     PathParams((map, landmark)): PathParams<(String, String)>,
     QueryParams(query): QueryParams<PageQuery>,
 ) -> Result<Json<Page<TrainingView>>, ApiError> {
-    let limit = page_limit(&query, app.config.limits.page)?;
+    let limit = page_limit(query.limit, app.config.limits.page)?;
     let after = after_number(&query)?;
     maps::get(app.store.reads(), &map).await?;
     let landmark = landmarks::get(app.store.reads(), &map, &landmark).await?;
     let rows = views::page(app.store.reads(), landmark.id, after, limit + 1).await?;
-    Ok(Json(page(rows, limit, |r| r.id.to_string(), view_shown)))
+    Ok(Json(page(rows, limit, landmark.views, |r| r.id.to_string(), view_shown)))
 }
 
 /// Deletes a view. The model stays until the landmark is learnt again.

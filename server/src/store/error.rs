@@ -40,6 +40,14 @@ pub(crate) enum StoreError {
         /// The size that was given.
         given: LandmarkSize,
     },
+    /// One of several did not go, so none did.
+    #[error("{source}")]
+    At {
+        /// Which one.
+        index: usize,
+        /// Why.
+        source: Box<StoreError>,
+    },
     /// Something else rests on it.
     #[error("{0}")]
     InUse(String),
@@ -145,7 +153,13 @@ impl StoreError {
                 matches!(primary_code(source), Some(SQLITE_IOERR | SQLITE_CORRUPT | SQLITE_NOTADB))
                     || matches!(source, sqlx::Error::Io(_) | sqlx::Error::WorkerCrashed)
             }
+            Self::At { source, .. } => source.is_fatal(),
             _ => false,
         }
+    }
+
+    /// That of one of several.
+    pub(crate) fn at(self, index: usize) -> Self {
+        Self::At { index, source: Box::new(self) }
     }
 }

@@ -13,7 +13,7 @@ use vision::{model::LandmarkId, pose::LandmarkSize};
 macro_rules! select {
     ($tail:literal) => {
         concat!(
-            "SELECT l.id, l.name, l.id || '.' || l.revision AS revision, l.width_m, l.height_m, l.x_m, l.y_m, l.z_m, l.theta_rad, \
+            "SELECT l.id, l.name, l.id || '.' || l.revision AS revision, l.changed_ms, l.width_m, l.height_m, l.x_m, l.y_m, l.z_m, l.theta_rad, \
              l.roll_rad, l.tilt_rad, l.place_covariance, l.size_from_views, l.health, l.finding, \
              (SELECT count(*) FROM views v WHERE v.landmark_id = l.id) AS views, \
              m.active, m.looks_like, m.reasons, m.facts, m.views AS model_views, m.generated_views, m.learnt_ms \
@@ -96,6 +96,8 @@ pub(crate) struct LandmarkRow {
     pub(crate) name: String,
     /// See [`super::revisions`].
     pub(crate) revision: String,
+    /// When the revision changed last.
+    pub(crate) changed_ms: i64,
     pub(crate) geometry: LandmarkGeometry,
     pub(crate) views: u64,
     pub(crate) model: Option<ModelSummary>,
@@ -192,6 +194,7 @@ fn landmark_row(row: &SqliteRow) -> Result<LandmarkRow, sqlx::Error> {
         id: row.try_get("id")?,
         name: row.try_get("name")?,
         revision: row.try_get("revision")?,
+        changed_ms: row.try_get("changed_ms")?,
         geometry: geometry(row)?,
         views: row.try_get::<i64, _>("views")? as u64,
         model,

@@ -58,6 +58,9 @@ OPERATIONS: dict[str, tuple[str, str]] = {
     "health": ("GET", "/healthz"),
     "readiness": ("GET", "/readyz"),
     "version": ("GET", "/version"),
+    "add_landmarks": ("POST", "/maps/{map}/bulk/create-landmarks"),
+    "delete_landmarks": ("POST", "/maps/{map}/bulk/delete-landmarks"),
+    "jobs": ("GET", "/jobs"),
     "add_landmark": ("POST", "/maps/{map}/landmarks"),
     "landmarks": ("GET", "/maps/{map}/landmarks"),
     "landmark": ("GET", "/maps/{map}/landmarks/{landmark}"),
@@ -120,6 +123,7 @@ CREATIONS = frozenset(
     {
         "create_map",
         "add_landmark",
+        "add_landmarks",
         "upload_view",
         "learn",
         "learn_landmark",
@@ -211,6 +215,12 @@ def pause_of(call: str, answer: httpx.Response | httpx.HTTPError) -> float | Non
         return min(float(seconds), MAX_PAUSE_S) if seconds.isdigit() else PAUSE_S
     is_final = isinstance(answer, httpx.TimeoutException | httpx.ConnectError | httpx.UnsupportedProtocol)
     return None if is_final else PAUSE_S
+
+
+def query_of(query: dict[str, Any]) -> dict[str, str]:
+    """A query as it is sent; what is `None` is left out."""
+    words = {True: "true", False: "false"}
+    return {name: words.get(value, str(value)) for name, value in query.items() if value is not None}
 
 
 def refusal(response: httpx.Response) -> Refused:

@@ -18,6 +18,7 @@ from waymark._http import (
     parsed,
     parsed_items,
     pause_of,
+    query_of,
     refusal,
     request_of,
     revision_of,
@@ -104,12 +105,13 @@ class AsyncBase:
     async def _bytes(self, call: str, *at: str | int) -> bytes:
         return (await self._checked(call, at)).content
 
-    async def _all(self, kind: type[T], call: str, *at: str | int) -> tuple[T, ...]:
-        """Every page of a list."""
+    async def _all(self, kind: type[T], call: str, *at: str | int, **query: Any) -> tuple[T, ...]:
+        """Every page of a list. What is `None` in the query is left out."""
+        params = query_of(query)
         items: list[T] = []
         cursor: str | None = None
         while True:
-            response = await self._checked(call, at, params={"cursor": cursor} if cursor else None)
+            response = await self._checked(call, at, params=params | ({"cursor": cursor} if cursor else {}))
             page = parsed(_Page, response)
             items.extend(parsed_items(kind, page.items, response))
             if page.next is None:

@@ -14,6 +14,7 @@ from waymark.api import (
     Health,
     LiveEvent,
     Map,
+    Order,
     Parent,
     PoseBody,
     Readiness,
@@ -72,6 +73,10 @@ class AsyncMaps(AsyncBase):
     async def maps(self) -> tuple[Map, ...]:
         """All maps, by name."""
         return await self._all(Map, "maps")
+
+    async def find_maps(self, *, name: str | None = None, sort: Order = "name") -> tuple[Map, ...]:
+        """The maps with this part of the name."""
+        return await self._all(Map, "maps", name=name, sort=sort)
 
     async def map(self, map: str) -> Map:
         """One map."""

@@ -22,6 +22,7 @@ from waymark.api import (
     Gathering,
     MappingProgressBody,
     ModalityMapBody,
+    Order,
     RecordingStatusBody,
     ReferenceRunBody,
     RelocalisationStatus,
@@ -60,6 +61,10 @@ class AsyncRobots(AsyncBase):
     async def robots(self) -> tuple[Robot, ...]:
         """All robots, by name."""
         return await self._all(Robot, "robots")
+
+    async def find_robots(self, *, name: str | None = None, sort: Order = "name") -> tuple[Robot, ...]:
+        """The robots with this part of the name."""
+        return await self._all(Robot, "robots", name=name, sort=sort)
 
     async def robot(self, robot: str) -> Robot:
         """One robot: whether it is connected, its pose, and whether a second program uses its name."""

@@ -15,6 +15,7 @@ from waymark.api import (
     Health,
     LiveEvent,
     Map,
+    Order,
     Parent,
     PoseBody,
     Readiness,
@@ -73,6 +74,10 @@ class Maps(Base):
     def maps(self) -> tuple[Map, ...]:
         """All maps, by name."""
         return self._all(Map, "maps")
+
+    def find_maps(self, *, name: str | None = None, sort: Order = "name") -> tuple[Map, ...]:
+        """The maps with this part of the name."""
+        return self._all(Map, "maps", name=name, sort=sort)
 
     def map(self, map: str) -> Map:
         """One map."""

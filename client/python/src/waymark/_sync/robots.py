@@ -23,6 +23,7 @@ from waymark.api import (
     Gathering,
     MappingProgressBody,
     ModalityMapBody,
+    Order,
     RecordingStatusBody,
     ReferenceRunBody,
     RelocalisationStatus,
@@ -61,6 +62,10 @@ class Robots(Base):
     def robots(self) -> tuple[Robot, ...]:
         """All robots, by name."""
         return self._all(Robot, "robots")
+
+    def find_robots(self, *, name: str | None = None, sort: Order = "name") -> tuple[Robot, ...]:
+        """The robots with this part of the name."""
+        return self._all(Robot, "robots", name=name, sort=sort)
 
     def robot(self, robot: str) -> Robot:
         """One robot: whether it is connected, its pose, and whether a second program uses its name."""

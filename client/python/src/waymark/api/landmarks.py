@@ -134,6 +134,30 @@ class Landmark:
 
 
 @dataclass(frozen=True, slots=True)
+class NewLandmark:
+    """A landmark to be made."""
+
+    name: str
+    size: Size | None = None
+    place: Place | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class LandmarkDeletion:
+    """A landmark to be deleted, if it still has this revision; without one, whatever is there."""
+
+    name: str
+    revision: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class BulkOutcome:
+    """Landmarks made or deleted."""
+
+    count: int
+
+
+@dataclass(frozen=True, slots=True)
 class PlacementReportBody:
     """Whether views place a landmark, how many, and why not."""
 

@@ -8,6 +8,8 @@ from typing import Any, Literal
 Distance = Literal["both", "correlation", "hausdorff"]
 JobState = Literal["queued", "running", "done", "failed", "cancelled"]
 Point2 = tuple[float, float]
+# Of a list: by name, or by the time of the last edit or lesson; `-` reverses it.
+Order = Literal["name", "-name", "changed", "-changed"]
 
 
 @dataclass(frozen=True, slots=True)
