@@ -4,14 +4,16 @@
 import { api } from "/session.js";
 
 const byId = (id) => document.getElementById(id);
-const known = { map: null, areas: null, changed: () => {} };
+// `tag`: the ETag of what is shown; a change is meant for that.
+const known = { map: null, areas: null, tag: null, changed: () => {} };
 
 const shown = () => document.querySelector("[data-layer=modalities]").checked;
 
 async function asked(path, options) {
   const answer = await api(path, { headers: { "content-type": "application/json" }, ...options });
   const body = await answer.json();
-  if (!answer.ok) throw new Error(body.detail ?? body.title);
+  if (!answer.ok) throw Object.assign(new Error(body.detail ?? body.title), { code: body.code });
+  known.tag = answer.headers.get("etag");
   return body;
 }
 
@@ -65,13 +67,22 @@ export function drawModalities(c, px, ink) {
   }
 }
 
+// Somebody else has changed what is shown.
+function faster() {
+  const again = Object.assign(document.createElement("button"), { type: "button", textContent: "Show what is there now" });
+  again.addEventListener("click", () => loadModalities(known.map, known.changed));
+  byId("modality-hint").replaceChildren("Not changed: somebody else was faster. ", again);
+}
+
 byId("fusion").addEventListener("change", async (event) => {
   const body = JSON.stringify({ fusion_mode: event.target.value });
+  const headers = { "content-type": "application/json", "if-match": known.tag ?? "*" };
   try {
-    known.areas = await asked(`/maps/${encodeURIComponent(known.map)}/modalities`, { method: "PUT", body });
+    known.areas = await asked(`/maps/${encodeURIComponent(known.map)}/modalities`, { method: "PUT", headers, body });
     tell();
   } catch (error) {
     byId("modality-hint").textContent = `Not changed: ${error.message}.`;
+    if (error.code === "changed_meanwhile") faster();
   }
   known.changed();
 });

@@ -16,13 +16,23 @@ const VISIBILITY = [["width_px", "image width", "px", 1], ["height_px", "image h
   ["max_incidence_rad", "most oblique view", "°", DEG], ["min_side_px", "shortest side seen", "px", 1],
   ["max_fill", "largest share of the image", "%", 0.01], ["standoff_m", "landmark before its wall", "cm", 0.01]];
 let map = null;
+// By path: the ETag of what its form shows. A change is meant for that.
+const seen = {};
+// By what was read: its ETag.
+const tags = new WeakMap();
+// Where the map lies, as the form shows it.
+let shownPlace = null;
+const placeOf = (found) => JSON.stringify([found.name, found.site, found.building, found.floor, found.parent]);
 
 async function ask(method, path, body) {
   const options = { method, headers: { accept: "application/json" } };
   if (body !== undefined) Object.assign(options, { body: JSON.stringify(body), headers: { ...options.headers, "content-type": "application/json" } });
+  if (method !== "GET") options.headers["if-match"] = seen[path] ?? "*";
   const answer = await api(path, options);
   const found = await answer.json().catch(() => ({}));
-  if (!answer.ok) throw Object.assign(new Error(found.detail ?? `${answer.status}`), { field: found.field });
+  if (!answer.ok) throw Object.assign(new Error(found.detail ?? `${answer.status}`), { field: found.field, code: found.code });
+  tags.set(found, answer.headers.get("etag"));
+  if (method !== "GET") seen[path] = tags.get(found);
   return found;
 }
 
@@ -86,10 +96,18 @@ async function send(form, fields, work) {
     form.querySelector("[role=status]").textContent = "Saved.";
     window.dispatchEvent(new CustomEvent("maps-changed"));
   } catch (error) {
+    if (error.code === "changed_meanwhile") return faster(form);
     const name = (error.field ?? "").replace(/^parent\./, "");
     const of = fields.find(([n]) => n === name);
     refuse(form, name === "map" ? "parent" : name, inUnit(error.message, of?.[2]));
   } finally { button.disabled = false; }
+}
+
+// Somebody else has changed what this form shows.
+function faster(form) {
+  const again = Object.assign(document.createElement("button"), { type: "button", textContent: "Show what is there now" });
+  again.addEventListener("click", () => { clean(form); load(map, true).catch((error) => refuse(form, "", error.message)); });
+  form.querySelector("[role=status]").replaceChildren("Not saved: somebody else was faster. ", again);
 }
 
 function saveWhere(event) {
@@ -103,7 +121,7 @@ function saveWhere(event) {
     if (missing) throw Object.assign(new Error("needed with another map"), { field: missing[0] });
     const kept = parent && form.dataset.parent === parent && form.dataset.covariance ? { covariance: JSON.parse(form.dataset.covariance) } : {};
     changes.parent = parent ? { map: parent, ...link, ...kept } : null;
-    await ask("PATCH", place(), changes);
+    shownPlace = placeOf(await ask("PATCH", place(), changes));
   });
 }
 
@@ -117,13 +135,18 @@ function toggleLink(form) {
   for (const [name] of LINK) form.elements[name].disabled = !form.elements.parent.value;
 }
 
-async function load(name) {
+async function load(name, isWanted = false) {
   map = name;
   const [found, settings, maps] = await Promise.all([ask("GET", place()), ask("GET", `${place()}/visibility-settings`), ask("GET", "/maps?limit=500")]);
   if (map !== name) return;
   const form = byId("where-form");
+  // Others may have changed what is in the map; the form still shows where it lies.
+  if (shownPlace === placeOf(found)) seen[place()] = tags.get(found);
   // What somebody is typing stays.
-  if (form.contains(document.activeElement) || byId("visibility-form").contains(document.activeElement)) return;
+  if (!isWanted && (form.contains(document.activeElement) || byId("visibility-form").contains(document.activeElement))) return;
+  shownPlace = placeOf(found);
+  seen[place()] = tags.get(found);
+  seen[`${place()}/visibility-settings`] = tags.get(settings);
   for (const [word] of WORDS) form.elements[word].value = found[word] ?? "";
   const others = maps.items.filter((m) => m.name !== name).map((m) => new Option([m.building, m.floor, m.name].filter(Boolean).join(" / "), m.name));
   form.elements.parent.replaceChildren(new Option("none: it stands for itself", ""), ...others);

@@ -57,6 +57,8 @@ pub(crate) async fn explained(failure: Failure, maps: Option<&MapClient>, map: O
         "unknown_camera" => failure.advised("waymark camera list ROBOT shows the cameras."),
         "not_recording" => failure.advised("Begin a recording: waymark run start ROBOT"),
         "exists" => failure.advised("Choose another name, or delete the other one first."),
+        "changed_meanwhile" => failure.advised("Look at it again, then repeat the command if it still fits."),
+        "in_progress" => failure.advised("The same request is at work: wait, then repeat it."),
         "timeout" | "not_published" => {
             failure.advised("It may have been done all the same: look before you try again.")
         }

@@ -2,9 +2,10 @@
 
 use super::{
     failure::{Class, Failure},
-    session::ServerArgs,
+    screen::Table,
+    session::{ServerArgs, Session},
 };
-use client::api::{Job, JobState};
+use client::api::{Job, JobQuery, JobState};
 
 /// `waymark job`.
 #[derive(Debug, clap::Args)]
@@ -17,6 +18,18 @@ pub(crate) struct Args {
 
 #[derive(Debug, clap::Subcommand)]
 enum Verb {
+    /// List jobs, newest first: those that wait or run, and the last that have ended.
+    List {
+        /// Only those that stand so.
+        #[arg(long, value_enum)]
+        state: Option<StateWord>,
+        /// Only those of this map.
+        #[arg(long, value_name = "MAP")]
+        map: Option<String>,
+        /// Most jobs that are listed.
+        #[arg(long, default_value_t = 50, value_parser = clap::value_parser!(u16).range(1..=500))]
+        limit: u16,
+    },
     /// Show a job as it stands.
     Show {
         /// Number of the job.
@@ -34,11 +47,59 @@ enum Verb {
     },
 }
 
+/// Where a job stands, as it is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum StateWord {
+    Queued,
+    Running,
+    Done,
+    Failed,
+    Cancelled,
+}
+
+impl From<StateWord> for JobState {
+    fn from(word: StateWord) -> Self {
+        match word {
+            StateWord::Queued => Self::Queued,
+            StateWord::Running => Self::Running,
+            StateWord::Done => Self::Done,
+            StateWord::Failed => Self::Failed,
+            StateWord::Cancelled => Self::Cancelled,
+        }
+    }
+}
+
+async fn list(session: &Session, query: &JobQuery) -> anyhow::Result<()> {
+    let page = session.maps().jobs(query).await?;
+    let table = |all: &[Job]| {
+        Table::of(["job", "what", "map", "state", "done", "message"], all, |job| {
+            let done = format!("{:.0} %", 100.0 * job.progress);
+            let state = job.state.as_str().to_owned();
+            [job.id.to_string(), job.kind.clone(), job.map.clone(), state, done, job.message.clone()]
+        })
+    };
+    session.list(&page.items, table, "There is no such job.")?;
+    let more = page.total.saturating_sub(page.items.len() as u64);
+    if page.next.is_some() {
+        session.note(&format!("  {more} more: --limit, --state or --map"));
+    }
+    Ok(())
+}
+
 /// Runs the command.
 pub(crate) async fn run(args: &Args) -> anyhow::Result<()> {
     let session = args.server.session()?;
     let maps = session.maps();
     let done = match &args.verb {
+        Verb::List { state, map, limit } => {
+            let query = JobQuery {
+                limit: Some(usize::from(*limit)),
+                cursor: None,
+                state: state.map(JobState::from),
+                map: map.clone(),
+            };
+            return session.explained(list(&session, &query).await).await;
+        }
         Verb::Show { job } => maps.job(*job).await,
         Verb::Cancel { job } => maps.cancel_job(*job).await,
         Verb::Wait { job } => match maps.job(*job).await {

@@ -163,6 +163,8 @@ pub struct Limits {
     pub jobs: usize,
     /// Finished jobs that are retained.
     pub jobs_kept: usize,
+    /// Answers to creations that are kept for repeats, for a day at most; the oldest go.
+    pub kept_answers: usize,
 }
 
 impl Default for Limits {
@@ -191,13 +193,14 @@ impl Default for Limits {
             write_queue: 256,
             jobs: 64,
             jobs_kept: 1_000,
+            kept_answers: 10_000,
         }
     }
 }
 
 impl Limits {
     /// Name and value of every bound that must not be 0.
-    fn counts(&self) -> [(&'static str, usize); 21] {
+    fn counts(&self) -> [(&'static str, usize); 22] {
         [
             ("limits.frame_bytes", self.frame_bytes),
             ("limits.frame_pixels", self.frame_pixels),
@@ -220,6 +223,7 @@ impl Limits {
             ("limits.page", self.page),
             ("limits.write_queue", self.write_queue),
             ("limits.jobs", self.jobs),
+            ("limits.kept_answers", self.kept_answers),
         ]
     }
 

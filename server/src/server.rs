@@ -4,13 +4,13 @@ use crate::{
     backup::Backups,
     bus::{Bus, BusError, Receivers},
     config::Config,
-    gather::{self, Gatherer, GatheringTap},
+    gather::{self, Gatherer, GatheringTap, OfferedFrame},
     http::{self, App, Services},
     identity::{Sessions, TokenId, local_token::LocalToken},
     jobs::Jobs,
     publication::{Catalogue, CatalogueTasks},
     ros2::Ros2,
-    store::{OpenError, landmarks, pictures},
+    store::{OpenError, StoreError, landmarks, pictures},
 };
 use engine::{
     decode::ImageLimits,
@@ -23,6 +23,7 @@ use engine::{
     vitals::{Failure, Pulse, Vitals},
     workers::{Engine, Workers},
 };
+use protos::Name;
 use std::{
     net::{IpAddr, Ipv4Addr, SocketAddr},
     path::Path,
@@ -127,21 +128,12 @@ impl Server {
         let sessions = Arc::<Sessions>::default();
         let (stop, stopping) = watch::channel(false);
         let (snapshots, vitals) = (store.snapshots().clone(), store.vitals().clone());
-        let (jobs, jobs_task) = Jobs::start(store.clone(), config.clone(), stopping.clone())
-            .await
-            .map_err(|e| StartError::Store(e.to_string()))?;
-        if config.params.recognise.verdict.points {
-            jobs.renew().await.map_err(|e| StartError::Store(e.to_string()))?;
-        }
-        let (findings, found) = findings();
         let (tap, offered) = gather::gathering_tap();
-        let (gatherer, gather) = Gatherer::start(store.clone(), &config, &tap, offered)
-            .await
-            .map_err(|e| StartError::Store(e.to_string()))?;
+        let teaching = Teaching::start(&config, &store, (&tap, offered), &stopping).await?;
+        let (findings, found) = findings();
         let engine = engine(&config, snapshots.clone(), vitals.clone(), (findings, tap));
-        let is_on = |map: &protos::Name, robot: &protos::Name| {
-            snapshots.robot_map(robot.as_str()).is_some_and(|on| on == map.as_str())
-        };
+        let is_on =
+            |map: &Name, robot: &Name| snapshots.robot_map(robot.as_str()).as_deref() == Some(map.as_str());
         engine.motion.mappings().count_in(vitals.panics().clone());
         engine.motion.mappings().resume_in(config.data.join("mapping"), is_on);
         let pulse = vitals.begin("the task that stores findings");
@@ -158,28 +150,23 @@ impl Server {
         let zenoh_endpoint = bus.endpoint().to_owned();
         let (backups, backups_task) = Backups::start(&config, vitals.panics().clone(), stopping.clone());
         let services = Services {
-            jobs,
-            gatherer,
+            jobs: teaching.jobs,
+            gatherer: teaching.gatherer,
             ros2: ros2.clone(),
             sessions: sessions.clone(),
             backups,
             local_token_file: Some(local_token.path().to_owned()),
         };
         let app = App::new(config.clone(), store, services, &engine, stopping.clone());
-        let pulse = vitals.begin("the HTTP listener");
-        let router = http::router(app);
-        let http = tokio::spawn(async move {
-            http::listen::serve(listener, router, config.limits.clone(), stopping).await;
-            drop(pulse);
-        });
+        let http = serve(listener, app, &config, vitals.begin("the HTTP listener"), stopping);
         let watch = tokio::spawn(vitals.clone().watch());
         let tasks = Tasks {
             workers,
             bus,
             http,
-            jobs: jobs_task,
+            jobs: teaching.jobs_task,
             findings,
-            gather,
+            gather: teaching.gather_task,
             pictures,
             backups: backups_task,
             writer,
@@ -199,6 +186,47 @@ impl Server {
             tasks,
         })
     }
+}
+
+/// What learns from photographs and drives.
+struct Teaching {
+    jobs: Arc<Jobs>,
+    jobs_task: JoinHandle<()>,
+    gatherer: Arc<Gatherer>,
+    gather_task: JoinHandle<()>,
+}
+
+impl Teaching {
+    async fn start(
+        config: &Arc<Config>,
+        store: &Catalogue,
+        (tap, offered): (&GatheringTap, Receiver<OfferedFrame>),
+        stopping: &watch::Receiver<bool>,
+    ) -> Result<Self, StartError> {
+        let failed = |e: StoreError| StartError::Store(e.to_string());
+        let started = Jobs::start(store.clone(), config.clone(), stopping.clone());
+        let (jobs, jobs_task) = started.await.map_err(failed)?;
+        if config.params.recognise.verdict.points {
+            jobs.renew().await.map_err(failed)?;
+        }
+        let started = Gatherer::start(store.clone(), config, tap, offered);
+        let (gatherer, gather_task) = started.await.map_err(failed)?;
+        Ok(Self { jobs, jobs_task, gatherer, gather_task })
+    }
+}
+
+fn serve(
+    listener: TcpListener,
+    app: App,
+    config: &Config,
+    pulse: Pulse,
+    stopping: watch::Receiver<bool>,
+) -> JoinHandle<()> {
+    let (router, limits) = (http::router(app), config.limits.clone());
+    tokio::spawn(async move {
+        http::listen::serve(listener, router, limits, stopping).await;
+        drop(pulse);
+    })
 }
 
 /// Everything between frames and answers, for one set of settings.

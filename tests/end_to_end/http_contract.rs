@@ -4,7 +4,7 @@
 use client::{LandmarkRegion, api::NewMap};
 use reqwest::{
     Client, Method, StatusCode,
-    header::CONTENT_TYPE,
+    header::{CONTENT_TYPE, IF_MATCH},
     multipart::{Form, Part},
 };
 use serde_json::{Value, json};
@@ -192,7 +192,7 @@ async fn invalid_requests_are_refused_and_change_nothing() {
     let before = inside.maps().map("hall").await.expect("map");
     for (method, path, body, status, code, field) in ROWS {
         let method = Method::from_bytes(method.as_bytes()).expect("a method");
-        let mut request = http.request(method.clone(), format!("{base}{path}"));
+        let mut request = http.request(method.clone(), format!("{base}{path}")).header(IF_MATCH, "*");
         if !body.is_empty() {
             request = request.header(CONTENT_TYPE, "application/json").body(*body);
         }
@@ -247,7 +247,8 @@ async fn limits_accept_their_bound_and_refuse_more() {
     let (inside, http, base) = prepared().await;
     let maps = inside.maps();
     let post = |path: &str, body: Value| http.post(format!("{base}{path}")).json(&body).send();
-    let put = |path: &str, body: Value| http.put(format!("{base}{path}")).json(&body).send();
+    let put =
+        |path: &str, body: Value| http.put(format!("{base}{path}")).header(IF_MATCH, "*").json(&body).send();
     let segments = |n: usize| json!({ "segments": vec![json!({ "a": [0, 0], "b": [1, 0] }); n] });
 
     for name in ["m2", "m3"] {

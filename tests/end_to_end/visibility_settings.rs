@@ -11,6 +11,7 @@ use tests::{Child, command::waymark};
 async fn call(server: &Child, method: Method, path: &str, body: Option<Value>) -> (StatusCode, Value) {
     let http = tests::http(&server.url).await;
     let request = http.request(method, format!("{}/api/v1/maps/hall{path}", server.url));
+    let request = request.header("if-match", "*");
     let request = match body {
         Some(body) => request.json(&body),
         None => request,

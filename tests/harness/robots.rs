@@ -32,10 +32,11 @@ pub fn jpeg(image: &GrayImage) -> Vec<u8> {
     out
 }
 
-/// A request to the server's interface: status and JSON.
+/// A request to the server's interface, that changes whatever is there: status and JSON.
 pub async fn call(inside: &Inside, method: Method, path: &str, body: Option<Value>) -> (StatusCode, Value) {
     let url = inside.url();
     let request = http(&url).await.request(method, format!("{url}/api/v1{path}"));
+    let request = request.header("if-match", "*");
     let request = match body {
         Some(body) => request.json(&body),
         None => request,

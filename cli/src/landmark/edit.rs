@@ -19,10 +19,11 @@ pub(super) async fn size(
     consent: Consent,
 ) -> anyhow::Result<()> {
     check_size(size, consent)?;
-    let before = session.maps().landmark(map, name).await?.size;
+    let before = session.maps().landmark(map, name).await?;
     let patch = LandmarkPatch { size: Some(Some(size)), ..LandmarkPatch::default() };
-    let landmark = session.maps().update_landmark(map, name, &patch).await?;
-    session.show(&landmark, &format!("{name}: size {} -> {}", size_text(before), size_text(landmark.size)))
+    let landmark = session.maps().if_match(&before.revision).update_landmark(map, name, &patch).await?;
+    let sizes = (size_text(before.size), size_text(landmark.size));
+    session.show(&landmark, &format!("{name}: size {} -> {}", sizes.0, sizes.1))
 }
 
 pub(super) async fn rename(session: &Session, map: &str, name: &str, new_name: &str) -> anyhow::Result<()> {
@@ -48,15 +49,18 @@ pub(super) async fn delete(
     names: &[String],
     consent: Consent,
 ) -> anyhow::Result<()> {
-    let mut views = 0;
+    let (mut views, mut revisions) = (0, Vec::new());
     for name in names {
-        views += session.maps().landmark(map, name).await?.views;
+        let landmark = session.maps().landmark(map, name).await?;
+        views += landmark.views;
+        revisions.push(landmark.revision);
     }
     let list = names.join(", ");
     consent
         .ask(&format!("Delete {list} with {}? This cannot be undone.", counted(views, "training view")))?;
-    for name in names {
-        session.maps().delete_landmark(map, name).await?;
+    // What was counted above is deleted, and nothing that came while the question was open.
+    for (name, revision) in names.iter().zip(&revisions) {
+        session.maps().if_match(revision).delete_landmark(map, name).await?;
     }
     session.show(&json!({ "deleted": names }), &format!("{list}: deleted"))
 }

@@ -27,8 +27,13 @@ pub(crate) struct Args {
 
 #[derive(Debug, clap::Subcommand)]
 enum Verb {
-    /// List the landmarks of a map: state, size, place, quality.
-    List,
+    /// List the landmarks of a map: state, size, place, quality
+    ///
+    /// For example, those that are not in use and have `door` in their names; those that were changed last:
+    ///   waymark landmark list --state inactive --name door
+    ///   waymark landmark list --sort=-changed
+    #[command(verbatim_doc_comment)]
+    List(show::ListArgs),
     /// Show a landmark: what it was learnt from, where it is, why it is not in use, what to do.
     Show {
         /// The landmark.
@@ -99,7 +104,7 @@ enum Verb {
 
 /// How far a landmark is trusted, as it is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum HealthWord {
+pub(super) enum HealthWord {
     Sound,
     Flagged,
     Quarantined,
@@ -121,7 +126,7 @@ pub(crate) async fn run(args: &Args) -> anyhow::Result<()> {
     let done = async {
         let map = session.map().await?;
         match &args.verb {
-            Verb::List => show::list(&session, map).await,
+            Verb::List(wanted) => show::list(&session, map, wanted).await,
             Verb::Show { landmark } => show::one(&session, map, landmark).await,
             Verb::Teach(teach) => teach::run(&session, map, teach).await,
             Verb::Place(place) => place::run(&session, map, place).await,

@@ -85,7 +85,7 @@ pub(super) async fn run(session: &Session, map: &str, args: &PlaceArgs) -> anyho
     } else {
         let place = if args.nowhere { None } else { Some(by_tape(session, map, args, &landmark).await?) };
         let patch = LandmarkPatch { place: Some(place), ..LandmarkPatch::default() };
-        session.maps().update_landmark(map, &args.landmark, &patch).await?
+        session.maps().if_match(&landmark.revision).update_landmark(map, &args.landmark, &patch).await?
     };
     session.show(&placed, &show::text(&placed))?;
     for line in show::next(&placed) {

@@ -1,14 +1,88 @@
 //! `waymark landmark list` and `show`.
 
-use super::reasons;
+use super::{HealthWord, reasons};
 use crate::{
     screen::{Table, counted},
     session::Session,
 };
-use client::api::{FindingBody, Landmark, LandmarkHealthBody, LandmarkStatus, Place, Size};
+use client::api::{
+    FindingBody, Landmark, LandmarkHealthBody, LandmarkQuery, LandmarkStatus, ListOrder, Place, Size,
+};
 
-pub(super) async fn list(session: &Session, map: &str) -> anyhow::Result<()> {
-    let all = session.maps().landmarks(map).await?;
+/// `waymark landmark list`.
+#[derive(Debug, clap::Args)]
+pub(super) struct ListArgs {
+    /// Only those whose name contains this.
+    #[arg(long, value_name = "PART")]
+    name: Option<String>,
+    /// Only those that have come so far.
+    #[arg(long, value_enum)]
+    state: Option<StateWord>,
+    /// Only those that are trusted so far.
+    #[arg(long, value_enum)]
+    health: Option<HealthWord>,
+    /// Only those with a place (`true`), or without (`false`).
+    #[arg(long, value_name = "true|false")]
+    placed: Option<bool>,
+    /// `name`, `changed` (by the last edit or lesson), or one of them reversed.
+    #[arg(long, value_enum, default_value_t = OrderWord::Name, allow_hyphen_values = true)]
+    sort: OrderWord,
+}
+
+/// How far a landmark has come, as it is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum StateWord {
+    NotLearnt,
+    Learning,
+    Active,
+    Inactive,
+}
+
+/// An order, as it is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum OrderWord {
+    Name,
+    #[value(name = "-name")]
+    NameReversed,
+    Changed,
+    #[value(name = "-changed")]
+    ChangedReversed,
+}
+
+impl ListArgs {
+    fn query(&self) -> LandmarkQuery {
+        LandmarkQuery {
+            name: self.name.clone(),
+            sort: Some(match self.sort {
+                OrderWord::Name => ListOrder::Name,
+                OrderWord::NameReversed => ListOrder::NameReversed,
+                OrderWord::Changed => ListOrder::Changed,
+                OrderWord::ChangedReversed => ListOrder::ChangedReversed,
+            }),
+            status: self.state.map(|state| match state {
+                StateWord::NotLearnt => LandmarkStatus::NotLearnt,
+                StateWord::Learning => LandmarkStatus::Learning,
+                StateWord::Active => LandmarkStatus::Active,
+                StateWord::Inactive => LandmarkStatus::Inactive,
+            }),
+            health: self.health.map(LandmarkHealthBody::from),
+            has_place: self.placed,
+            ..LandmarkQuery::default()
+        }
+    }
+}
+
+pub(super) async fn list(session: &Session, map: &str, wanted: &ListArgs) -> anyhow::Result<()> {
+    let (mut all, mut query) = (Vec::new(), wanted.query());
+    let is_all = query == LandmarkQuery { sort: query.sort, ..LandmarkQuery::default() };
+    loop {
+        let page = session.maps().find_landmarks(map, &query).await?;
+        all.extend(page.items);
+        query.cursor = page.next;
+        if query.cursor.is_none() {
+            break;
+        }
+    }
     let table = |all: &[Landmark]| {
         Table::of(["landmark", "state", "views", "size", "place", "health", "not in use because"], all, |l| {
             [
@@ -22,8 +96,11 @@ pub(super) async fn list(session: &Session, map: &str) -> anyhow::Result<()> {
             ]
         })
     };
-    let empty =
-        format!("{map} has no landmark yet. Teach one: waymark landmark teach NAME PHOTO... --map {map}");
+    let empty = if is_all {
+        format!("{map} has no landmark yet. Teach one: waymark landmark teach NAME PHOTO... --map {map}")
+    } else {
+        format!("{map} has no such landmark.")
+    };
     session.list(&all, table, &empty)
 }
 

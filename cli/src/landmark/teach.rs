@@ -96,7 +96,7 @@ async fn resize(session: &Session, map: &str, landmark: &Landmark, size: Size) -
         return Ok(());
     }
     let patch = LandmarkPatch { size: Some(Some(size)), ..LandmarkPatch::default() };
-    session.maps().update_landmark(map, &landmark.name, &patch).await?;
+    session.maps().if_match(&landmark.revision).update_landmark(map, &landmark.name, &patch).await?;
     let (before, after) = (show::size_text(landmark.size), show::size_text(Some(size)));
     session.note(&format!("{}: size {before} -> {after}", landmark.name));
     Ok(())

@@ -10,7 +10,7 @@ use crate::{
     session::{Consent, ServerArgs, Session},
 };
 use anyhow::Context as _;
-use client::api::WallsBody;
+use client::{Revised, api::WallsBody};
 use formats::{
     map_svg,
     walls::{self, GridReport, ImportOptions, ImportReport, Imported, MapFile, Underlay},
@@ -133,7 +133,11 @@ async fn on_server(
     walls: &WallsBody,
     picture: Option<&Underlay>,
 ) -> anyhow::Result<(Difference, Outcome)> {
-    let also_underlay = picture.is_some() && underlay::is_there(session, &args.map).await?;
+    let underlay = match picture {
+        Some(_) => underlay::revision(session, &args.map).await?,
+        None => None,
+    };
+    let also_underlay = underlay.is_some();
     let replacing = if args.dry_run {
         Replacing::DryRun
     } else {
@@ -143,7 +147,7 @@ async fn on_server(
     let outcome = match picture {
         None => Outcome::Absent,
         Some(_) if args.dry_run => Outcome::DryRun,
-        Some(picture) => underlay::upload(session, &args.map, picture).await?,
+        Some(picture) => underlay::upload(session, &args.map, picture, underlay.as_deref()).await?,
     };
     Ok((difference, outcome))
 }
@@ -168,7 +172,8 @@ pub(super) async fn replace(
     walls: &WallsBody,
     replacing: Replacing,
 ) -> anyhow::Result<Difference> {
-    let difference = Difference::of(&session.maps().walls(map).await?, walls);
+    let Revised { value: old, revision } = session.maps().walls_revised(map).await?;
+    let difference = Difference::of(&old, walls);
     if let Replacing::With { consent, also_underlay } = replacing {
         let old = match (difference.old_segments > 0, also_underlay) {
             (true, true) => Some("walls and its underlay"),
@@ -179,7 +184,7 @@ pub(super) async fn replace(
         if let Some(old) = old {
             consent.ask(&format!("{map}: {difference}. Replace its {old}?"))?;
         }
-        session.maps().set_walls(map, walls).await?;
+        session.maps().if_match(&revision).set_walls(map, walls).await?;
     }
     Ok(difference)
 }

@@ -208,7 +208,7 @@ async fn on_server(session: &Session, verb: &Verb) -> anyhow::Result<()> {
             let found = maps.map(map).await?;
             let landmarks = counted(found.landmarks, "landmark");
             consent.ask(&format!("Delete the map {map} with {landmarks}? This cannot be undone."))?;
-            maps.delete_map(map).await?;
+            maps.if_match(&found.revision).delete_map(map).await?;
             session.show(&serde_json::json!({ "deleted": map }), &format!("map {map} deleted"))
         }
         Verb::Show { map, .. } => show(session, map).await,

@@ -32,18 +32,25 @@ fn place(picture: &Underlay) -> UnderlayPlace {
     }
 }
 
-/// Whether a map has an underlay.
-pub(super) async fn is_there(session: &Session, map: &str) -> anyhow::Result<bool> {
-    match session.maps().underlay(map).await {
-        Ok(_) => Ok(true),
-        Err(error) if Failure::of_client(&error).code == "unknown_underlay" => Ok(false),
+/// The revision of a map's underlay, if it has one.
+pub(super) async fn revision(session: &Session, map: &str) -> anyhow::Result<Option<String>> {
+    match session.maps().underlay_revised(map).await {
+        Ok(found) => Ok(Some(found.revision)),
+        Err(error) if Failure::of_client(&error).code == "unknown_underlay" => Ok(None),
         Err(error) => Err(error.into()),
     }
 }
 
-/// Uploads a picture. What the server refuses, such as one that is too large, is an outcome.
-pub(super) async fn upload(session: &Session, map: &str, picture: &Underlay) -> anyhow::Result<Outcome> {
-    match session.maps().set_underlay(map, picture.png.clone(), &place(picture)).await {
+/// Uploads a picture, in the place of the one with this revision. What the server refuses, such as one that is too large, is
+/// an outcome.
+pub(super) async fn upload(
+    session: &Session,
+    map: &str,
+    picture: &Underlay,
+    revision: Option<&str>,
+) -> anyhow::Result<Outcome> {
+    let maps = revision.map_or_else(|| session.maps().clone(), |known| session.maps().if_match(known));
+    match maps.set_underlay(map, picture.png.clone(), &place(picture)).await {
         Ok(_) => Ok(Outcome::Uploaded),
         Err(error) => refused(Failure::of_client(&error)),
     }

@@ -1,7 +1,7 @@
 //! `waymark map visibility`: the visibility settings of a map, with angles in degrees.
 
 use crate::arg_parsers::{height_m, numbers};
-use client::{MapClient, api::VisibilitySettingsBody};
+use client::{MapClient, Revised, api::VisibilitySettingsBody};
 
 /// A camera and the limits that define "visible". Options that are absent change nothing.
 #[derive(Debug, Clone, clap::Args)]
@@ -69,13 +69,13 @@ impl VisibilityArgs {
 
     /// Sets the given options, if there are any, and gives the settings after that.
     pub(super) async fn set(&self, maps: &MapClient, map: &str) -> anyhow::Result<VisibilitySettingsBody> {
-        let now = maps.visibility_settings(map).await?;
+        let Revised { value: now, revision } = maps.visibility_settings_revised(map).await?;
         let none = VisibilitySettingsBody::default();
         if self.over(&none) == none && !self.defaults {
             return Ok(now);
         }
         let all = self.over(if self.defaults { &none } else { &now });
-        Ok(maps.set_visibility_settings(map, &all).await?)
+        Ok(maps.if_match(&revision).set_visibility_settings(map, &all).await?)
     }
 }
 

@@ -35,7 +35,7 @@ def test_every_program_of_the_guide_runs(server: Server, tmp_path: Path, monkeyp
         (tmp_path / f"{name}.jpg").write_bytes(photo.data)
     (tmp_path / "view.jpg").write_bytes(Image.rgb(pictures.seen_from(pictures.front(2.0))).jpeg(95).data)
     monkeypatch.chdir(tmp_path)
-    assert len(programs()) == 6
+    assert len(programs()) == 7
     scope: dict[str, Any] = {}
     with contextlib.redirect_stdout(io.StringIO()) as out:
         for program in programs():

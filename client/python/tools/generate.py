@@ -35,6 +35,7 @@ WORDS = [
     (r"aread", "read"),
     (r"asyncio\.sleep", "time.sleep"),
     (r"import asyncio\nimport json", "import json\nimport time"),
+    (r"import asyncio\nimport contextlib\nimport copy", "import contextlib\nimport copy\nimport time"),
     (r"waymark\._async", "waymark._sync"),
     (r"for asyncio, written by hand; `tools/generate\.py` makes `_sync` of it", "that blocks"),
 ]

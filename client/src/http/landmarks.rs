@@ -3,7 +3,8 @@
 use super::{map_client::MapClient, operation::operations};
 use crate::ClientError;
 use protos::api::{
-    Landmark, LandmarkPatch, NewLandmark, Place, Size, VisibilityAreaBody, VisibilitySettingsBody,
+    BulkOutcome, Landmark, LandmarkDeletion, LandmarkDeletions, LandmarkPatch, LandmarkQuery, NewLandmark,
+    NewLandmarks, Page, Place, Size, VisibilityAreaBody, VisibilitySettingsBody,
 };
 
 operations! {
@@ -12,6 +13,8 @@ operations! {
     GET: GET "/maps/{map}/landmarks/{landmark}" => landmark,
     UPDATE: PATCH "/maps/{map}/landmarks/{landmark}" => update_landmark,
     DELETE: DELETE "/maps/{map}/landmarks/{landmark}" => delete_landmark,
+    ADD_ALL: POST "/maps/{map}/bulk/create-landmarks" => add_landmarks,
+    DELETE_ALL: POST "/maps/{map}/bulk/delete-landmarks" => delete_landmarks,
     AREA: GET "/maps/{map}/landmarks/{landmark}/visibility" => visibility_area,
 }
 
@@ -31,6 +34,34 @@ impl MapClient {
     /// All landmarks of a map, by name.
     pub async fn landmarks(&self, map: &str) -> Result<Vec<Landmark>, ClientError> {
         self.all(&LIST, &[&map]).await
+    }
+
+    /// A page of the landmarks that a query selects, with their number on all pages.
+    pub async fn find_landmarks(
+        &self,
+        map: &str,
+        query: &LandmarkQuery,
+    ) -> Result<Page<Landmark>, ClientError> {
+        self.send(self.ask_query(&LIST, &[&map], query)?).await
+    }
+
+    /// Adds landmarks without views, at most 2000: all or none. The field of a refusal has the number of the one at fault.
+    pub async fn add_landmarks(&self, map: &str, new: &[NewLandmark]) -> Result<u64, ClientError> {
+        let body = NewLandmarks { landmarks: new.to_vec() };
+        let done: BulkOutcome = self.send(self.ask(&ADD_ALL, &[&map])?.json(&body)).await?;
+        Ok(done.count)
+    }
+
+    /// Deletes landmarks with their views and models, at most 2000: all or none. One with a revision is deleted only if it
+    /// still has that.
+    pub async fn delete_landmarks(
+        &self,
+        map: &str,
+        landmarks: &[LandmarkDeletion],
+    ) -> Result<u64, ClientError> {
+        let body = LandmarkDeletions { landmarks: landmarks.to_vec() };
+        let done: BulkOutcome = self.send(self.ask(&DELETE_ALL, &[&map])?.json(&body)).await?;
+        Ok(done.count)
     }
 
     /// One landmark.

@@ -6,12 +6,13 @@ use super::{
     operation::operations,
 };
 use crate::ClientError;
-use protos::api::{Job, JobState, LandmarkLesson, MapLesson};
+use protos::api::{Job, JobQuery, JobState, LandmarkLesson, MapLesson, Page};
 use std::time::{Duration, Instant};
 
 operations! {
     LEARN: POST "/maps/{map}/learn" => learn,
     LEARN_LANDMARK: POST "/maps/{map}/landmarks/{landmark}/learn" => learn_landmark,
+    LIST: GET "/jobs" => jobs,
     GET: GET "/jobs/{job}" => job,
     CANCEL: DELETE "/jobs/{job}" => cancel_job,
     EVENTS: GET "/jobs/{job}/events" => job_events,
@@ -64,6 +65,11 @@ impl MapClient {
     ) -> Result<Job, ClientError> {
         let lesson = LandmarkLesson { generated_views: generated_views.map(|n| n as usize) };
         self.send(self.ask(&LEARN_LANDMARK, &[&map, &landmark])?.json(&lesson)).await
+    }
+
+    /// A page of jobs, newest first, with their number on all pages.
+    pub async fn jobs(&self, query: &JobQuery) -> Result<Page<Job>, ClientError> {
+        self.send(self.ask_query(&LIST, &[], query)?).await
     }
 
     /// The present state of a job.

@@ -3,6 +3,7 @@
 //! A client without a token takes that of a server on this machine, once the server has answered 401 (`local_token`).
 
 use super::{
+    creation::{KEY, execute, fresh_key},
     local_token::{self, LocalTokenError},
     operation::{Operation, PathValue, path_of, query_of},
 };
@@ -10,7 +11,7 @@ use crate::ClientError;
 use protos::api::{Page, PageQuery, Problem};
 use reqwest::{
     Method, Request, RequestBuilder, Response, StatusCode,
-    header::{AUTHORIZATION, HeaderValue, WWW_AUTHENTICATE},
+    header::{AUTHORIZATION, ETAG, HeaderValue, IF_MATCH, WWW_AUTHENTICATE},
 };
 use serde::{Serialize, de::DeserializeOwned};
 use std::{
@@ -30,6 +31,8 @@ pub struct MapClient {
     token: Arc<RwLock<Option<TokenText>>>,
     /// Port of a server on this machine, whose local token may be taken.
     local_port: Option<u16>,
+    key: Option<String>,
+    revision: Option<String>,
 }
 
 /// A token, not shown.
@@ -42,6 +45,15 @@ impl fmt::Debug for TokenText {
     }
 }
 
+/// What was read, with its revision for [`MapClient::if_match`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct Revised<T> {
+    /// What was read.
+    pub value: T,
+    /// Another one after every edit or lesson, the same after what robots do by themselves.
+    pub revision: String,
+}
+
 impl MapClient {
     /// A client of the server at `base`, such as `http://127.0.0.1:8080`. Nothing is sent yet. On this machine and for this
     /// user no token is needed; else [`MapClient::with_token`].
@@ -51,7 +63,7 @@ impl MapClient {
         let http = http.map_err(|e| ClientError::Http { url: base.to_owned(), detail: e.to_string() })?;
         let base = base.trim_end_matches('/').to_owned();
         let local_port = local_token::local_port(&base);
-        Ok(Self { http, base, token: Arc::default(), local_port })
+        Ok(Self { http, base, token: Arc::default(), local_port, key: None, revision: None })
     }
 
     /// The same client with this token, as `waymark token create` prints it. No other is taken.
@@ -59,6 +71,30 @@ impl MapClient {
     pub fn with_token(self, token: &str) -> Self {
         let token = Arc::new(RwLock::new(Some(TokenText(token.trim().to_owned()))));
         Self { token, local_port: None, ..self }
+    }
+
+    /// The same with this key for its next creation, in place of a fresh one: a program that repeats a creation by itself, also
+    /// after its own restart, gives the same key again. The server makes it once, and answers with `idempotency_key_reused` if
+    /// the key was used for another one. 1 to 128 visible ASCII characters; kept for a day.
+    #[must_use]
+    pub fn with_idempotency_key(&self, key: &str) -> Self {
+        Self { key: Some(key.to_owned()), ..self.clone() }
+    }
+
+    /// The same for changes of what still has this revision: another one is refused with `changed_meanwhile` (status 412) and
+    /// changes nothing. Without it, changes are made whatever is there.
+    ///
+    /// ```no_run
+    /// # async fn example(maps: client::MapClient) -> Result<(), client::ClientError> {
+    /// let landmark = maps.landmark("hall", "poster").await?;
+    /// // ... a person looks at it ...
+    /// maps.if_match(&landmark.revision).delete_landmark("hall", "poster").await?;
+    /// # Ok(())
+    /// # }
+    /// ```
+    #[must_use]
+    pub fn if_match(&self, revision: &str) -> Self {
+        Self { revision: Some(revision.to_owned()), ..self.clone() }
     }
 
     /// The token that requests carry now.
@@ -73,7 +109,15 @@ impl MapClient {
         at: &[PathValue<'_>],
     ) -> Result<RequestBuilder, ClientError> {
         let path = path_of(operation.path, at)?;
-        Ok(self.http.request(operation.method.clone(), format!("{}/api/v1{path}", self.base)))
+        let mut request = self.http.request(operation.method.clone(), format!("{}/api/v1{path}", self.base));
+        if operation.takes_key() {
+            request = request.header(KEY, self.key.clone().unwrap_or_else(fresh_key));
+        }
+        if operation.takes_revision() {
+            let known = self.revision.as_ref().map(|revision| format!("\"{revision}\""));
+            request = request.header(IF_MATCH, known.unwrap_or_else(|| "*".to_owned()));
+        }
+        Ok(request)
     }
 
     /// The same with a query.
@@ -111,6 +155,20 @@ impl MapClient {
         let url = response.url().to_string();
         let bytes = whole(response).await?;
         serde_json::from_slice(&bytes).map_err(|e| ClientError::Unexpected { url, detail: e.to_string() })
+    }
+
+    /// Sends, and reads the answer with its revision.
+    pub(super) async fn revised<T: DeserializeOwned>(
+        &self,
+        request: RequestBuilder,
+    ) -> Result<Revised<T>, ClientError> {
+        let response = self.checked(request).await?;
+        let url = response.url().to_string();
+        let tag = response.headers().get(ETAG).and_then(|tag| tag.to_str().ok()?.split('"').nth(1));
+        let unexpected = |detail: String| ClientError::Unexpected { url: url.clone(), detail };
+        let revision = tag.map(str::to_owned).ok_or_else(|| unexpected("no revision in ETag".to_owned()))?;
+        let value = serde_json::from_slice(&whole(response).await?).map_err(|e| unexpected(e.to_string()))?;
+        Ok(Revised { value, revision })
     }
 
     /// Sends; the answer is empty.
@@ -161,7 +219,7 @@ impl MapClient {
             value.set_sensitive(true);
             request.headers_mut().insert(AUTHORIZATION, value);
         }
-        self.http.execute(request).await.map_err(|e| self.unsent(&e))
+        execute(&self.http, request).await.map_err(|e| self.unsent(&e))
     }
 
     /// Takes the local token that a 401 names. Whether it is another than the one that was sent.

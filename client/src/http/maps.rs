@@ -2,7 +2,7 @@
 
 use super::{map_client::MapClient, operation::operations};
 use crate::ClientError;
-use protos::api::{Map, MapPatch, NewMap, TransformQuery, TransformResponse};
+use protos::api::{ListQuery, Map, MapPatch, NewMap, Page, TransformQuery, TransformResponse};
 
 operations! {
     CREATE: POST "/maps" => create_map,
@@ -22,6 +22,11 @@ impl MapClient {
     /// All maps, by name.
     pub async fn maps(&self) -> Result<Vec<Map>, ClientError> {
         self.all(&LIST, &[]).await
+    }
+
+    /// A page of the maps that a query selects, with their number on all pages.
+    pub async fn find_maps(&self, query: &ListQuery) -> Result<Page<Map>, ClientError> {
+        self.send(self.ask_query(&LIST, &[], query)?).await
     }
 
     /// One map.

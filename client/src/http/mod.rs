@@ -3,7 +3,9 @@
 
 mod backups;
 mod cameras;
+mod creation;
 mod events;
+mod form;
 mod gathering;
 mod health;
 mod landmarks;
@@ -29,7 +31,7 @@ pub use backups::BackupFile;
 pub use cameras::CameraFrame;
 pub use learning::JobEvents;
 pub use live::LiveEvents;
-pub use map_client::MapClient;
+pub use map_client::{MapClient, Revised};
 pub use operation::Operation;
 pub use views::{LandmarkRegion, NewView};
 

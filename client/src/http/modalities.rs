@@ -1,6 +1,9 @@
 //! Modality statistics and fusion mode of a map.
 
-use super::{map_client::MapClient, operation::operations};
+use super::{
+    map_client::{MapClient, Revised},
+    operation::operations,
+};
 use crate::ClientError;
 use protos::api::{AreaStatsBody, ModalityMapBody, ModalityMapPatch, ModalityQuery};
 
@@ -14,6 +17,11 @@ impl MapClient {
     /// Modality statistics by pose cell from reference runs, and the fusion mode.
     pub async fn modalities(&self, map: &str) -> Result<ModalityMapBody, ClientError> {
         self.send(self.ask(&GET, &[&map])?).await
+    }
+
+    /// The same with the revision of the fusion mode and the named areas.
+    pub async fn modalities_revised(&self, map: &str) -> Result<Revised<ModalityMapBody>, ClientError> {
+        self.revised(self.ask(&GET, &[&map])?).await
     }
 
     /// Sets the fusion mode and the named areas; absent fields do not change.

@@ -19,6 +19,41 @@ pub struct Operation {
     pub call: &'static str,
 }
 
+/// Operations that create, and take a key.
+const CREATIONS: [&str; 9] = [
+    "/maps/{map}/bulk/create-landmarks",
+    "/maps",
+    "/maps/{map}/landmarks",
+    "/maps/{map}/landmarks/{landmark}/views",
+    "/maps/{map}/landmarks/{landmark}/learn",
+    "/maps/{map}/learn",
+    "/maps/{map}/gatherings",
+    "/maps/{map}/gatherings/{gathering}/accept",
+    "/robots/{robot}/recording/reference",
+];
+
+/// Paths of what has a revision: their changes say which one they are meant for.
+const REVISED: [&str; 6] = [
+    "/maps/{map}",
+    "/maps/{map}/walls",
+    "/maps/{map}/underlay",
+    "/maps/{map}/visibility-settings",
+    "/maps/{map}/modalities",
+    "/maps/{map}/landmarks/{landmark}",
+];
+
+impl Operation {
+    /// Whether it asks for an `If-Match`: the client sends `*` unless [`crate::MapClient::if_match`] says another.
+    pub fn takes_revision(&self) -> bool {
+        REVISED.contains(&self.path) && [Method::PUT, Method::PATCH, Method::DELETE].contains(&self.method)
+    }
+
+    /// Whether it creates and takes an `Idempotency-Key`: the client sends a fresh one each time.
+    pub fn takes_key(&self) -> bool {
+        self.method == Method::POST && CREATIONS.contains(&self.path)
+    }
+}
+
 /// Declares the operations of a file, and their list. A call that is no method of [`crate::MapClient`] does not compile.
 macro_rules! operations {
     ($($name:ident: $method:ident $path:literal => $call:ident),+ $(,)?) => {

@@ -1,9 +1,8 @@
 //! Recognition of one photograph.
 
-use super::{map_client::MapClient, operation::operations, views::image_part};
+use super::{form::Form, map_client::MapClient, operation::operations};
 use crate::ClientError;
 use protos::{convert::geometry::intrinsics_wire, v1::Answer};
-use reqwest::multipart::Form;
 use serde_json::json;
 use vision::frame::Intrinsics;
 
@@ -19,10 +18,10 @@ impl MapClient {
         image: Vec<u8>,
         camera: Option<&Intrinsics>,
     ) -> Result<Answer, ClientError> {
-        let mut form = Form::new().part("image", image_part(image));
+        let mut form = Form::with_image(&image);
         if let Some(camera) = camera {
-            form = form.text("intrinsics", json!(intrinsics_wire(camera)).to_string());
+            form = form.text("intrinsics", &json!(intrinsics_wire(camera)).to_string());
         }
-        self.send(self.ask(&RECOGNISE, &[&map])?.multipart(form)).await
+        self.send(form.of(self.ask(&RECOGNISE, &[&map])?)).await
     }
 }

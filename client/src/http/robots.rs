@@ -3,7 +3,8 @@
 use super::{map_client::MapClient, operation::operations};
 use crate::ClientError;
 use protos::api::{
-    CorrectionsBody, RelocalisationStatus, Robot, RobotAssignment, Ros2Status, TrajectoriesBody,
+    CorrectionsBody, ListQuery, Page, RelocalisationStatus, Robot, RobotAssignment, Ros2Status,
+    TrajectoriesBody,
 };
 
 operations! {
@@ -27,6 +28,11 @@ impl MapClient {
     /// All robots, by name.
     pub async fn robots(&self) -> Result<Vec<Robot>, ClientError> {
         self.all(&LIST, &[]).await
+    }
+
+    /// A page of the robots that a query selects, with their number on all pages.
+    pub async fn find_robots(&self, query: &ListQuery) -> Result<Page<Robot>, ClientError> {
+        self.send(self.ask_query(&LIST, &[], query)?).await
     }
 
     /// One robot: whether it is connected, its pose and how old that is, and whether a second program uses its name.

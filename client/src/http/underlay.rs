@@ -1,9 +1,12 @@
 //! The picture that is shown under a map.
 
-use super::{map_client::MapClient, operation::operations, views::image_part};
+use super::{
+    form::Form,
+    map_client::{MapClient, Revised},
+    operation::operations,
+};
 use crate::ClientError;
 use protos::api::{Underlay, UnderlayPlace};
-use reqwest::multipart::Form;
 
 operations! {
     SET: PUT "/maps/{map}/underlay" => set_underlay,
@@ -21,18 +24,23 @@ impl MapClient {
         place: &UnderlayPlace,
     ) -> Result<Underlay, ClientError> {
         let UnderlayPlace { metres_per_pixel, x_m, y_m, theta_rad } = place;
-        let mut form = Form::new().part("image", image_part(image));
+        let mut form = Form::with_image(&image);
         for (name, value) in
             [("metres_per_pixel", metres_per_pixel), ("x_m", x_m), ("y_m", y_m), ("theta_rad", theta_rad)]
         {
-            form = form.text(name, value.to_string());
+            form = form.text(name, &value.to_string());
         }
-        self.send(self.ask(&SET, &[&map])?.multipart(form)).await
+        self.send(form.of(self.ask(&SET, &[&map])?)).await
     }
 
     /// Where the picture under a map lies.
     pub async fn underlay(&self, map: &str) -> Result<Underlay, ClientError> {
         self.send(self.ask(&GET, &[&map])?).await
+    }
+
+    /// The same with its revision.
+    pub async fn underlay_revised(&self, map: &str) -> Result<Revised<Underlay>, ClientError> {
+        self.revised(self.ask(&GET, &[&map])?).await
     }
 
     /// The picture under a map, as it was uploaded.

@@ -1,9 +1,8 @@
 //! Training views of a landmark.
 
-use super::{map_client::MapClient, operation::operations};
+use super::{form::Form, map_client::MapClient, operation::operations};
 use crate::ClientError;
 use protos::api::{CaptureMetadata, Size, TrainingView};
-use reqwest::multipart::{Form, Part};
 use serde_json::json;
 
 operations! {
@@ -74,14 +73,14 @@ impl MapClient {
         landmark: &str,
         new: NewView,
     ) -> Result<TrainingView, ClientError> {
-        let mut form = Form::new().part("image", image_part(new.image));
+        let mut form = Form::with_image(&new.image);
         match new.region {
             LandmarkRegion::Detect => {}
             LandmarkRegion::WholeImage => form = form.text("whole_image", "true"),
-            LandmarkRegion::Corners(corners) => form = form.text("corners", json!(corners).to_string()),
+            LandmarkRegion::Corners(corners) => form = form.text("corners", &json!(corners).to_string()),
         }
         if let Some(capture) = new.capture {
-            form = form.text("capture", json!(capture).to_string());
+            form = form.text("capture", &json!(capture).to_string());
         }
         if new.keep_near_duplicate {
             form = form.text("keep_near_duplicate", "true");
@@ -90,9 +89,9 @@ impl MapClient {
             form = form.text("create", "true");
         }
         if let Some(Size { width_m, height_m }) = new.size {
-            form = form.text("width_m", width_m.to_string()).text("height_m", height_m.to_string());
+            form = form.text("width_m", &width_m.to_string()).text("height_m", &height_m.to_string());
         }
-        self.send(self.ask(&UPLOAD, &[&map, &landmark])?.multipart(form)).await
+        self.send(form.of(self.ask(&UPLOAD, &[&map, &landmark])?)).await
     }
 
     /// All views of a landmark, by number.
@@ -114,9 +113,4 @@ impl MapClient {
     pub async fn view_icon(&self, map: &str, landmark: &str, view: i64) -> Result<Vec<u8>, ClientError> {
         self.bytes(self.ask(&ICON, &[&map, &landmark, &view])?).await
     }
-}
-
-/// A part of a form with a photograph.
-pub(super) fn image_part(image: Vec<u8>) -> Part {
-    Part::bytes(image).file_name("image")
 }

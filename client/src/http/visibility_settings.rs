@@ -1,6 +1,9 @@
 //! The visibility settings of a map: camera, and limits that define "visible".
 
-use super::{map_client::MapClient, operation::operations};
+use super::{
+    map_client::{MapClient, Revised},
+    operation::operations,
+};
 use crate::ClientError;
 use protos::api::VisibilitySettingsBody;
 
@@ -13,6 +16,14 @@ impl MapClient {
     /// The visibility settings; every field is there.
     pub async fn visibility_settings(&self, map: &str) -> Result<VisibilitySettingsBody, ClientError> {
         self.send(self.ask(&GET, &[&map])?).await
+    }
+
+    /// The same with their revision.
+    pub async fn visibility_settings_revised(
+        &self,
+        map: &str,
+    ) -> Result<Revised<VisibilitySettingsBody>, ClientError> {
+        self.revised(self.ask(&GET, &[&map])?).await
     }
 
     /// Replaces the visibility settings; absent fields take their defaults.

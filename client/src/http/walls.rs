@@ -1,6 +1,9 @@
 //! The walls of a map.
 
-use super::{map_client::MapClient, operation::operations};
+use super::{
+    map_client::{MapClient, Revised},
+    operation::operations,
+};
 use crate::ClientError;
 use protos::api::WallsBody;
 
@@ -13,6 +16,11 @@ impl MapClient {
     /// Replaces the walls; returns those stored.
     pub async fn set_walls(&self, map: &str, walls: &WallsBody) -> Result<WallsBody, ClientError> {
         self.send(self.ask(&SET, &[&map])?.json(walls)).await
+    }
+
+    /// The walls, as stored, with their revision.
+    pub async fn walls_revised(&self, map: &str) -> Result<Revised<WallsBody>, ClientError> {
+        self.revised(self.ask(&GET, &[&map])?).await
     }
 
     /// The walls, as stored.

@@ -236,7 +236,7 @@ fn place(i: usize, shift_m: f64) -> Place {
 impl Large {
     async fn change(&self, landmark: &str, changes: &Value) -> anyhow::Result<()> {
         let url = format!("{}/api/v1/maps/{MAP}/landmarks/{landmark}", self.base);
-        let answer = self.http.patch(&url).json(changes).send().await?;
+        let answer = self.http.patch(&url).header("if-match", "*").json(changes).send().await?;
         anyhow::ensure!(answer.status().is_success(), "{url}: {}", answer.text().await?);
         Ok(())
     }

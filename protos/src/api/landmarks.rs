@@ -1,9 +1,68 @@
 //! `/maps/{map}/landmarks`: landmarks with size, place, model and health.
 
-use super::failed_gates::FailedGate;
+use super::{failed_gates::FailedGate, page::ListOrder};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::fmt;
+
+/// Which landmarks of a map are listed, in which order, and which page of them.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::IntoParams))]
+#[serde(deny_unknown_fields)]
+#[cfg_attr(feature = "openapi", into_params(parameter_in = Query))]
+pub struct LandmarkQuery {
+    /// Most items; 100 by default, bounded by `limits.page`.
+    pub limit: Option<usize>,
+    /// The `next` of the page before; absent for the first page.
+    pub cursor: Option<String>,
+    /// Only those whose name contains this.
+    pub name: Option<String>,
+    /// `name` by default.
+    pub sort: Option<ListOrder>,
+    /// Only those that have come so far.
+    pub status: Option<LandmarkStatus>,
+    /// Only those that are trusted so far.
+    pub health: Option<LandmarkHealthBody>,
+    /// Only those with a place, or those without.
+    pub has_place: Option<bool>,
+}
+
+/// Landmarks to be made together: all, or none.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+#[serde(deny_unknown_fields)]
+pub struct NewLandmarks {
+    /// 1 to 2000.
+    pub landmarks: Vec<NewLandmark>,
+}
+
+/// A landmark to be deleted.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+#[serde(deny_unknown_fields)]
+pub struct LandmarkDeletion {
+    /// Its name.
+    pub name: String,
+    /// The revision that is meant; absent for whatever is there.
+    pub revision: Option<String>,
+}
+
+/// Landmarks to be deleted together: all, or none.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+#[serde(deny_unknown_fields)]
+pub struct LandmarkDeletions {
+    /// 1 to 2000.
+    pub landmarks: Vec<LandmarkDeletion>,
+}
+
+/// What was done to several landmarks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct BulkOutcome {
+    /// Landmarks made or deleted.
+    pub count: u64,
+}
 
 /// Width and height of a landmark.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -156,6 +215,10 @@ pub struct ObservedPlaceBody {
 pub struct Landmark {
     /// `[a-z0-9_-]{1,64}`, unique in the map.
     pub name: String,
+    /// Another one after every edit of name, size, place, views or, by a person, health, and after every lesson of its model;
+    /// the same after what robots do by themselves. `If-Match` takes it, in quotes.
+    #[serde(default)]
+    pub revision: String,
     /// How far it has come.
     pub status: LandmarkStatus,
     /// Why it is not matched; empty unless it is inactive.

@@ -40,6 +40,35 @@ pub enum JobState {
     Cancelled,
 }
 
+/// Which jobs are listed, newest first.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::IntoParams))]
+#[serde(deny_unknown_fields)]
+#[cfg_attr(feature = "openapi", into_params(parameter_in = Query))]
+pub struct JobQuery {
+    /// Most items; 100 by default, bounded by `limits.page`.
+    pub limit: Option<usize>,
+    /// The `next` of the page before; absent for the first page.
+    pub cursor: Option<String>,
+    /// Only those that stand so.
+    pub state: Option<JobState>,
+    /// Only those of this map.
+    pub map: Option<String>,
+}
+
+impl JobState {
+    /// The word in queries and in the database.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Queued => "queued",
+            Self::Running => "running",
+            Self::Done => "done",
+            Self::Failed => "failed",
+            Self::Cancelled => "cancelled",
+        }
+    }
+}
+
 /// Long work.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]

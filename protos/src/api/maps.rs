@@ -45,6 +45,10 @@ pub struct Map {
     pub name: String,
     /// Counts up with every change that an answer could depend on.
     pub version: u64,
+    /// Another one after every edit or lesson of the map or of what is in it, the same after what robots do by themselves:
+    /// `If-Match` takes it, in quotes.
+    #[serde(default)]
+    pub revision: String,
     /// Landmarks in it, learnt or not.
     pub landmarks: u64,
     /// Which distance decides.

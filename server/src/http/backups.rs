@@ -4,7 +4,7 @@ use super::{
     AppState,
     answers::page,
     error::ApiError,
-    extract::{PathParams, QueryParams, after_name, page_limit},
+    extract::{PathParams, QueryParams, page_limit},
 };
 use crate::store::StoreError;
 use axum::{
@@ -43,13 +43,14 @@ async fn list(
     State(app): State<AppState>,
     QueryParams(query): QueryParams<PageQuery>,
 ) -> Result<Json<Page<Backup>>, ApiError> {
-    let limit = page_limit(&query, app.config.limits.page)?;
-    let after = after_name(&query);
+    let limit = page_limit(query.limit, app.config.limits.page)?;
+    let after = query.cursor.unwrap_or_default();
     let mut all = blocking(&app, |app| Ok(app.backups.list())).await?;
+    let total = all.len() as u64;
     all.sort_by(|a, b| a.name.cmp(&b.name));
     all.retain(|backup| backup.name > after);
     all.truncate(limit + 1);
-    Ok(Json(page(all, limit, |backup| backup.name.clone(), |backup| backup)))
+    Ok(Json(page(all, limit, total, |backup| backup.name.clone(), |backup| backup)))
 }
 
 /// One backup: how far it is, and what it holds.

@@ -22,11 +22,20 @@ pub(crate) struct ApiError {
     pub(crate) field: Option<String>,
     detail: String,
     more: serde_json::Map<String, Value>,
+    /// The present revision, where another one was meant.
+    revision: Option<Box<str>>,
 }
 
 impl ApiError {
     pub(crate) fn new(status: StatusCode, code: &'static str, detail: impl Into<String>) -> Self {
-        Self { status, code, field: None, detail: detail.into(), more: serde_json::Map::new() }
+        Self {
+            status,
+            code,
+            field: None,
+            detail: detail.into(),
+            more: serde_json::Map::new(),
+            revision: None,
+        }
     }
 
     /// 422: understood, but a value cannot be.
@@ -71,12 +80,13 @@ impl ApiError {
 
 impl IntoResponse for ApiError {
     fn into_response(self) -> Response {
-        let status = self.status;
+        let (status, revision) = (self.status, self.revision.clone());
         let body = serde_json::to_vec(&self.problem()).unwrap_or_default();
         let mut response = (status, [(header::CONTENT_TYPE, PROBLEM_JSON)], body).into_response();
         if status == StatusCode::SERVICE_UNAVAILABLE {
             response.headers_mut().insert(header::RETRY_AFTER, HeaderValue::from_static("2"));
         }
+        response.headers_mut().extend(revision.and_then(|is| etag(&is)).map(|tag| (header::ETAG, tag)));
         response
     }
 }
@@ -127,6 +137,21 @@ impl From<StoreError> for ApiError {
                 Self::new(StatusCode::INTERNAL_SERVER_ERROR, "not_published", detail)
                     .with("may_be_done", Value::Bool(true))
             }
+            StoreError::At { index, source } => {
+                let error = Self::from(*source);
+                let field = error.field.as_deref().unwrap_or("name").to_owned();
+                let field = if field == "landmark" { "name".to_owned() } else { field };
+                error.field(format!("landmarks[{index}].{field}"))
+            }
+            StoreError::ChangedMeanwhile { present } => {
+                let status = StatusCode::PRECONDITION_FAILED;
+                let error = Self::new(status, "changed_meanwhile", detail).field("if-match");
+                Self { revision: Some(present.into()), ..error }
+            }
+            StoreError::KeyAtWork => {
+                Self::new(StatusCode::CONFLICT, "in_progress", detail).field("idempotency-key")
+            }
+            StoreError::KeyReused => Self::invalid("idempotency_key_reused", "idempotency-key", detail),
             StoreError::Changed | StoreError::Busy => {
                 Self::new(StatusCode::SERVICE_UNAVAILABLE, "busy", StoreError::Busy.to_string())
             }
@@ -156,6 +181,11 @@ pub(super) fn not_found() -> ApiError {
 pub(super) fn method_not_allowed() -> ApiError {
     let detail = "this path does not take this method";
     ApiError::new(StatusCode::METHOD_NOT_ALLOWED, "method_not_allowed", detail).field("method")
+}
+
+/// A strong entity tag.
+pub(super) fn etag(revision: &str) -> Option<HeaderValue> {
+    HeaderValue::from_str(&format!("\"{revision}\"")).ok()
 }
 
 /// 422 for a number outside its range, in this part of the input.

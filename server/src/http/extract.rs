@@ -135,8 +135,8 @@ impl<T: DeserializeOwned> FromRequestParts<AppState> for QueryParams<T> {
 const PAGE_DEFAULT: usize = 100;
 
 /// How many items a page may have, checked against the bound.
-pub(super) fn page_limit(query: &PageQuery, max: usize) -> Result<usize, ApiError> {
-    match query.limit {
+pub(super) fn page_limit(limit: Option<usize>, max: usize) -> Result<usize, ApiError> {
+    match limit {
         None => Ok(PAGE_DEFAULT.min(max)),
         Some(limit) if (1..=max).contains(&limit) => Ok(limit),
         Some(limit) => {
@@ -147,11 +147,11 @@ pub(super) fn page_limit(query: &PageQuery, max: usize) -> Result<usize, ApiErro
 
 /// The cursor of a list by number; 0 comes before every number.
 pub(super) fn after_number(query: &PageQuery) -> Result<i64, ApiError> {
-    let bad = |_e| ApiError::invalid("invalid_value", "cursor", "not one of this list");
-    query.cursor.as_deref().map_or(Ok(0), |text| text.parse().map_err(bad))
+    Ok(number_cursor(query.cursor.as_deref())?.unwrap_or(0))
 }
 
-/// The cursor of a list by name; empty comes before every name.
-pub(super) fn after_name(query: &PageQuery) -> String {
-    query.cursor.clone().unwrap_or_default()
+/// The cursor of a list by number.
+pub(super) fn number_cursor(cursor: Option<&str>) -> Result<Option<i64>, ApiError> {
+    let bad = |_e| ApiError::invalid("invalid_value", "cursor", "not one of this list");
+    cursor.map(|text| text.parse().map_err(bad)).transpose()
 }

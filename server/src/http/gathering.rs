@@ -2,7 +2,7 @@
 
 use super::{
     AppState,
-    answers::page,
+    answers::{created, page},
     authorise::check_robot,
     error::ApiError,
     extract::{Body, PathParams, QueryParams, after_number, name, page_limit},
@@ -14,8 +14,9 @@ use crate::{
     identity::Principal,
     store::{
         gatherings::{self, GatheringRow, NewGathering},
+        landmark_placement::PlacementReport,
         landmarks, maps,
-        track_acceptance::{self, TrackAcceptance},
+        track_acceptance::{self, AcceptanceResult, TrackAcceptance},
     },
 };
 use axum::{
@@ -64,9 +65,15 @@ fn counts_shown(counts: GatheringCounts) -> GatheringCountsBody {
 }
 
 fn gathering_shown(app: &AppState, row: GatheringRow) -> Gathering {
+    let counts = app.gatherer.counts(row.id);
+    with_counts(row, counts)
+}
+
+/// A gathering with the counts of now, or those of its end.
+fn with_counts(row: GatheringRow, counts: Option<GatheringCounts>) -> Gathering {
     let kept = || serde_json::from_str(&row.counts).unwrap_or_default();
     Gathering {
-        counts: counts_shown(app.gatherer.counts(row.id).unwrap_or_else(kept)),
+        counts: counts_shown(counts.unwrap_or_else(kept)),
         id: row.id,
         map: row.map,
         robot: row.robot,
@@ -108,8 +115,10 @@ async fn begin(
         }
     }
     let new = NewGathering { robot: new.robot, landmark: new.landmark, known: new.known };
-    let row = app.gatherer.begin(&map, new).await?;
-    Ok((StatusCode::CREATED, Json(gathering_shown(&app, row))))
+    let shown = |row: &GatheringRow| {
+        (StatusCode::CREATED, with_counts(row.clone(), Some(GatheringCounts::default())))
+    };
+    created(shown, app.gatherer.begin(&map, new)).await
 }
 
 /// Lists gatherings by number, ended ones included.
@@ -120,10 +129,11 @@ async fn list(
     PathParams(map): PathParams<String>,
     QueryParams(query): QueryParams<PageQuery>,
 ) -> Result<Json<Page<Gathering>>, ApiError> {
-    let (limit, after) = (page_limit(&query, app.config.limits.page)?, after_number(&query)?);
+    let (limit, after) = (page_limit(query.limit, app.config.limits.page)?, after_number(&query)?);
     let map = maps::get(app.store.reads(), &map).await?;
     let rows = gatherings::page(app.store.reads(), map.id, after, limit + 1).await?;
-    Ok(Json(page(rows, limit, |r| r.id.to_string(), |r| gathering_shown(&app, r))))
+    let total = gatherings::count(app.store.reads(), map.id).await?;
+    Ok(Json(page(rows, limit, total, |r| r.id.to_string(), |r| gathering_shown(&app, r))))
 }
 
 /// One gathering.
@@ -246,12 +256,16 @@ async fn accept(
         views: limits.views,
         jobs: (limits.jobs, limits.jobs_kept),
     };
-    let done = app.gatherer.accept((&map, id), picks, decision.learn, bounds).await?;
-    let landmarks = done
-        .landmarks
-        .into_iter()
-        .map(|(name, (views, placing))| ExtendedLandmark { name, views, placing: placement_shown(placing) })
-        .collect();
+    created(acceptance_shown, app.gatherer.accept((&map, id), picks, decision.learn, bounds)).await
+}
+
+fn acceptance_shown(done: &AcceptanceResult) -> (StatusCode, AcceptanceBody) {
+    let landmark = |(name, (views, placing)): (&String, &(u64, PlacementReport))| ExtendedLandmark {
+        name: name.clone(),
+        views: *views,
+        placing: placement_shown(placing.clone()),
+    };
     let status = if done.job.is_some() { StatusCode::ACCEPTED } else { StatusCode::OK };
-    Ok((status, Json(AcceptanceBody { landmarks, job: done.job.map(|row| job_shown(row, None)) })))
+    let job = done.job.clone().map(|row| job_shown(row, None));
+    (status, AcceptanceBody { landmarks: done.landmarks.iter().map(landmark).collect(), job })
 }

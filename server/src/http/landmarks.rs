@@ -2,9 +2,10 @@
 
 use super::{
     App, AppState,
-    answers::page,
+    answers::{Listed, created, page, selected},
     error::{ApiError, out_of_range},
-    extract::{Body, PathParams, QueryParams, after_name, name, page_limit},
+    extract::{Body, PathParams, QueryParams, name, page_limit},
+    revision::{IfMatch, Revised},
 };
 use crate::{
     failed_gates::{self, Evidence, Refusal, StoredLookAlike},
@@ -12,6 +13,7 @@ use crate::{
     store::{
         landmarks::{self, LandmarkGeometry, LandmarkRow},
         maps,
+        revisions::{self, Subject},
     },
 };
 use axum::{Json, extract::State, http::StatusCode};
@@ -22,8 +24,8 @@ use map::{
 };
 use nalgebra::Vector3;
 use protos::api::{
-    FailedGate, Landmark, LandmarkHealthBody, LandmarkModelBody, LandmarkPatch, LandmarkStatus,
-    LookAlikeBody, NewLandmark, Page, PageQuery, Place, PlaceSigma, Problem, Size,
+    FailedGate, Landmark, LandmarkHealthBody, LandmarkModelBody, LandmarkPatch, LandmarkQuery,
+    LandmarkStatus, ListOrder, ListQuery, LookAlikeBody, NewLandmark, Page, Place, PlaceSigma, Problem, Size,
 };
 use serde_json::{Map, Value, json};
 use utoipa_axum::{router::OpenApiRouter, routes};
@@ -34,7 +36,7 @@ pub(super) fn router() -> OpenApiRouter<AppState> {
 }
 
 /// Size and place, checked. Either may be missing.
-fn geometry(size: Option<Size>, place: Option<Place>) -> Result<LandmarkGeometry, ApiError> {
+pub(super) fn geometry(size: Option<Size>, place: Option<Place>) -> Result<LandmarkGeometry, ApiError> {
     let size = size.map(|s| LandmarkSize { width_m: s.width_m, height_m: s.height_m });
     // A place is checked with some size, a size at some place: each has its own ranges.
     let stand_in = LandmarkSize { width_m: 1.0, height_m: 1.0 };
@@ -160,6 +162,7 @@ fn landmark_shown(row: LandmarkRow, context: &Context<'_>) -> Landmark {
         health: health_shown(row.health),
         finding: row.finding.and_then(|f| serde_json::from_str(&f).ok()),
         name: row.name,
+        revision: row.revision,
         status,
         failed_gates,
         views: row.views,
@@ -208,22 +211,49 @@ async fn create(
     let write = app.store.write(move |tx| {
         Box::pin(async move { landmarks::create(tx, &map, name.as_str(), geometry, max).await })
     });
-    Ok((StatusCode::CREATED, Json(landmark_shown(write.await?, &Context::default()))))
+    let shown = |row: &LandmarkRow| (StatusCode::CREATED, landmark_shown(row.clone(), &Context::default()));
+    created(shown, write).await
 }
 
-/// Lists the landmarks of a map by name.
-#[utoipa::path(get, path = "/maps/{map}/landmarks", tag = "landmarks", params(("map" = String, Path), PageQuery),
-    responses((status = 200, body = Page<Landmark>), (status = 404, body = Problem)))]
+impl Listed for LandmarkRow {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn changed_ms(&self) -> Option<i64> {
+        Some(self.changed_ms)
+    }
+}
+
+/// Lists the landmarks of a map.
+#[utoipa::path(get, path = "/maps/{map}/landmarks", tag = "landmarks", params(("map" = String, Path), LandmarkQuery),
+    responses((status = 200, body = Page<Landmark>), (status = 404, body = Problem),
+    (status = 422, body = Problem, description = "out_of_range, invalid_value")))]
 async fn list(
     State(app): State<AppState>,
     PathParams(map): PathParams<String>,
-    QueryParams(query): QueryParams<PageQuery>,
+    QueryParams(query): QueryParams<LandmarkQuery>,
 ) -> Result<Json<Page<Landmark>>, ApiError> {
-    let limit = page_limit(&query, app.config.limits.page)?;
+    let limits = &app.config.limits;
     let map = maps::get(app.store.reads(), &map).await?;
-    let rows = landmarks::page(app.store.reads(), map.id, &after_name(&query), limit + 1).await?;
     let learning = app.jobs.learning(&map.name).await?;
-    Ok(Json(page(rows, limit, |r| r.name.clone(), |r| shown(&app, &learning, &map.name, r))))
+    let shown = |row| shown(&app, &learning, &map.name, row);
+    let LandmarkQuery { limit, cursor, name, sort, status, health, has_place } = query;
+    let is_whole = status.is_none() && health.is_none() && has_place.is_none();
+    if is_whole && name.is_none() && sort.unwrap_or_default() == ListOrder::Name {
+        let limit = page_limit(limit, limits.page)?;
+        let after = cursor.unwrap_or_default();
+        let rows = landmarks::page(app.store.reads(), map.id, &after, limit + 1).await?;
+        return Ok(Json(page(rows, limit, map.landmarks, |r| r.name.clone(), shown)));
+    }
+    let mut rows = landmarks::page(app.store.reads(), map.id, "", limits.landmarks).await?;
+    rows.retain(|row| {
+        has_place.is_none_or(|wanted| row.geometry.place.is_some() == wanted)
+            && health.is_none_or(|wanted| health_shown(row.health) == wanted)
+            && status.is_none_or(|wanted| shown(row.clone()).status == wanted)
+    });
+    let Page { items, next, total } = selected(rows, &ListQuery { limit, cursor, name, sort }, limits.page)?;
+    Ok(Json(Page { items: items.into_iter().map(shown).collect(), next, total }))
 }
 
 /// One landmark.
@@ -233,10 +263,10 @@ async fn list(
 async fn get(
     State(app): State<AppState>,
     PathParams((map, landmark)): PathParams<(String, String)>,
-) -> Result<Json<Landmark>, ApiError> {
+) -> Result<Revised<Landmark>, ApiError> {
     maps::get(app.store.reads(), &map).await?;
     let row = landmarks::get(app.store.reads(), &map, &landmark).await?;
-    Ok(Json(shown(&app, &app.jobs.learning(&map).await?, &map, row)))
+    Ok(Revised(row.revision.clone(), shown(&app, &app.jobs.learning(&map).await?, &map, row)))
 }
 
 /// Renames it; sets or forgets size and place; sets how far it is trusted. Everything that belongs to it follows the name.
@@ -248,14 +278,16 @@ async fn get(
 async fn patch(
     State(app): State<AppState>,
     PathParams((map, landmark)): PathParams<(String, String)>,
+    IfMatch(is): IfMatch,
     Body(changes): Body<LandmarkPatch>,
-) -> Result<Json<Landmark>, ApiError> {
+) -> Result<Revised<Landmark>, ApiError> {
     let checked = geometry(changes.size.flatten(), changes.place.flatten())?;
     let new_name = changes.name.map(|new| name("name", new)).transpose()?;
     let (size, place) = (changes.size.is_some(), changes.place.is_some());
     let (map_name, health) = (map.clone(), changes.health.map(health));
     let write = app.store.write(move |tx| {
         Box::pin(async move {
+            revisions::check(tx, &map, &Subject::Landmark(landmark.clone()), &is).await?;
             let landmark = match new_name {
                 Some(new) => landmarks::rename(tx, &map, &landmark, new.as_str()).await?,
                 None => landmark,
@@ -273,7 +305,8 @@ async fn patch(
         })
     });
     let changed = write.await?;
-    Ok(Json(shown(&app, &app.jobs.learning(&map_name).await?, &map_name, changed)))
+    let learning = app.jobs.learning(&map_name).await?;
+    Ok(Revised(changed.revision.clone(), shown(&app, &learning, &map_name, changed)))
 }
 
 /// Deletes a landmark with its views and its model.
@@ -283,7 +316,14 @@ async fn patch(
 async fn delete(
     State(app): State<AppState>,
     PathParams((map, landmark)): PathParams<(String, String)>,
+    IfMatch(is): IfMatch,
 ) -> Result<StatusCode, ApiError> {
-    app.store.write(move |tx| Box::pin(async move { landmarks::delete(tx, &map, &landmark).await })).await?;
+    let write = app.store.write(move |tx| {
+        Box::pin(async move {
+            revisions::check(tx, &map, &Subject::Landmark(landmark.clone()), &is).await?;
+            landmarks::delete(tx, &map, &landmark).await
+        })
+    });
+    write.await?;
     Ok(StatusCode::NO_CONTENT)
 }

@@ -2,13 +2,18 @@
 
 use super::{
     AppState,
+    answers::{created, page},
     error::ApiError,
-    extract::{Body, PathParams},
+    extract::{Body, PathParams, QueryParams, number_cursor, page_limit},
 };
 use crate::{
     identity::Principal,
     jobs::{JobProgress, request},
-    store::{StoreError, jobs::JobRow, landmarks, maps},
+    store::{
+        StoreError,
+        jobs::{JobFilter, JobRow},
+        landmarks, maps,
+    },
 };
 use axum::{
     Extension, Json,
@@ -20,7 +25,7 @@ use axum::{
     },
 };
 use futures::{Stream, StreamExt, stream};
-use protos::api::{Job, JobState, LandmarkLesson, MapLesson, Problem};
+use protos::api::{Job, JobQuery, JobState, LandmarkLesson, MapLesson, Page, Problem};
 use std::convert::Infallible;
 use tokio_stream::wrappers::WatchStream;
 use utoipa_axum::{router::OpenApiRouter, routes};
@@ -29,6 +34,7 @@ pub(super) fn router() -> OpenApiRouter<AppState> {
     OpenApiRouter::new()
         .routes(routes!(learn_one))
         .routes(routes!(learn_map))
+        .routes(routes!(list))
         .routes(routes!(get, cancel))
         .routes(routes!(events))
 }
@@ -124,13 +130,34 @@ async fn submit(
             return Err(ApiError::new(StatusCode::CONFLICT, "no_views", detail).field("landmarks"));
         }
     }
-    let row = app.jobs.submit(map, &request).await?;
-    Ok((StatusCode::ACCEPTED, Json(job_shown(row, None))))
+    let shown = |row: &JobRow| (StatusCode::ACCEPTED, job_shown(row.clone(), None));
+    created(shown, app.jobs.submit(map, &request)).await
 }
 
 async fn read(app: &AppState, id: i64) -> Result<Job, StoreError> {
     let (row, progress) = app.jobs.get(id).await?;
     Ok(job_shown(row, progress.as_ref()))
+}
+
+/// Lists jobs, newest first: those that wait or run, and the last that have ended.
+#[utoipa::path(get, path = "/jobs", tag = "lessons", params(JobQuery),
+    responses((status = 200, body = Page<Job>), (status = 422, body = Problem, description = "out_of_range, invalid_value")))]
+async fn list(
+    State(app): State<AppState>,
+    QueryParams(query): QueryParams<JobQuery>,
+    Extension(principal): Extension<Principal>,
+) -> Result<Json<Page<Job>>, ApiError> {
+    let limit = page_limit(query.limit, app.config.limits.page)?;
+    // Every number is less than that of the first page.
+    let before = number_cursor(query.cursor.as_deref())?.unwrap_or(i64::MAX);
+    let maps = match query.map {
+        Some(map) => Some(if principal.may_see(&map) { vec![map] } else { Vec::new() }),
+        None => principal.maps.map(|maps| maps.into_iter().collect()),
+    };
+    let maps = maps.map(|names| serde_json::json!(names).to_string());
+    let filter = JobFilter { state: query.state.map(JobState::as_str), maps };
+    let (jobs, total) = app.jobs.page(&filter, before, limit + 1).await?;
+    Ok(Json(page(jobs, limit, total, |(row, _)| row.id.to_string(), |(row, p)| job_shown(row, p.as_ref()))))
 }
 
 /// One job.

@@ -2,16 +2,18 @@
 
 use super::{
     AppState,
-    answers::{page, row_major, visible_rows},
+    answers::{Listed, created, row_major, selected},
     authorise::check_map,
     error::{ApiError, out_of_range},
-    extract::{Body, PathParams, QueryParams, after_name, name, page_limit},
+    extract::{Body, PathParams, QueryParams, name},
+    revision::{IfMatch, Revised},
 };
 use crate::{
     identity::Principal,
     store::{
         map_locations::{self, MapLocation},
         maps::{self, MapRow},
+        revisions::{self, Subject},
     },
 };
 use axum::{Extension, Json, extract::State, http::StatusCode};
@@ -22,7 +24,7 @@ use map::{
 };
 use nalgebra::{Matrix3, Vector3};
 use protos::api::{
-    Map, MapPatch, NewMap, Page, PageQuery, Parent, Problem, TransformQuery, TransformResponse,
+    ListQuery, Map, MapPatch, NewMap, Page, Parent, Problem, TransformQuery, TransformResponse,
     TransformedPose,
 };
 use utoipa_axum::{router::OpenApiRouter, routes};
@@ -66,6 +68,7 @@ fn map_shown(row: MapRow, found: MapLocation, principal: &Principal) -> Map {
     Map {
         name: row.name,
         version: row.version,
+        revision: row.revision,
         landmarks: row.landmarks,
         distance: row.distance.into(),
         parent: link.as_ref().map(parent_shown),
@@ -113,44 +116,45 @@ async fn create(
     };
     let write = app.store.write(move |tx| {
         Box::pin(async move {
-            let row = maps::create(tx, name.as_str(), distance, max).await?;
+            maps::create(tx, name.as_str(), distance, max).await?;
             let found = map_locations::set(tx, name.as_str(), |_| found).await?;
-            Ok((row, found))
+            Ok((maps::of(tx, name.as_str()).await?, found))
         })
     });
-    let (row, found) = write.await.map_err(|e| unknown_parent(e.into()))?;
-    Ok((StatusCode::CREATED, Json(map_shown(row, found, &principal))))
+    let shown = move |(row, found): &(MapRow, MapLocation)| {
+        (StatusCode::CREATED, map_shown(row.clone(), found.clone(), &principal))
+    };
+    created(shown, async { write.await.map_err(|e| unknown_parent(e.into())) }).await
 }
 
-/// Lists maps by name.
-#[utoipa::path(get, path = "/maps", tag = "maps", params(PageQuery), responses((status = 200, body = Page<Map>)))]
+impl Listed for MapRow {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn changed_ms(&self) -> Option<i64> {
+        Some(self.changed_ms)
+    }
+}
+
+/// Lists maps.
+#[utoipa::path(get, path = "/maps", tag = "maps", params(ListQuery), responses((status = 200, body = Page<Map>),
+    (status = 422, body = Problem, description = "out_of_range, invalid_value")))]
 async fn list(
     State(app): State<AppState>,
-    QueryParams(query): QueryParams<PageQuery>,
+    QueryParams(query): QueryParams<ListQuery>,
     Extension(principal): Extension<Principal>,
 ) -> Result<Json<Page<Map>>, ApiError> {
-    let limit = page_limit(&query, app.config.limits.page)?;
-    let rows = visible_rows(
-        (after_name(&query), limit),
-        |after| {
-            let app = app.clone();
-            async move { maps::page(app.store.reads(), &after, limit + 1).await }
-        },
-        |row| &row.name,
-        |row| principal.may_see(&row.name),
-    );
-    let rows = rows.await?;
-    let known = map_locations::all(app.store.reads()).await?;
-    let found = |name: &str| known.get(name).cloned().unwrap_or_default();
-    Ok(Json(page(
-        rows,
-        limit,
-        |r| r.name.clone(),
-        |r| {
-            let found = found(&r.name);
-            map_shown(r, found, &principal)
-        },
-    )))
+    let limits = &app.config.limits;
+    let mut rows = maps::page(app.store.reads(), "", limits.maps).await?;
+    rows.retain(|row| principal.may_see(&row.name));
+    let mut known = map_locations::all(app.store.reads()).await?;
+    let Page { items, next, total } = selected(rows, &query, limits.page)?;
+    let shown = |row: MapRow| {
+        let found = known.remove(&row.name).unwrap_or_default();
+        map_shown(row, found, &principal)
+    };
+    Ok(Json(Page { items: items.into_iter().map(shown).collect(), next, total }))
 }
 
 /// One map.
@@ -160,10 +164,10 @@ async fn get(
     State(app): State<AppState>,
     PathParams(map): PathParams<String>,
     Extension(principal): Extension<Principal>,
-) -> Result<Json<Map>, ApiError> {
+) -> Result<Revised<Map>, ApiError> {
     let row = maps::get(app.store.reads(), &map).await?;
     let found = map_locations::all(app.store.reads()).await?.remove(&map).unwrap_or_default();
-    Ok(Json(map_shown(row, found, &principal)))
+    Ok(Revised(row.revision.clone(), map_shown(row, found, &principal)))
 }
 
 /// Changes a map's name, site, building, floor or position.
@@ -176,8 +180,9 @@ async fn patch(
     State(app): State<AppState>,
     PathParams(map): PathParams<String>,
     Extension(principal): Extension<Principal>,
+    IfMatch(is): IfMatch,
     Body(changes): Body<MapPatch>,
-) -> Result<Json<Map>, ApiError> {
+) -> Result<Revised<Map>, ApiError> {
     let new_name = changes.name.map(|new| name("name", new)).transpose()?;
     let changed = |field, given: Option<Option<String>>| given.map(|text| word(field, text)).transpose();
     let (site, building) = (changed("site", changes.site)?, changed("building", changes.building)?);
@@ -189,6 +194,7 @@ async fn patch(
     }
     let write = app.store.write(move |tx| {
         Box::pin(async move {
+            revisions::check(tx, &map, &Subject::Map, &is).await?;
             let found = map_locations::set(tx, &map, |old| MapLocation {
                 site: site.unwrap_or(old.site),
                 building: building.unwrap_or(old.building),
@@ -202,7 +208,7 @@ async fn patch(
         })
     });
     let (row, found) = write.await.map_err(|e| unknown_parent(e.into()))?;
-    Ok(Json(map_shown(row, found, &principal)))
+    Ok(Revised(row.revision.clone(), map_shown(row, found, &principal)))
 }
 
 /// Deletes a map and all that is in it.
@@ -212,8 +218,15 @@ async fn patch(
 async fn delete(
     State(app): State<AppState>,
     PathParams(map): PathParams<String>,
+    IfMatch(is): IfMatch,
 ) -> Result<StatusCode, ApiError> {
-    app.store.write(move |tx| Box::pin(async move { maps::delete(tx, &map).await })).await?;
+    let write = app.store.write(move |tx| {
+        Box::pin(async move {
+            revisions::check(tx, &map, &Subject::Map, &is).await?;
+            maps::delete(tx, &map).await
+        })
+    });
+    write.await?;
     Ok(StatusCode::NO_CONTENT)
 }
 

@@ -4,11 +4,13 @@ use super::{
     AppState,
     error::ApiError,
     extract::{Body, PathParams, QueryParams},
+    revision::{IfMatch, Revised},
 };
 use crate::store::kind::Kind;
 use crate::store::{
     maps,
     modality_stats::{self, ModalitySettings},
+    revisions::{self, Subject},
 };
 use axum::{Json, extract::State};
 use map::{
@@ -150,14 +152,21 @@ fn known(app: &AppState, map: &str) -> Result<Arc<ModalityMap>, ApiError> {
     Ok(found.modalities.clone())
 }
 
+/// With the revision of what people set: the fusion mode and the named areas.
+fn revised(areas: &ModalityMap) -> Revised<ModalityMapBody> {
+    let named = areas.named().map(|(area, _)| area.clone()).collect();
+    let set = ModalitySettings { mode: areas.mode(), named };
+    Revised(modality_stats::revision(&set), modality_map(areas))
+}
+
 /// Which modality is best where, as runs have shown, and what is fused.
 #[utoipa::path(get, path = "/maps/{map}/modalities", tag = "maps", params(("map" = String, Path)),
     responses((status = 200, body = ModalityMapBody), (status = 404, body = Problem)))]
 async fn get(
     State(app): State<AppState>,
     PathParams(map): PathParams<String>,
-) -> Result<Json<ModalityMapBody>, ApiError> {
-    Ok(Json(modality_map(&*known(&app, &map)?)))
+) -> Result<Revised<ModalityMapBody>, ApiError> {
+    Ok(revised(&*known(&app, &map)?))
 }
 
 fn checked(areas: Vec<AreaBody>) -> Result<Vec<NamedArea>, ApiError> {
@@ -186,8 +195,9 @@ fn checked(areas: Vec<AreaBody>) -> Result<Vec<NamedArea>, ApiError> {
 async fn put(
     State(app): State<AppState>,
     PathParams(map): PathParams<String>,
+    IfMatch(is): IfMatch,
     Body(change): Body<ModalityMapPatch>,
-) -> Result<Json<ModalityMapBody>, ApiError> {
+) -> Result<Revised<ModalityMapBody>, ApiError> {
     let named = change.areas.map(checked).transpose()?;
     let fusion = change.fusion_mode.map(mode);
     let name = map.clone();
@@ -197,11 +207,12 @@ async fn put(
                 mode: fusion.unwrap_or(old.mode),
                 named: named.unwrap_or(old.named),
             };
+            revisions::check(tx, &name, &Subject::Modalities, &is).await?;
             modality_stats::set(tx, &name, new).await
         })
     });
     write.await?;
-    Ok(Json(modality_map(&*known(&app, &map)?)))
+    Ok(revised(&*known(&app, &map)?))
 }
 
 /// What is known where a robot would be: what runs have found there, and what follows.

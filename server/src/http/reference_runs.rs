@@ -2,11 +2,16 @@
 
 use super::{
     App, AppState,
+    answers::created,
     error::ApiError,
     extract::{BodyUpTo, PathParams, name},
     modalities::stats,
 };
-use crate::store::{maps, modality_stats, robots};
+use crate::store::{
+    maps,
+    modality_stats::{self, ReferenceRunRow},
+    robots,
+};
 use axum::{Json, extract::State, http::StatusCode};
 use engine::motion::{RecordingError, RecordingStatus};
 use map::{
@@ -25,7 +30,7 @@ const USUAL: [f64; 2] = [0.01, 0.005];
 /// Most bytes of one pose in JSON: 20 digits of the time, three numbers of up to 25 characters, and what is between them.
 const POSE_BYTES: usize = 112;
 /// Most bytes of a path: that of [`MAX_REFERENCE`] poses, and the rest of the object.
-const PATH_BYTES: usize = MAX_REFERENCE * POSE_BYTES + 1024;
+pub(super) const PATH_BYTES: usize = MAX_REFERENCE * POSE_BYTES + 1024;
 
 pub(super) fn router() -> OpenApiRouter<AppState> {
     OpenApiRouter::new()
@@ -82,7 +87,7 @@ async fn cancel(
     given_up.map(|_run| StatusCode::NO_CONTENT).ok_or_else(|| refused(RecordingError::None))
 }
 
-fn run_shown(row: modality_stats::ReferenceRunRow) -> ReferenceRunBody {
+fn run_shown(row: &ReferenceRunRow) -> ReferenceRunBody {
     let mut sums = StatsByModality::default();
     for found in row.cells.values() {
         for (sum, more) in sums.iter_mut().zip(found) {
@@ -91,7 +96,7 @@ fn run_shown(row: modality_stats::ReferenceRunRow) -> ReferenceRunBody {
     }
     ReferenceRunBody {
         id: row.id,
-        robot: row.robot,
+        robot: row.robot.clone(),
         created_ms: row.created_ms,
         distance_m: row.way_m,
         cells: row.cells.len(),
@@ -169,21 +174,15 @@ async fn reference(
             "none of the run's times is within those of the path",
         ));
     }
-    let map = lent.recording.map.clone();
-    let (on, way_m, cells) = (map.clone(), learnt.way_m, learnt.cells);
+    let (on, way_m, cells) = (lent.recording.map.clone(), learnt.way_m, learnt.cells);
     let write = app.store.write(move |tx| {
         Box::pin(async move {
-            let id = modality_stats::add(tx, &on, &whose, way_m, &cells).await?;
+            let row = modality_stats::add(tx, &on, &whose, way_m, &cells).await?;
             tx.after(move || lent.finish());
-            Ok(id)
+            Ok(row)
         })
     });
-    let id = write.await?;
-    let map = maps::get(app.store.reads(), &map).await?;
-    let runs = modality_stats::runs(app.store.reads(), map.id).await?;
-    let row = runs.into_iter().find(|run| run.id == id);
-    let row = row.ok_or_else(|| refused(RecordingError::None))?;
-    Ok((StatusCode::CREATED, Json(run_shown(row))))
+    created(|row: &ReferenceRunRow| (StatusCode::CREATED, run_shown(row)), write).await
 }
 
 /// The runs that the map's areas have learnt from.
@@ -195,7 +194,7 @@ async fn list(
 ) -> Result<Json<ReferenceRuns>, ApiError> {
     let map = maps::get(app.store.reads(), &map).await?;
     let runs = modality_stats::runs(app.store.reads(), map.id).await?;
-    Ok(Json(ReferenceRuns { runs: runs.into_iter().map(run_shown).collect() }))
+    Ok(Json(ReferenceRuns { runs: runs.iter().map(run_shown).collect() }))
 }
 
 /// Forgets a run and what it showed.

@@ -2,10 +2,10 @@
 
 use super::{
     AppState,
-    answers::{page, row_major, visible_rows},
+    answers::{row_major, selected},
     authorise::check_map,
     error::ApiError,
-    extract::{Body, PathParams, QueryParams, after_name, name, page_limit},
+    extract::{Body, PathParams, QueryParams, name},
 };
 use crate::{
     identity::Principal,
@@ -21,7 +21,7 @@ use map::pose2::Pose2;
 use protos::{
     Name,
     api::{
-        CorrectionBody, CorrectionsBody, EpochConflictBody, Page, PageQuery, Problem, Robot, RobotAssignment,
+        CorrectionBody, CorrectionsBody, EpochConflictBody, ListQuery, Page, Problem, Robot, RobotAssignment,
         RobotPose,
     },
 };
@@ -98,25 +98,21 @@ async fn put(
 
 /// Lists robots by name, with what is known of each: whether its software is connected, whether a second program uses its
 /// name, its pose, how old that is and how far it is trusted.
-#[utoipa::path(get, path = "/robots", tag = "robots", params(PageQuery),
-    responses((status = 200, body = Page<Robot>)))]
+#[utoipa::path(get, path = "/robots", tag = "robots", params(ListQuery),
+    responses((status = 200, body = Page<Robot>),
+    (status = 422, body = Problem, description = "out_of_range, invalid_value: it is sorted by name only")))]
 async fn list(
     State(app): State<AppState>,
-    QueryParams(query): QueryParams<PageQuery>,
+    QueryParams(query): QueryParams<ListQuery>,
     Extension(principal): Extension<Principal>,
 ) -> Result<Json<Page<Robot>>, ApiError> {
-    let limit = page_limit(&query, app.config.limits.page)?;
-    let rows = visible_rows(
-        (after_name(&query), limit),
-        |after| {
-            let app = app.clone();
-            async move { robots::page(app.store.reads(), &after, limit + 1).await }
-        },
-        |row| &row.name,
-        |row| principal.may_see(&row.map),
-    );
-    let rows = rows.await?;
-    Ok(Json(page(rows, limit, |r| r.name.clone(), |r| robot_shown(r, &app.motion, &app.live))))
+    let limits = &app.config.limits;
+    let rows = robots::page(app.store.reads(), "", limits.robots).await?;
+    let visible = rows.into_iter().filter(|row| principal.may_see(&row.map));
+    let rows = visible.map(|row| (row.name.clone(), row)).collect();
+    let Page { items, next, total } = selected(rows, &query, limits.page)?;
+    let items = items.into_iter().map(|(_, row)| robot_shown(row, &app.motion, &app.live)).collect();
+    Ok(Json(Page { items, next, total }))
 }
 
 /// One robot.

@@ -1,11 +1,11 @@
 //! Every route, with the layers around them and the OpenAPI document made from them.
 
 use super::{
-    API, App, AppState, authorise, backups, cameras,
+    API, App, AppState, authorise, backups, bulk, cameras, creation, documented,
     error::{ApiError, method_not_allowed, not_found},
     examples::with_examples,
     gathering, guard, health, landmarks, learning, live, mapping, maps, modalities, page_session, pages,
-    recognise, reference_runs, relocalisation, robots, ros2,
+    recognise, reference_runs, relocalisation, revision, robots, ros2,
     security::with_security,
     tokens, underlay, views, visibility, visibility_settings, walls,
 };
@@ -25,11 +25,14 @@ use utoipa_axum::router::OpenApiRouter;
 use utoipa_swagger_ui::SwaggerUi;
 
 #[derive(OpenApi)]
-#[openapi(info(
-    title = "Waymark",
-    description = "Maps, landmarks, lessons and robots. Errors are application/problem+json with a stable `code` and \
+#[openapi(
+    components(schemas(protos::api::ListOrder)),
+    info(
+        title = "Waymark",
+        description = "Maps, landmarks, lessons and robots. Errors are application/problem+json with a stable `code` and \
                    the `field` at fault; lists come in pages."
-))]
+    )
+)]
 struct Document;
 
 fn api(limits: &Limits) -> OpenApiRouter<AppState> {
@@ -39,6 +42,7 @@ fn api(limits: &Limits) -> OpenApiRouter<AppState> {
         .merge(underlay::router(limits.upload_bytes))
         .merge(mapping::router())
         .merge(landmarks::router())
+        .merge(bulk::router())
         .merge(views::router(limits.upload_bytes))
         .merge(learning::router())
         .merge(gathering::router())
@@ -59,10 +63,12 @@ fn api(limits: &Limits) -> OpenApiRouter<AppState> {
 }
 
 /// Routes and their OpenAPI document.
-fn parts(limits: &Limits) -> (Router<AppState>, openapi::OpenApi) {
+pub(super) fn parts(limits: &Limits) -> (Router<AppState>, openapi::OpenApi) {
     let (routes, document) =
         OpenApiRouter::with_openapi(Document::openapi()).nest(API, api(limits)).split_for_parts();
-    (routes, with_security(with_examples(document, API), API))
+    let document = creation::with_keys(with_examples(document, API));
+    let document = documented::with_errors(revision::with_revisions(document));
+    (routes, with_security(document, API))
 }
 
 /// The whole service.
@@ -74,6 +80,7 @@ pub(crate) fn router(app: App) -> Router {
     let config = utoipa_swagger_ui::Config::from(format!("{API}/openapi.json"));
     let docs: Router<AppState> = SwaggerUi::new("/api/docs").config(config).into();
     routes
+        .route_layer(from_fn_with_state(app.clone(), creation::keyed))
         .route_layer(from_fn_with_state(app.clone(), authorise::authorise))
         .route(&format!("{API}/openapi.json"), get(move || async move { Json(document) }))
         .merge(health)

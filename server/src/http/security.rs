@@ -29,11 +29,11 @@ pub(super) fn with_security(mut document: OpenApi, root: &str) -> OpenApi {
         for (method, operation) in methods {
             if let (Some(operation), Some(Access::Needs(role, scope))) = (operation, access(method, below)) {
                 let whole = if scope == Scope::Server { ", for all maps" } else { "" };
-                refuse(operation, "401", format!("unauthenticated: the role {role} is needed"));
+                refuse(operation, "401", &format!("unauthenticated: the role {role} is needed"));
                 refuse(
                     operation,
                     "403",
-                    format!("forbidden: less than the role {role}{whole}; page_header_missing"),
+                    &format!("forbidden: less than the role {role}{whole}; page_header_missing"),
                 );
                 operation.security = Some(vec![SecurityRequirement::new(SCHEME, [] as [&str; 0])]);
             }
@@ -42,9 +42,15 @@ pub(super) fn with_security(mut document: OpenApi, root: &str) -> OpenApi {
     document
 }
 
-fn refuse(operation: &mut Operation, status: &str, description: String) {
+/// Adds a refusal to what the document says of this status.
+fn refuse(operation: &mut Operation, status: &str, description: &str) {
+    let responses = &mut operation.responses.responses;
+    let before = match responses.get(status) {
+        Some(RefOr::T(response)) => format!("{}; ", response.description),
+        _ => String::new(),
+    };
     let problem = Content::new(Some(RefOr::Ref(Ref::from_schema_name("Problem"))));
-    let response: Response =
-        ResponseBuilder::new().description(description).content(super::error::PROBLEM_JSON, problem).build();
-    operation.responses.responses.insert(status.to_owned(), RefOr::T(response));
+    let response = ResponseBuilder::new().description(before + description);
+    let response: Response = response.content(super::error::PROBLEM_JSON, problem).build();
+    responses.insert(status.to_owned(), RefOr::T(response));
 }

@@ -1,9 +1,12 @@
 //! The routes without a network: requests go straight to the router.
 
 mod authorisation;
+mod creation;
 mod earlier_build;
+mod lists;
 mod openapi;
 mod page_sessions;
+mod revision;
 mod teaching;
 
 use super::*;
@@ -99,7 +102,8 @@ impl Service {
 
 fn request(method: &str, path: &str, body: impl Into<Body>) -> Request<Body> {
     let request = Request::builder().method(method).uri(path).header(header::HOST, "localhost");
-    request.header(header::CONTENT_TYPE, "application/json").body(body.into()).unwrap()
+    let request = request.header(header::CONTENT_TYPE, "application/json").header(header::IF_MATCH, "*");
+    request.body(body.into()).unwrap()
 }
 
 async fn read(response: Response<Body>) -> (u16, Value) {

@@ -67,9 +67,10 @@ async fn list(
     State(app): State<AppState>,
     QueryParams(query): QueryParams<PageQuery>,
 ) -> Result<Json<Page<Token>>, ApiError> {
-    let limit = page_limit(&query, app.config.limits.page)?;
+    let limit = page_limit(query.limit, app.config.limits.page)?;
     let rows = tokens::page(app.store.reads(), after_number(&query)?, limit + 1).await?;
-    Ok(Json(page(rows, limit, |row| row.token.id.to_string(), |row| row.token)))
+    let total = tokens::count(app.store.reads()).await?;
+    Ok(Json(page(rows, limit, total, |row| row.token.id.to_string(), |row| row.token)))
 }
 
 /// Revokes a token, and ends the sessions and event streams that it opened.

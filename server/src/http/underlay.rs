@@ -5,14 +5,15 @@ use super::{
     answers::picture_answer,
     error::{ApiError, out_of_range},
     extract::{self, PathParams},
+    revision::{IfMatch, Revised},
     upload::{FORM_OVERHEAD, Form},
 };
 use crate::store::{
     maps, pictures,
+    revisions::{self, Subject},
     underlays::{self, UnderlayRow},
 };
 use axum::{
-    Json,
     body::Bytes,
     extract::{DefaultBodyLimit, Request, State},
     http::StatusCode,
@@ -63,8 +64,9 @@ fn number(part: Option<&Bytes>, field: &'static str, [low, high]: [f64; 2]) -> R
 async fn put(
     State(app): State<AppState>,
     PathParams(map): PathParams<String>,
+    IfMatch(is): IfMatch,
     request: Request,
-) -> Result<Json<Underlay>, ApiError> {
+) -> Result<Revised<Underlay>, ApiError> {
     maps::get(app.store.reads(), &map).await?;
     let mut form =
         Form::read(&app, request, &["image", "metres_per_pixel", "x_m", "y_m", "theta_rad"]).await?;
@@ -84,9 +86,15 @@ async fn put(
         map_from_picture: [x_m, y_m, theta_rad],
         created_ms: 0,
     };
-    let write =
-        app.store.write(move |tx| Box::pin(async move { underlays::put(tx, &map, row, &image).await }));
-    Ok(Json(shown(write.await?)))
+    let write = app.store.write(move |tx| {
+        Box::pin(async move {
+            revisions::check(tx, &map, &Subject::Underlay, &is).await?;
+            let row = underlays::put(tx, &map, row, &image).await?;
+            Ok((revisions::after(tx, &map, &Subject::Underlay).await?, row))
+        })
+    });
+    let (revision, row) = write.await?;
+    Ok(Revised(revision, shown(row)))
 }
 
 /// The picture, if it can be shown, with its size.
@@ -101,9 +109,10 @@ fn decoded(app: &App, bytes: Bytes) -> Result<(Bytes, [u32; 2]), ApiError> {
 async fn get(
     State(app): State<AppState>,
     PathParams(map): PathParams<String>,
-) -> Result<Json<Underlay>, ApiError> {
+) -> Result<Revised<Underlay>, ApiError> {
+    let revision = app.store.revision(&map, &Subject::Underlay).await?;
     let map = maps::get(app.store.reads(), &map).await?;
-    Ok(Json(shown(underlays::get(app.store.reads(), (map.id, &map.name)).await?)))
+    Ok(Revised(revision, shown(underlays::get(app.store.reads(), (map.id, &map.name)).await?)))
 }
 
 /// Deletes the picture under the map.
@@ -112,8 +121,15 @@ async fn get(
 async fn delete(
     State(app): State<AppState>,
     PathParams(map): PathParams<String>,
+    IfMatch(is): IfMatch,
 ) -> Result<StatusCode, ApiError> {
-    app.store.write(move |tx| Box::pin(async move { underlays::delete(tx, &map).await })).await?;
+    let write = app.store.write(move |tx| {
+        Box::pin(async move {
+            revisions::check(tx, &map, &Subject::Underlay, &is).await?;
+            underlays::delete(tx, &map).await
+        })
+    });
+    write.await?;
     Ok(StatusCode::NO_CONTENT)
 }
 

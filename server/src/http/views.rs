@@ -2,7 +2,7 @@
 
 use super::{
     App, AppState,
-    answers::{page, picture_answer},
+    answers::{created, page, picture_answer},
     error::ApiError,
     extract::{self, PathParams, QueryParams, after_number, page_limit},
     landmarks::checked_size,
@@ -135,14 +135,17 @@ async fn add(
     let create = creates.then_some(app.config.limits.landmarks);
     let view = NewView { capture, ..new };
     let teaching = Teaching { map, landmark, view, max, novelty, size, create };
-    let (row, outcome, placing) = teaching::add(&app.store, teaching).await?;
+    created(added_shown, teaching::add(&app.store, teaching)).await
+}
+
+/// What came of a view.
+fn added_shown((row, outcome, placing): &teaching::Added) -> (StatusCode, TrainingView) {
     let view = TrainingView {
-        placing: placing.map(placement_shown),
-        outcome: Some(outcome_shown(outcome)),
-        ..view_shown(row)
+        placing: placing.clone().map(placement_shown),
+        outcome: Some(outcome_shown(*outcome)),
+        ..view_shown(row.clone())
     };
-    let status = if outcome == UploadOutcome::New { StatusCode::CREATED } else { StatusCode::OK };
-    Ok((status, Json(view)))
+    (if *outcome == UploadOutcome::New { StatusCode::CREATED } else { StatusCode::OK }, view)
 }
 
 /// A size by hand, checked. Both sides or none.
@@ -264,12 +267,12 @@ async fn list(
     PathParams((map, landmark)): PathParams<(String, String)>,
     QueryParams(query): QueryParams<PageQuery>,
 ) -> Result<Json<Page<TrainingView>>, ApiError> {
-    let limit = page_limit(&query, app.config.limits.page)?;
+    let limit = page_limit(query.limit, app.config.limits.page)?;
     let after = after_number(&query)?;
     maps::get(app.store.reads(), &map).await?;
     let landmark = landmarks::get(app.store.reads(), &map, &landmark).await?;
     let rows = views::page(app.store.reads(), landmark.id, after, limit + 1).await?;
-    Ok(Json(page(rows, limit, |r| r.id.to_string(), view_shown)))
+    Ok(Json(page(rows, limit, landmark.views, |r| r.id.to_string(), view_shown)))
 }
 
 /// Deletes a view. The model stays until the landmark is learnt again.

@@ -5,9 +5,14 @@ use super::{
     AppState,
     error::ApiError,
     extract::{Body, PathParams},
+    revision::{IfMatch, Revised},
 };
-use crate::store::{maps, visibility_settings};
-use axum::{Json, extract::State, http::StatusCode};
+use crate::store::{
+    maps,
+    revisions::{self, Subject},
+    visibility_settings,
+};
+use axum::{extract::State, http::StatusCode};
 use engine::snapshot::MapSnapshot;
 use map::{
     check::OutOfRange,
@@ -101,11 +106,12 @@ fn refused(error: &OutOfRange, outer: &str) -> ApiError {
 async fn get(
     State(app): State<AppState>,
     PathParams(map): PathParams<String>,
-) -> Result<Json<VisibilitySettingsBody>, ApiError> {
+) -> Result<Revised<VisibilitySettingsBody>, ApiError> {
     maps::get(app.store.reads(), &map).await?;
     let gone = || ApiError::new(StatusCode::NOT_FOUND, "unknown_map", "no such map").field("map");
     let snapshot = app.store.snapshots().get(&map).ok_or_else(gone)?;
-    Ok(Json(shown(&snapshot.visibility_settings)))
+    let settings = &snapshot.visibility_settings;
+    Ok(Revised(visibility_settings::revision(settings), shown(settings)))
 }
 
 /// Says which camera looks for a map's landmarks; what is absent is that of a usual robot. The areas of all landmarks are
@@ -116,14 +122,19 @@ async fn get(
 async fn put(
     State(app): State<AppState>,
     PathParams(map): PathParams<String>,
+    IfMatch(is): IfMatch,
     Body(fields): Body<VisibilitySettingsBody>,
-) -> Result<Json<VisibilitySettingsBody>, ApiError> {
+) -> Result<Revised<VisibilitySettingsBody>, ApiError> {
     let sight = over(&fields, &VisibilitySettings::default()).map_err(|e| refused(&e, ""))?;
-    let stored = shown(&sight);
-    app.store
-        .write(move |tx| Box::pin(async move { visibility_settings::set(tx, &map, &sight).await }))
-        .await?;
-    Ok(Json(stored))
+    let stored = Revised(visibility_settings::revision(&sight), shown(&sight));
+    let write = app.store.write(move |tx| {
+        Box::pin(async move {
+            revisions::check(tx, &map, &Subject::VisibilitySettings, &is).await?;
+            visibility_settings::set(tx, &map, &sight).await
+        })
+    });
+    write.await?;
+    Ok(stored)
 }
 
 /// Areas by landmark.

@@ -4,9 +4,14 @@ use super::{
     AppState,
     error::{ApiError, out_of_range},
     extract::{Body, PathParams},
+    revision::{IfMatch, Revised},
 };
-use crate::store::{maps, walls};
-use axum::{Json, extract::State};
+use crate::store::{
+    maps,
+    revisions::{self, Subject},
+    walls,
+};
+use axum::extract::State;
 use protos::api::{Problem, WallBody, WallsBody};
 use utoipa_axum::{router::OpenApiRouter, routes};
 
@@ -29,16 +34,23 @@ fn checked(index: usize, WallBody { a, b }: &WallBody) -> Result<[f64; 4], ApiEr
 async fn put(
     State(app): State<AppState>,
     PathParams(map): PathParams<String>,
+    IfMatch(is): IfMatch,
     Body(walls): Body<WallsBody>,
-) -> Result<Json<WallsBody>, ApiError> {
+) -> Result<Revised<WallsBody>, ApiError> {
     let max = app.config.limits.laser_segments;
     if walls.segments.len() > max {
         return Err(ApiError::invalid("too_many", "segments", format!("more than {max} segments")));
     }
     let ends =
         walls.segments.iter().enumerate().map(|(i, s)| checked(i, s)).collect::<Result<Vec<_>, _>>()?;
-    app.store.write(move |tx| Box::pin(async move { walls::replace(tx, &map, &ends).await })).await?;
-    Ok(Json(walls))
+    let write = app.store.write(move |tx| {
+        Box::pin(async move {
+            revisions::check(tx, &map, &Subject::Walls, &is).await?;
+            walls::replace(tx, &map, &ends).await?;
+            revisions::after(tx, &map, &Subject::Walls).await
+        })
+    });
+    Ok(Revised(write.await?, walls))
 }
 
 /// The walls.
@@ -47,9 +59,10 @@ async fn put(
 async fn get(
     State(app): State<AppState>,
     PathParams(map): PathParams<String>,
-) -> Result<Json<WallsBody>, ApiError> {
+) -> Result<Revised<WallsBody>, ApiError> {
+    let revision = app.store.revision(&map, &Subject::Walls).await?;
     let map = maps::get(app.store.reads(), &map).await?;
     let stored = walls::all_of(app.store.reads(), map.id).await?;
     let segments = stored.into_iter().map(|[ax, ay, bx, by]| WallBody { a: [ax, ay], b: [bx, by] }).collect();
-    Ok(Json(WallsBody { segments }))
+    Ok(Revised(revision, WallsBody { segments }))
 }

@@ -19,7 +19,7 @@ use crate::{
     publication::Catalogue,
     store::{
         StoreError,
-        jobs::{self, Ended, JobRow},
+        jobs::{self, Ended, JobFilter, JobRow},
     },
 };
 use std::{
@@ -158,16 +158,31 @@ impl Jobs {
     /// A job with its progress while it is open. Its row ends in the transaction of its models; here it has ended once those
     /// are published, so whoever asks next is answered by them.
     pub(crate) async fn get(&self, id: i64) -> Result<(JobRow, Option<JobProgress>), StoreError> {
-        let mut row = jobs::get(self.store.reads(), id).await?;
+        Ok(self.with_progress(jobs::get(self.store.reads(), id).await?))
+    }
+
+    /// Jobs with numbers below `before`, newest first, and how many there are on all pages.
+    pub(crate) async fn page(
+        &self,
+        filter: &JobFilter,
+        before: i64,
+        limit: usize,
+    ) -> Result<(Vec<(JobRow, Option<JobProgress>)>, u64), StoreError> {
+        let rows = jobs::page(self.store.reads(), filter, before, limit).await?;
+        let total = jobs::count(self.store.reads(), filter).await?;
+        Ok((rows.into_iter().map(|row| self.with_progress(row)).collect(), total))
+    }
+
+    fn with_progress(&self, mut row: JobRow) -> (JobRow, Option<JobProgress>) {
         let reporters = self.lock();
         if !is_open(&row) {
-            if reporters.running != Some(id) {
-                return Ok((row, None));
+            if reporters.running != Some(row.id) {
+                return (row, None);
             }
             (row.state, row.message, row.result) = ("running".to_owned(), String::new(), None);
         }
-        let progress = reporters.of.get(&id).map(|reporter| reporter.progress.borrow().clone());
-        Ok((row, progress))
+        let progress = reporters.of.get(&row.id).map(|reporter| reporter.progress.borrow().clone());
+        (row, progress)
     }
 
     /// Progress of an open job, from its queue to its end; `None` once it has ended.

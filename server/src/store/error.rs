@@ -40,6 +40,14 @@ pub(crate) enum StoreError {
         /// The size that was given.
         given: LandmarkSize,
     },
+    /// One of several did not go, so none did.
+    #[error("{source}")]
+    At {
+        /// Which one.
+        index: usize,
+        /// Why.
+        source: Box<StoreError>,
+    },
     /// Something else rests on it.
     #[error("{0}")]
     InUse(String),
@@ -64,6 +72,20 @@ pub(crate) enum StoreError {
     /// What a write rests on changed after each preparation.
     #[error("others change the same things at this moment; try again")]
     Busy,
+    /// A change is meant for another revision.
+    #[error("somebody else has changed it since it was read: read it again, and change that")]
+    ChangedMeanwhile {
+        /// The present revision.
+        present: String,
+    },
+    /// A creation with this key is at work.
+    #[error("a request with this key is at work: repeat it when that has ended")]
+    KeyAtWork,
+    /// The key was used for another request.
+    #[error(
+        "this key was used for another request: take a fresh one for each creation, the same one to repeat it"
+    )]
+    KeyReused,
     /// The writer has stopped: after an I/O error nothing may be written any more.
     #[error("storage failed; the server stops: check the disk, then restart it")]
     Closed,
@@ -144,7 +166,13 @@ impl StoreError {
                 matches!(primary_code(source), Some(SQLITE_IOERR | SQLITE_CORRUPT | SQLITE_NOTADB))
                     || matches!(source, sqlx::Error::Io(_) | sqlx::Error::WorkerCrashed)
             }
+            Self::At { source, .. } => source.is_fatal(),
             _ => false,
         }
+    }
+
+    /// That of one of several.
+    pub(crate) fn at(self, index: usize) -> Self {
+        Self::At { index, source: Box::new(self) }
     }
 }

@@ -144,6 +144,12 @@ fn unknown(what: Kind, number: i64) -> StoreError {
     StoreError::NotFound { what, name: number.to_string() }
 }
 
+/// How many gatherings a map has.
+pub(crate) async fn count(db: impl SqliteExecutor<'_>, map_id: i64) -> Result<u64, StoreError> {
+    let count = sqlx::query_scalar::<_, i64>(COUNT).bind(map_id).fetch_one(db).await;
+    count.map(|n| n as u64).map_err(StoreError::during("count gatherings"))
+}
+
 /// Starts a gathering with a robot that is on the map.
 pub(crate) async fn create(
     tx: &mut Tx,

@@ -7,6 +7,9 @@ statements! {
     COUNT_OPEN = "SELECT count(*) FROM jobs WHERE state IN ('queued', 'running')";
     INSERT = "INSERT INTO jobs (kind, map, request, state, created_ms) VALUES (?1, ?2, ?3, 'queued', ?4) RETURNING id";
     GET = "SELECT id, kind, map, request, state, message, result, attempts FROM jobs WHERE id = ?1";
+    LIST = "SELECT id, kind, map, request, state, message, result, attempts FROM jobs WHERE id < ?1 \
+            AND (?2 IS NULL OR state = ?2) AND (?3 IS NULL OR map IN (SELECT value FROM json_each(?3))) ORDER BY id DESC LIMIT ?4";
+    COUNT = "SELECT count(*) FROM jobs WHERE (?1 IS NULL OR state = ?1) AND (?2 IS NULL OR map IN (SELECT value FROM json_each(?2)))";
     OPEN = "SELECT id, kind, map, request, state, message, result, attempts FROM jobs \
             WHERE state IN ('queued', 'running') ORDER BY id";
     BEGIN = "UPDATE jobs SET state = 'running', attempts = attempts + 1 \
@@ -113,6 +116,33 @@ pub(crate) async fn get(db: impl SqliteExecutor<'_>, id: i64) -> Result<JobRow, 
     let row = sqlx::query(GET).bind(id).fetch_optional(db).await.map_err(StoreError::during("read job"))?;
     let row = row.ok_or_else(|| StoreError::NotFound { what: Kind::Job, name: id.to_string() })?;
     job_row(&row).map_err(StoreError::during("read job"))
+}
+
+/// Which jobs are listed.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub(crate) struct JobFilter {
+    /// As in [`JobRow`].
+    pub(crate) state: Option<&'static str>,
+    /// JSON list of names of maps; `None` for all.
+    pub(crate) maps: Option<String>,
+}
+
+/// Jobs with numbers below `before`, newest first.
+pub(crate) async fn page(
+    db: impl SqliteExecutor<'_>,
+    filter: &JobFilter,
+    before: i64,
+    limit: usize,
+) -> Result<Vec<JobRow>, StoreError> {
+    let rows = sqlx::query(LIST).bind(before).bind(filter.state).bind(&filter.maps).bind(limit as i64);
+    let rows = rows.fetch_all(db).await.map_err(StoreError::during("list jobs"))?;
+    rows.iter().map(job_row).collect::<Result<_, _>>().map_err(StoreError::during("list jobs"))
+}
+
+/// How many jobs a list has.
+pub(crate) async fn count(db: impl SqliteExecutor<'_>, filter: &JobFilter) -> Result<u64, StoreError> {
+    let count = sqlx::query_scalar::<_, i64>(COUNT).bind(filter.state).bind(&filter.maps).fetch_one(db).await;
+    count.map(|n| n as u64).map_err(StoreError::during("count jobs"))
 }
 
 /// Jobs not ended, oldest first.

@@ -13,7 +13,7 @@ use vision::{model::LandmarkId, pose::LandmarkSize};
 macro_rules! select {
     ($tail:literal) => {
         concat!(
-            "SELECT l.id, l.name, l.width_m, l.height_m, l.x_m, l.y_m, l.z_m, l.theta_rad, \
+            "SELECT l.id, l.name, l.id || '.' || l.revision AS revision, l.changed_ms, l.width_m, l.height_m, l.x_m, l.y_m, l.z_m, l.theta_rad, \
              l.roll_rad, l.tilt_rad, l.place_covariance, l.size_from_views, l.health, l.finding, \
              (SELECT count(*) FROM views v WHERE v.landmark_id = l.id) AS views, \
              m.active, m.looks_like, m.reasons, m.facts, m.views AS model_views, m.generated_views, m.learnt_ms \
@@ -94,6 +94,10 @@ pub(crate) struct ModelSummary {
 pub(crate) struct LandmarkRow {
     pub(crate) id: i64,
     pub(crate) name: String,
+    /// See [`super::revisions`].
+    pub(crate) revision: String,
+    /// When the revision changed last.
+    pub(crate) changed_ms: i64,
     pub(crate) geometry: LandmarkGeometry,
     pub(crate) views: u64,
     pub(crate) model: Option<ModelSummary>,
@@ -189,6 +193,8 @@ fn landmark_row(row: &SqliteRow) -> Result<LandmarkRow, sqlx::Error> {
     Ok(LandmarkRow {
         id: row.try_get("id")?,
         name: row.try_get("name")?,
+        revision: row.try_get("revision")?,
+        changed_ms: row.try_get("changed_ms")?,
         geometry: geometry(row)?,
         views: row.try_get::<i64, _>("views")? as u64,
         model,
@@ -222,15 +228,7 @@ pub(crate) async fn create(
     within(count, max, "landmarks in a map")?;
     set_geometry(tx, id, &geometry).await?;
     maps::bump(tx, map.id).await?;
-    Ok(LandmarkRow {
-        id,
-        name: name.to_owned(),
-        geometry,
-        views: 0,
-        model: None,
-        health: LandmarkHealth::Sound,
-        finding: None,
-    })
+    get(&mut tx.conn, &map.name, name).await
 }
 
 /// One landmark by the names of its map and itself. A missing map is not told from a missing landmark.
@@ -270,8 +268,7 @@ pub(crate) async fn set_health(
     finding: Option<&str>,
 ) -> Result<LandmarkRow, StoreError> {
     let map = maps::get(&mut tx.conn, map).await?;
-    let mut landmark = get(&mut tx.conn, &map.name, name).await?;
-    (landmark.health, landmark.finding) = (health, finding.map(str::to_owned));
+    let landmark = get(&mut tx.conn, &map.name, name).await?;
     sqlx::query(SET_HEALTH)
         .bind(landmark.id)
         .bind(health_word(health))
@@ -280,7 +277,7 @@ pub(crate) async fn set_health(
         .await
         .map_err(StoreError::during("set landmark health"))?;
     maps::bump(tx, map.id).await?;
-    Ok(landmark)
+    get(&mut tx.conn, &map.name, name).await
 }
 
 /// Sets size and place. `change` gets the present geometry and returns the new one.
@@ -291,19 +288,15 @@ pub(crate) async fn update(
     change: impl FnOnce(LandmarkGeometry) -> LandmarkGeometry + Send,
 ) -> Result<LandmarkRow, StoreError> {
     let map = maps::get(&mut tx.conn, map).await?;
-    let mut landmark = get(&mut tx.conn, &map.name, name).await?;
-    let old = landmark.geometry;
-    landmark.geometry = change(old);
-    if landmark.geometry != old && landmark.health != LandmarkHealth::Sound {
+    let old = get(&mut tx.conn, &map.name, name).await?;
+    let geometry = change(old.geometry);
+    if geometry != old.geometry && old.health != LandmarkHealth::Sound {
         // The finding was about another place.
-        landmark = LandmarkRow {
-            geometry: landmark.geometry,
-            ..set_health(tx, &map.name, name, LandmarkHealth::Sound, None).await?
-        };
+        set_health(tx, &map.name, name, LandmarkHealth::Sound, None).await?;
     }
-    set_geometry(tx, landmark.id, &landmark.geometry).await?;
+    set_geometry(tx, old.id, &geometry).await?;
     maps::bump(tx, map.id).await?;
-    Ok(landmark)
+    get(&mut tx.conn, &map.name, name).await
 }
 
 /// Gives a landmark another name, also in the jobs that wait for it; returns that name. Errors: `Exists`.

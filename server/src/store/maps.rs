@@ -7,9 +7,9 @@ use vision::recognise::DistanceKind;
 statements! {
     COUNT = "SELECT count(*) FROM maps";
     INSERT = "INSERT INTO maps (name, distance, created_ms) VALUES (?1, ?2, ?3) RETURNING id";
-    GET = "SELECT id, name, version, distance, (SELECT count(*) FROM landmarks WHERE map_id = maps.id) AS landmarks \
+    GET = "SELECT id, name, version, id || '.' || revision AS revision, changed_ms, distance, (SELECT count(*) FROM landmarks WHERE map_id = maps.id) AS landmarks \
            FROM maps WHERE name = ?1";
-    PAGE = "SELECT id, name, version, distance, (SELECT count(*) FROM landmarks WHERE map_id = maps.id) AS landmarks \
+    PAGE = "SELECT id, name, version, id || '.' || revision AS revision, changed_ms, distance, (SELECT count(*) FROM landmarks WHERE map_id = maps.id) AS landmarks \
             FROM maps WHERE name > ?1 ORDER BY name LIMIT ?2";
     BUMP = "UPDATE maps SET version = version + 1 WHERE id = ?1";
     DELETE = "DELETE FROM maps WHERE id = ?1";
@@ -29,6 +29,10 @@ pub(crate) struct MapRow {
     pub(crate) id: i64,
     pub(crate) name: String,
     pub(crate) version: u64,
+    /// Of the map and all that is in it ([`super::revisions`]).
+    pub(crate) revision: String,
+    /// When the revision changed last.
+    pub(crate) changed_ms: i64,
     pub(crate) distance: DistanceKind,
     /// How many landmarks it has.
     pub(crate) landmarks: u64,
@@ -40,6 +44,8 @@ fn map_row(row: &SqliteRow) -> Result<MapRow, sqlx::Error> {
         id: row.try_get("id")?,
         name: row.try_get("name")?,
         version: row.try_get::<i64, _>("version")? as u64,
+        revision: row.try_get("revision")?,
+        changed_ms: row.try_get("changed_ms")?,
         distance: distance_of(&distance),
         landmarks: row.try_get::<i64, _>("landmarks")? as u64,
     })
@@ -80,7 +86,7 @@ pub(crate) async fn create(
         sqlx::query_scalar(COUNT).fetch_one(&mut tx.conn).await.map_err(StoreError::during("count maps"))?;
     within(count, max, "maps")?;
     tx.changed(CommittedChange::Map(id));
-    Ok(MapRow { id, name: name.to_owned(), version: 1, distance, landmarks: 0 })
+    get(&mut tx.conn, name).await
 }
 
 /// One map by name.
@@ -151,6 +157,7 @@ pub(crate) async fn rename(tx: &mut Tx, name: &str, new: &str) -> Result<(), Sto
     in_jobs.map_err(StoreError::during("rename map in jobs"))?;
     tx.changed(CommittedChange::MapRemoved(map.name));
     tx.changed(CommittedChange::Map(map.id));
+    tx.changed(CommittedChange::Tokens);
     tx.changed(CommittedChange::Links);
     Ok(())
 }

@@ -29,6 +29,8 @@ const FILES: &[(&str, &str)] = files![
     "0015_underlay",
     "0016_pictures",
     "0017_tokens",
+    "0018_idempotency",
+    "0019_revisions",
 ];
 
 /// The steps in order.

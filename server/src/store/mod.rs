@@ -31,6 +31,8 @@ pub(crate) mod visibility_settings;
 pub(crate) mod robots;
 pub(crate) mod tokens;
 pub(crate) mod jobs;
+pub(crate) mod kept_answers;
+pub(crate) mod revisions;
 
 pub(crate) use error::StoreError;
 pub(crate) use on_commit::{CommittedChange, OnCommit};
@@ -40,8 +42,9 @@ pub(crate) use writer::{PART as WRITER, Tx};
 use crate::config::Config;
 use engine::vitals::Vitals;
 use futures::future::BoxFuture;
+use sha2::{Digest as _, Sha256};
 use sqlx::SqlitePool;
-use std::{sync::Arc, time::SystemTime};
+use std::{fmt::Write as _, sync::Arc, time::SystemTime};
 use tokio::sync::{Mutex, MutexGuard, Notify, mpsc, oneshot};
 
 /// The open store. Cheap to clone.
@@ -53,6 +56,9 @@ pub(crate) struct Store {
     jobs: Arc<Notify>,
     /// Held while a write is prepared and made.
     turn: Arc<Mutex<()>>,
+    keys: kept_answers::KeysAtWork,
+    /// Most answers that are kept for repeats.
+    kept_answers: usize,
 }
 
 /// Awaited so that the file is closed in good order.
@@ -102,18 +108,21 @@ impl Store {
         let (close, closed) = oneshot::channel();
         let task = tokio::spawn(writer.run(closed, vitals.begin(WRITER)));
         let task = WriterTask { task, close, reads: opened.reads.clone(), _lock: opened.lock };
-        Ok((Self { commands, reads: opened.reads, vitals, jobs, turn: Arc::default() }, task))
+        let (turn, keys) = (Arc::default(), kept_answers::KeysAtWork::default());
+        let kept_answers = config.limits.kept_answers;
+        Ok((Self { commands, reads: opened.reads, vitals, jobs, turn, keys, kept_answers }, task))
     }
 
     /// Runs `write` in its own transaction. When this returns `Ok`, it is committed and visible. A caller that drops this
-    /// future before the transaction begins takes the write back; later it runs to its end.
+    /// future before the transaction begins takes the write back; later it runs to its end. The answer to a creation with a key
+    /// is kept in the same transaction ([`kept_answers`]).
     pub(crate) async fn write<T, F>(&self, write: F) -> Result<T, StoreError>
     where
         T: Send + 'static,
         F: for<'t> FnOnce(&'t mut Tx) -> BoxFuture<'t, Result<T, StoreError>> + Send + 'static,
     {
         let caller = Arc::new(());
-        let (command, answer) = writer::command(write, &caller);
+        let (command, answer) = writer::command(write, kept_answers::Keeping::current(), &caller);
         self.commands.send(command).await.map_err(|_gone| StoreError::Closed)?;
         let answer = answer.await;
         drop(caller);
@@ -149,6 +158,16 @@ pub(crate) fn now_ms() -> i64 {
 /// Refuses an insertion that has passed a bound: the transaction is rolled back.
 fn within(count: i64, max: usize, what: &'static str) -> Result<(), StoreError> {
     if count as usize > max { Err(StoreError::Limit { what, max }) } else { Ok(()) }
+}
+
+/// The revision of a text: its digest, so that what is shown and what is stored can be compared wherever they are read.
+fn text_revision(text: &str) -> String {
+    let digest = Sha256::digest(text.as_bytes());
+    digest[..12].iter().fold(String::new(), |mut hex, byte| {
+        // Writing to a String cannot fail.
+        write!(hex, "{byte:02x}").ok();
+        hex
+    })
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Modality statistics of a map's reference runs, the areas that people named, and the fusion mode.
 
-use super::{StoreError, Tx, kind::Kind, maps, now_ms, statements::statements, within};
+use super::{StoreError, Tx, kind::Kind, maps, now_ms, statements::statements, text_revision, within};
 use map::modality_stats::{FusionMode, MAX_AREAS, NamedArea, PoseCell, StatsByModality};
 use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
 use std::collections::BTreeMap;
@@ -91,6 +91,11 @@ pub(crate) async fn settings(
     Ok(ModalitySettings { mode, named: named.into_iter().filter(|area| area.check().is_ok()).collect() })
 }
 
+/// The revision of a fusion mode and named areas.
+pub(crate) fn revision(settings: &ModalitySettings) -> String {
+    text_revision(&json("areas", &(mode_word(settings.mode), &settings.named)).unwrap_or_default())
+}
+
 /// Changes the settings of a map; `change` gets the present ones.
 pub(crate) async fn set(
     tx: &mut Tx,
@@ -119,29 +124,30 @@ pub(crate) async fn runs(
     rows.iter().map(run_row).collect::<Result<_, _>>().map_err(StoreError::during("read runs"))
 }
 
-/// Stores a reference run; gives its number.
+/// Stores a reference run; gives it as it is read.
 pub(crate) async fn add(
     tx: &mut Tx,
     map: &str,
     robot: &str,
     way_m: f64,
     cells: &BTreeMap<PoseCell, StatsByModality>,
-) -> Result<i64, StoreError> {
+) -> Result<ReferenceRunRow, StoreError> {
     let map = maps::get(&mut tx.conn, map).await?;
-    let cells = json("a run", &cells.iter().collect::<Vec<_>>())?;
+    let (text, created_ms) = (json("a run", &cells.iter().collect::<Vec<_>>())?, now_ms());
     let id = sqlx::query_scalar(INSERT)
         .bind(map.id)
         .bind(robot)
-        .bind(now_ms())
+        .bind(created_ms)
         .bind(way_m)
-        .bind(cells)
+        .bind(&text)
         .fetch_one(&mut tx.conn)
         .await
         .map_err(StoreError::during("store run"))?;
     let count = sqlx::query_scalar(COUNT).bind(map.id).fetch_one(&mut tx.conn).await;
     within(count.map_err(StoreError::during("count runs"))?, MAX_RUNS, "runs")?;
     maps::bump(tx, map.id).await?;
-    Ok(id)
+    // Through the text: its numbers have fewer digits.
+    Ok(ReferenceRunRow { id, robot: robot.to_owned(), created_ms, way_m, cells: cells_of(&text) })
 }
 
 /// Deletes a reference run with its statistics.
@@ -178,7 +184,9 @@ mod tests {
     }
 
     async fn put(store: &Catalogue, x: i32) -> Result<i64, StoreError> {
-        store.write(move |tx| Box::pin(async move { add(tx, "a", "r1", 12.5, &statistics(x)).await })).await
+        let write =
+            store.write(move |tx| Box::pin(async move { add(tx, "a", "r1", 12.5, &statistics(x)).await }));
+        write.await.map(|run| run.id)
     }
 
     fn known(store: &Catalogue) -> (u64, Arc<ModalityMap>) {

@@ -148,12 +148,12 @@ struct Prepared {
     placement: Option<PlacementOutcome>,
 }
 
+/// What came of a view: its row or that of the one it repeats, and the placement of its landmark.
+pub(crate) type Added = (ViewRow, UploadOutcome, Option<PlacementReport>);
+
 /// Stores a view, unless it is there already or is a near-duplicate of one; then gives that one. A view with a capture
 /// places its landmark in the same transaction.
-pub(crate) async fn add(
-    store: &Store,
-    teaching: Teaching,
-) -> Result<(ViewRow, UploadOutcome, Option<PlacementReport>), StoreError> {
+pub(crate) async fn add(store: &Store, teaching: Teaching) -> Result<Added, StoreError> {
     let teaching = Arc::new(teaching);
     let _turn = store.preparing().await;
     for _ in 0..ATTEMPTS {
@@ -251,11 +251,7 @@ fn near_duplicate(new: &QuadCrop, stored: &[(i64, QuadCrop)], p: &NoveltyParams)
     (novelty < 1.0).then(|| stored[index].0)
 }
 
-async fn write(
-    tx: &mut Tx,
-    new: &Teaching,
-    prepared: Prepared,
-) -> Result<(ViewRow, UploadOutcome, Option<PlacementReport>), StoreError> {
+async fn write(tx: &mut Tx, new: &Teaching, prepared: Prepared) -> Result<Added, StoreError> {
     let Teaching { map, landmark, view, max, .. } = new;
     let (of_map, number) = landmark_for(tx, new, &prepared).await?;
     if let Some(row) = views::same(tx, number, view).await? {

@@ -26,6 +26,8 @@ async fn every_statement_prepares_on_the_migrated_schema() {
         robots::ALL,
         tokens::ALL,
         jobs::ALL,
+        kept_answers::ALL,
+        revisions::ALL,
         map_rows::ALL,
     ];
     for (name, sql) in all.into_iter().flatten() {

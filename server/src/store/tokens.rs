@@ -2,7 +2,7 @@
 
 use super::{CommittedChange, StoreError, Tx, kind::Kind, maps, now_ms, statements::statements, within};
 use protos::api::{Role, Token};
-use sqlx::{Row, SqliteConnection, SqliteExecutor, sqlite::SqliteRow};
+use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
 
 statements! {
     COUNT = "SELECT count(*) FROM tokens";
@@ -95,13 +95,16 @@ pub(crate) async fn create(tx: &mut Tx, new: TokenInsert) -> Result<Token, Store
         .fetch_one(&mut tx.conn)
         .await
         .map_err(StoreError::during("create token"))?;
-    within(count(&mut tx.conn).await?, MAX_TOKENS, "tokens")?;
+    within(count(&mut tx.conn).await? as i64, MAX_TOKENS, "tokens")?;
     tx.changed(CommittedChange::Tokens);
     get(&mut tx.conn, id).await
 }
 
-async fn count(conn: &mut SqliteConnection) -> Result<i64, StoreError> {
-    sqlx::query_scalar(COUNT).fetch_one(conn).await.map_err(StoreError::during("count tokens"))
+/// How many there are.
+pub(crate) async fn count(db: impl SqliteExecutor<'_>) -> Result<u64, StoreError> {
+    let count: i64 =
+        sqlx::query_scalar(COUNT).fetch_one(db).await.map_err(StoreError::during("count tokens"))?;
+    Ok(count as u64)
 }
 
 /// One token.

@@ -1,6 +1,6 @@
 //! Visibility settings: the camera and the limits that define "visible", one set for each map.
 
-use super::{StoreError, Tx, maps, statements::statements};
+use super::{StoreError, Tx, maps, statements::statements, text_revision};
 use map::visibility::VisibilitySettings;
 
 statements! {
@@ -21,6 +21,11 @@ pub(crate) async fn set(tx: &mut Tx, map: &str, settings: &VisibilitySettings) -
         .await
         .map_err(StoreError::during("store visibility settings"))?;
     maps::bump(tx, map.id).await
+}
+
+/// The revision of settings.
+pub(crate) fn revision(settings: &VisibilitySettings) -> String {
+    text_revision(&serde_json::to_string(settings).unwrap_or_default())
 }
 
 /// The stored settings. Unreadable or impossible ones (a file of another program) become the defaults.

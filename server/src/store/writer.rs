@@ -9,6 +9,7 @@
 
 use super::{
     error::StoreError,
+    kept_answers::Keeping,
     on_commit::{CommittedChange, OnCommit},
 };
 use engine::{
@@ -80,8 +81,13 @@ pub(super) struct Command {
     caller: Weak<()>,
 }
 
-/// Wraps a closure for the channel. The write is wanted for as long as `caller` lives.
-pub(super) fn command<T, F>(write: F, caller: &Arc<()>) -> (Command, oneshot::Receiver<Result<T, StoreError>>)
+/// Wraps a closure for the channel. The write is wanted for as long as `caller` lives; the answer to what it made is kept in
+/// its transaction, as `keeping` says.
+pub(super) fn command<T, F>(
+    write: F,
+    keeping: Option<Keeping>,
+    caller: &Arc<()>,
+) -> (Command, oneshot::Receiver<Result<T, StoreError>>)
 where
     T: Send + 'static,
     F: for<'t> FnOnce(&'t mut Tx) -> BoxFuture<'t, Result<T, StoreError>> + Send + 'static,
@@ -90,13 +96,23 @@ where
     let run: Run = Box::new(move |tx| {
         Box::pin(async move {
             // Unwind safety: the closure's changes are in the transaction, which is rolled back.
-            let ended = AssertUnwindSafe(async move { write(tx).await }).catch_unwind().await;
+            let all = async {
+                let made = write(tx).await?;
+                if let Some(keeping) = &keeping {
+                    let answer = keeping.answer_to(&made);
+                    keeping.keep(tx, answer).await?;
+                }
+                Ok(made)
+            };
+            let ended = AssertUnwindSafe(all).catch_unwind().await;
             let (result, panic) = match ended {
                 Ok(result) => (result, None),
                 Err(cause) => (Err(StoreError::Panicked), Some(cause)),
             };
             let (keep, fatal) = (result.is_ok(), result.as_ref().is_err_and(StoreError::is_fatal));
             let acknowledge: Acknowledge = Box::new(move |ended| {
+                // The key is free again before the caller knows.
+                drop(keeping);
                 // An error means that the caller is gone; the write stands.
                 drop(reply.send(result.and_then(|value| ended.map(|()| value))));
             });

@@ -9,7 +9,7 @@ from waymark import api, wire
 from waymark._async.client import AsyncMapClient
 from waymark._async.landmarks import AsyncJobEvents
 from waymark._async.maps import AsyncLiveEvents
-from waymark._http import Region
+from waymark._http import Region, Revised
 from waymark._link import Delivery, Subscription
 from waymark._sync.client import MapClient
 from waymark._sync.landmarks import JobEvents
@@ -78,6 +78,7 @@ __all__ = [
     "QuadAnswer",
     "Refused",
     "Region",
+    "Revised",
     "Robot",
     "RobotPose",
     "Scan",

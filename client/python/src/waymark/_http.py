@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import uuid
 from collections.abc import Iterator, Sequence
-from typing import Any, Literal, TypeAlias
+from dataclasses import dataclass
+from typing import Any, Generic, Literal, TypeAlias, TypeVar
 from urllib.parse import quote
 
 import httpx
@@ -24,6 +26,8 @@ from waymark.api import (
 )
 from waymark.errors import InvalidInput, JobFailed, Refused, Unexpected, Unreachable
 from waymark.image import Picture, as_image
+
+T = TypeVar("T")
 
 # Longest wait for one request, and longest silence of a stream, in seconds; the server sends something every 15 s.
 TIMEOUT_S = 60.0
@@ -54,6 +58,9 @@ OPERATIONS: dict[str, tuple[str, str]] = {
     "health": ("GET", "/healthz"),
     "readiness": ("GET", "/readyz"),
     "version": ("GET", "/version"),
+    "add_landmarks": ("POST", "/maps/{map}/bulk/create-landmarks"),
+    "delete_landmarks": ("POST", "/maps/{map}/bulk/delete-landmarks"),
+    "jobs": ("GET", "/jobs"),
     "add_landmark": ("POST", "/maps/{map}/landmarks"),
     "landmarks": ("GET", "/maps/{map}/landmarks"),
     "landmark": ("GET", "/maps/{map}/landmarks/{landmark}"),
@@ -122,6 +129,38 @@ OPERATIONS: dict[str, tuple[str, str]] = {
     "walls": ("GET", "/maps/{map}/walls"),
 }
 
+# Operations that create. Each is sent with a fresh key, and once more with the same key where its answer was lost.
+CREATIONS = frozenset(
+    {
+        "create_map",
+        "add_landmark",
+        "add_landmarks",
+        "upload_view",
+        "learn",
+        "learn_landmark",
+        "start_gathering",
+        "accept_tracks",
+        "finish_recording",
+    }
+)
+# Changes of what has a revision. Each says which one it is meant for.
+CHANGES = frozenset(
+    {
+        "locate_map",
+        "delete_map",
+        "set_walls",
+        "set_underlay",
+        "delete_underlay",
+        "set_visibility_settings",
+        "set_modalities",
+        "update_landmark",
+        "delete_landmark",
+    }
+)
+# Pause before a repeat, where the server says none, and the longest, in seconds.
+PAUSE_S = 0.25
+MAX_PAUSE_S = 5.0
+
 _EVENTS: dict[str, Any] = {
     "answer": LiveAnswer,
     "pose": LivePose,
@@ -147,6 +186,52 @@ def request_of(call: str, at: Sequence[str | int]) -> tuple[str, str]:
             segment = quote(text, safe="")
         made += f"/{segment}"
     return method, made
+
+
+def headers_of(call: str, key: str | None, revision: str | None) -> dict[str, str]:
+    """The headers of an operation: a key for a creation, a fresh one unless it is given; for a change of what has a
+    revision, the one it is meant for."""
+    if call in CREATIONS:
+        return {"idempotency-key": key if key is not None else uuid.uuid4().hex}
+    if call in CHANGES:
+        return {"if-match": "*" if revision is None else f'"{revision}"'}
+    return {}
+
+
+@dataclass(frozen=True, slots=True)
+class Revised(Generic[T]):
+    """What was read, with its revision for `if_match`: another one after every edit or lesson, the same after what
+    robots do by themselves."""
+
+    value: T
+    revision: str
+
+
+def revision_of(response: httpx.Response) -> str:
+    """The revision of what was read."""
+    tag = response.headers.get("etag", "").split('"')
+    if len(tag) != 3:
+        raise Unexpected(f"{response.url}: no revision in ETag")
+    return str(tag[1])
+
+
+def pause_of(call: str, answer: httpx.Response | httpx.HTTPError) -> float | None:
+    """How long to wait before a creation is repeated with its key; `None` if the answer is final."""
+    if call not in CREATIONS:
+        return None
+    if isinstance(answer, httpx.Response):
+        if answer.status_code not in (408, 503):
+            return None
+        seconds = answer.headers.get("retry-after", "")
+        return min(float(seconds), MAX_PAUSE_S) if seconds.isdigit() else PAUSE_S
+    is_final = isinstance(answer, httpx.TimeoutException | httpx.ConnectError | httpx.UnsupportedProtocol)
+    return None if is_final else PAUSE_S
+
+
+def query_of(query: dict[str, Any]) -> dict[str, str]:
+    """A query as it is sent; what is `None` is left out."""
+    words = {True: "true", False: "false"}
+    return {name: words.get(value, str(value)) for name, value in query.items() if value is not None}
 
 
 def refusal(response: httpx.Response, reason: str = "") -> Refused:

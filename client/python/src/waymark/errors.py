@@ -31,6 +31,8 @@ ADVICE: dict[str, str] = {
     "unexpected": "are client and server of the same version?",
     "timeout": "the server is busy; ask again",
     "busy": "the server is busy; ask again",
+    "changed_meanwhile": "read it again, and change that (`MapClient.if_match`)",
+    "in_progress": "the same creation is at work; ask again when it has ended",
 }
 
 

@@ -61,7 +61,7 @@ async fn no_two_types_have_schemas_of_one_name() {
     }
 }
 
-async fn read_long(service: &Service, path: &str) -> (u16, Value) {
+pub(super) async fn read_long(service: &Service, path: &str) -> (u16, Value) {
     let response = service.ask(request("GET", path, "")).await;
     let status = response.status().as_u16();
     let bytes = to_bytes(response.into_body(), 8 << 20).await.unwrap();
@@ -76,7 +76,7 @@ fn poster(seed: u64) -> Vec<u8> {
 
 /// Map `hall` with walls, the landmark `poster` with a view, and robot `r1`, which has been recorded or has gathered where the
 /// operation asks for it.
-async fn prepared(operation: &str) -> (Service, String) {
+pub(super) async fn prepared(operation: &str) -> (Service, String) {
     let service = Service::start(Limits::default()).await;
     let walls = json!({ "segments": [{ "a": [0.0, 0.0], "b": [6.0, 0.0] }] }).to_string();
     assert_eq!(service.ask(request("PUT", "/api/v1/maps/hall/walls", walls)).await.status(), StatusCode::OK);
@@ -141,4 +141,57 @@ async fn every_body_has_an_example_and_the_server_takes_it() {
         examples.into_keys().collect(),
         "examples of operations that do not exist, or have no body"
     );
+}
+
+/// Where the document is kept, for programs that make clients of it.
+const KEPT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/openapi.json");
+
+#[test]
+fn the_document_in_docs_is_that_of_the_code() {
+    let (_, document) = crate::http::router::parts(&Limits::default());
+    let text = serde_json::to_string_pretty(&document).unwrap() + "\n";
+    if std::env::var_os("WAYMARK_REFRESH").is_some() {
+        fs::write(KEPT, &text).unwrap();
+    }
+    let kept = fs::read_to_string(KEPT).unwrap_or_default();
+    assert!(
+        kept == text,
+        "docs/openapi.json is stale: WAYMARK_REFRESH=1 cargo test -p server the_document_in_docs"
+    );
+}
+
+#[test]
+fn every_operation_names_what_guard_extractors_and_store_may_answer() {
+    let (_, document) = crate::http::router::parts(&Limits::default());
+    let document = serde_json::to_value(document).unwrap();
+    let mut count = 0;
+    for (path, item) in document["paths"].as_object().unwrap() {
+        for (method, operation) in item.as_object().unwrap() {
+            count += 1;
+            let responses = operation["responses"].as_object().unwrap();
+            let mut needed = vec!["403", "408", "500", "503"];
+            if path.contains('{') {
+                needed.push("404");
+            }
+            if !operation["requestBody"].is_null() {
+                needed.extend(["400", "413", "415", "422"]);
+            }
+            if method != "get" {
+                needed.push("507");
+            }
+            for status in needed {
+                let response =
+                    responses.get(status).unwrap_or_else(|| panic!("{method} {path}: no {status}"));
+                assert!(
+                    response["description"].as_str().is_some_and(|d| !d.is_empty()),
+                    "{method} {path} {status}"
+                );
+            }
+            for (status, response) in responses.iter().filter(|(status, _)| status.as_str() >= "400") {
+                let kinds: Vec<_> = response["content"].as_object().unwrap().keys().collect();
+                assert_eq!(kinds, ["application/problem+json"], "{method} {path} {status}");
+            }
+        }
+    }
+    assert!(count > 60, "{count}");
 }

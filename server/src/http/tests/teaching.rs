@@ -7,7 +7,7 @@ use serde_json::json;
 use std::fmt::Write as _;
 
 /// Grey blocks, another number, other blocks: PNG.
-fn blocks(number: usize) -> Vec<u8> {
+pub(super) fn blocks(number: usize) -> Vec<u8> {
     let grey = |i: usize| {
         let (u, v) = (i % 240, i / 240);
         let block = |size: usize| (u / size * 31 + v / size * 57 + size + number * 7919) as u64;
@@ -49,6 +49,7 @@ impl Service {
             .uri(path)
             .header(header::HOST, "localhost")
             .header(header::CONTENT_TYPE, "multipart/form-data; boundary=b")
+            .header(header::IF_MATCH, "*")
             .body(Body::from(body))
             .unwrap();
         read(self.ask(request).await).await
@@ -166,7 +167,7 @@ async fn what_belongs_to_a_landmark_follows_its_new_name() {
 
 impl Service {
     /// Trains a landmark.
-    async fn learn(&self, landmark: &str) {
+    pub(super) async fn learn(&self, landmark: &str) {
         let path = format!("/api/v1/maps/hall/landmarks/{landmark}/learn");
         let (status, job) = read(self.ask(request("POST", &path, "{}")).await).await;
         assert_eq!(status, 202, "{job}");

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
+import copy
 from collections.abc import AsyncIterator, Sequence
 from dataclasses import dataclass
 from os import PathLike
@@ -12,9 +14,23 @@ from typing import Any, Generic, TypeVar
 import httpx
 
 from waymark import _local_token
-from waymark._http import TIMEOUT_S, EventParser, parsed, parsed_items, refusal, request_of, unreachable
+from waymark._http import (
+    TIMEOUT_S,
+    EventParser,
+    Revised,
+    headers_of,
+    parsed,
+    parsed_items,
+    pause_of,
+    query_of,
+    refusal,
+    request_of,
+    revision_of,
+    unreachable,
+)
 
 T = TypeVar("T")
+B = TypeVar("B", bound="AsyncBase")
 
 
 class AsyncBase:
@@ -28,8 +44,26 @@ class AsyncBase:
         self._base = server.rstrip("/")
         self._token = token
         self._local_port = _local_token.local_port(self._base) if token is None else None
+        self._key: str | None = None
+        self._revision: str | None = None
         # Ignores proxies of the environment: the server is in the robot's own network.
         self._http = httpx.AsyncClient(base_url=self._base, timeout=TIMEOUT_S, trust_env=False)
+
+    def with_idempotency_key(self: B, key: str) -> B:
+        """The same with this key for its next creation, in place of a fresh one: a program that repeats a creation by
+        itself, also after its own restart, gives the same key again. The server makes it once, and answers with
+        `idempotency_key_reused` if the key was used for another one. 1 to 128 visible ASCII characters; kept for a
+        day."""
+        other = copy.copy(self)
+        other._key = key
+        return other
+
+    def if_match(self: B, revision: str) -> B:
+        """The same for changes of what still has this revision: another one is refused with `changed_meanwhile` and
+        changes nothing. Without it, changes are made whatever is there."""
+        other = copy.copy(self)
+        other._revision = revision
+        return other
 
     async def aclose(self) -> None:
         """Closes its connections."""
@@ -42,35 +76,52 @@ class AsyncBase:
         self, call: str, at: Sequence[str | int], is_stream: bool = False, **parts: Any
     ) -> httpx.Response:
         method, path = request_of(call, at)
+        headers = headers_of(call, self._key, self._revision)
+        answer = await self._answer(method, path, headers, is_stream, parts)
+        pause_s = pause_of(call, answer)
+        if pause_s is not None:
+            await asyncio.sleep(pause_s)
+            answer = await self._answer(method, path, headers, is_stream, parts)
+        if isinstance(answer, httpx.HTTPError):
+            raise unreachable(self._base, answer) from answer
+        if answer.is_error:
+            raise refusal(answer)
+        return answer
+
+    async def _answer(
+        self, method: str, path: str, headers: dict[str, str], is_stream: bool, parts: dict[str, Any]
+    ) -> httpx.Response | httpx.HTTPError:
         try:
             await self._find_local_token(parts)
             sent = self._token
-            response = await self._sent(method, path, is_stream, parts)
-            reason = ""
+            response = await self._sent(method, path, headers, is_stream, parts)
             if response.status_code == 401:
                 try:
                     if self._take_local_token(response) != sent:
                         await response.aclose()
-                        response = await self._sent(method, path, is_stream, parts)
+                        response = await self._sent(method, path, headers, is_stream, parts)
                 except _local_token.NotUsedError as error:
-                    reason = f" (the local token is not used: {error})"
+                    await response.aread()
+                    raise refusal(response, f" (the local token is not used: {error})") from error
             if response.is_error:
                 await response.aread()
-                raise refusal(response, reason)
             return response
         except httpx.HTTPError as error:
-            raise unreachable(self._base, error) from error
+            return error
 
     async def _find_local_token(self, parts: dict[str, Any]) -> None:
         """Finds the token of the server on this machine before a body is sent: a refusal may break off a large one."""
         is_large = "files" in parts or (self._token is None and "json" in parts)
         if self._local_port is not None and is_large:
-            response = await self._sent(*request_of("whoami", ()), is_stream=False, parts={})
+            response = await self._sent(*request_of("whoami", ()), headers={}, is_stream=False, parts={})
             with contextlib.suppress(_local_token.NotUsedError):
                 self._take_local_token(response)
 
-    async def _sent(self, method: str, path: str, is_stream: bool, parts: dict[str, Any]) -> httpx.Response:
-        headers = {"Authorization": f"Bearer {self._token}"} if self._token is not None else None
+    async def _sent(
+        self, method: str, path: str, headers: dict[str, str], is_stream: bool, parts: dict[str, Any]
+    ) -> httpx.Response:
+        if self._token is not None:
+            headers = headers | {"Authorization": f"Bearer {self._token}"}
         request = self._http.build_request(method, path, headers=headers, **parts)
         return await self._http.send(request, stream=is_stream)
 
@@ -84,6 +135,10 @@ class AsyncBase:
     async def _send(self, kind: type[T], call: str, *at: str | int, **parts: Any) -> T:
         found: T = parsed(kind, await self._checked(call, at, **parts))
         return found
+
+    async def _revised(self, kind: type[T], call: str, *at: str | int) -> Revised[T]:
+        response = await self._checked(call, at)
+        return Revised(parsed(kind, response), revision_of(response))
 
     async def _done(self, call: str, *at: str | int) -> None:
         await self._checked(call, at)
@@ -105,12 +160,13 @@ class AsyncBase:
             await response.aclose()
         return size
 
-    async def _all(self, kind: type[T], call: str, *at: str | int) -> tuple[T, ...]:
-        """Every page of a list."""
+    async def _all(self, kind: type[T], call: str, *at: str | int, **query: Any) -> tuple[T, ...]:
+        """Every page of a list. What is `None` in the query is left out."""
+        params = query_of(query)
         items: list[T] = []
         cursor: str | None = None
         while True:
-            response = await self._checked(call, at, params={"cursor": cursor} if cursor else None)
+            response = await self._checked(call, at, params=params | ({"cursor": cursor} if cursor else {}))
             page = parsed(_Page, response)
             items.extend(parsed_items(kind, page.items, response))
             if page.next is None:

@@ -10,10 +10,16 @@ from waymark._async.base import AsyncBase, AsyncEvents, AsyncStream
 from waymark._http import JOB_POLL_S, Region, job_ended, picture_part, view_form
 from waymark._values import UNSET, Unset, from_json, given, present, to_json
 from waymark.api import (
+    BulkOutcome,
     CaptureMetadata,
     Job,
+    JobState,
     Landmark,
+    LandmarkDeletion,
     LandmarkHealth,
+    LandmarkStatus,
+    NewLandmark,
+    Order,
     Place,
     Size,
     TrainingView,
@@ -46,6 +52,32 @@ class AsyncLandmarks(AsyncBase):
     async def landmarks(self, map: str) -> tuple[Landmark, ...]:
         """All landmarks of a map, by name."""
         return await self._all(Landmark, "landmarks", map)
+
+    async def find_landmarks(
+        self,
+        map: str,
+        *,
+        name: str | None = None,
+        status: LandmarkStatus | None = None,
+        health: LandmarkHealth | None = None,
+        has_place: bool | None = None,
+        sort: Order = "name",
+    ) -> tuple[Landmark, ...]:
+        """The landmarks of a map that have all of this: a part of the name, a status, a health, a place or none."""
+        query = {"name": name, "status": status, "health": health, "has_place": has_place, "sort": sort}
+        return await self._all(Landmark, "landmarks", map, **query)
+
+    async def add_landmarks(self, map: str, new: Iterable[NewLandmark]) -> int:
+        """Adds landmarks without views, at most 2000: all or none. The field of a refusal has the number of the one at
+        fault."""
+        body = {"landmarks": to_json(list(new))}
+        return (await self._send(BulkOutcome, "add_landmarks", map, json=body)).count
+
+    async def delete_landmarks(self, map: str, landmarks: Iterable[LandmarkDeletion]) -> int:
+        """Deletes landmarks with their views and models, at most 2000: all or none. One with a revision is deleted only
+        if it still has that."""
+        body = {"landmarks": to_json(list(landmarks))}
+        return (await self._send(BulkOutcome, "delete_landmarks", map, json=body)).count
 
     async def landmark(self, map: str, landmark: str) -> Landmark:
         """One landmark."""
@@ -123,6 +155,10 @@ class AsyncLandmarks(AsyncBase):
         """Starts to learn one landmark again from its views."""
         body = present(generated_views=generated_views)
         return await self._send(Job, "learn_landmark", map, landmark, json=body)
+
+    async def jobs(self, *, state: JobState | None = None, map: str | None = None) -> tuple[Job, ...]:
+        """All jobs that the server knows, newest first: those that stand so, those of a map."""
+        return await self._all(Job, "jobs", state=state, map=map)
 
     async def job(self, job: int) -> Job:
         """The present state of a job."""

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from os import PathLike
 
 from waymark._async.base import AsyncBase, AsyncEvents, AsyncStream
-from waymark._http import live_event, picture_part
+from waymark._http import Revised, live_event, picture_part
 from waymark._values import UNSET, Unset, given, present, to_json
 from waymark.api import (
     Backup,
@@ -16,6 +16,7 @@ from waymark.api import (
     Health,
     LiveEvent,
     Map,
+    Order,
     Parent,
     PoseBody,
     Readiness,
@@ -95,6 +96,10 @@ class AsyncMaps(AsyncBase):
         """All maps, by name."""
         return await self._all(Map, "maps")
 
+    async def find_maps(self, *, name: str | None = None, sort: Order = "name") -> tuple[Map, ...]:
+        """The maps with this part of the name."""
+        return await self._all(Map, "maps", name=name, sort=sort)
+
     async def map(self, map: str) -> Map:
         """One map."""
         return await self._send(Map, "map", map)
@@ -137,6 +142,10 @@ class AsyncMaps(AsyncBase):
         """The walls, as stored."""
         return await self._send(WallsBody, "walls", map)
 
+    async def walls_revised(self, map: str) -> Revised[WallsBody]:
+        """The walls, as stored, with their revision for `if_match`."""
+        return await self._revised(WallsBody, "walls", map)
+
     async def set_underlay(self, map: str, image: Picture, place: UnderlayPlace) -> Underlay:
         """Replaces the picture that is shown under a map. It changes no answer to a robot."""
         form = {name: repr(float(value)) for name, value in to_json(place).items()}
@@ -145,6 +154,10 @@ class AsyncMaps(AsyncBase):
     async def underlay(self, map: str) -> Underlay:
         """Where the picture under a map lies; `Refused` with code `unknown_underlay` if there is none."""
         return await self._send(Underlay, "underlay", map)
+
+    async def underlay_revised(self, map: str) -> Revised[Underlay]:
+        """Where the picture under a map lies, with its revision for `if_match`."""
+        return await self._revised(Underlay, "underlay", map)
 
     async def underlay_image(self, map: str) -> bytes:
         """The picture under a map, as it was uploaded: PNG or JPEG."""
@@ -157,6 +170,10 @@ class AsyncMaps(AsyncBase):
     async def visibility_settings(self, map: str) -> VisibilitySettingsBody:
         """The camera that visibility is computed for, and what counts as seen; every field is there."""
         return await self._send(VisibilitySettingsBody, "visibility_settings", map)
+
+    async def visibility_settings_revised(self, map: str) -> Revised[VisibilitySettingsBody]:
+        """The visibility settings with their revision for `if_match`."""
+        return await self._revised(VisibilitySettingsBody, "visibility_settings", map)
 
     async def set_visibility_settings(self, map: str, settings: VisibilitySettingsBody) -> VisibilitySettingsBody:
         """Replaces the visibility settings; absent fields take their defaults."""

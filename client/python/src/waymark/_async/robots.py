@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from waymark._async.base import AsyncBase
+from waymark._http import Revised
 from waymark._values import UNSET, Unset, given, present
 from waymark.api import (
     AcceptanceBody,
@@ -21,6 +22,7 @@ from waymark.api import (
     Gathering,
     MappingProgressBody,
     ModalityMapBody,
+    Order,
     RecordingStatusBody,
     ReferenceRunBody,
     RelocalisationStatus,
@@ -59,6 +61,10 @@ class AsyncRobots(AsyncBase):
     async def robots(self) -> tuple[Robot, ...]:
         """All robots, by name."""
         return await self._all(Robot, "robots")
+
+    async def find_robots(self, *, name: str | None = None, sort: Order = "name") -> tuple[Robot, ...]:
+        """The robots with this part of the name."""
+        return await self._all(Robot, "robots", name=name, sort=sort)
 
     async def robot(self, robot: str) -> Robot:
         """One robot: whether it is connected, its pose, and whether a second program uses its name."""
@@ -148,6 +154,10 @@ class AsyncRobots(AsyncBase):
     async def modalities(self, map: str) -> ModalityMapBody:
         """Modality statistics by pose cell from reference runs, and the fusion mode."""
         return await self._send(ModalityMapBody, "modalities", map)
+
+    async def modalities_revised(self, map: str) -> Revised[ModalityMapBody]:
+        """The same with the revision of the fusion mode and the named areas, for `if_match`."""
+        return await self._revised(ModalityMapBody, "modalities", map)
 
     async def set_modalities(
         self,

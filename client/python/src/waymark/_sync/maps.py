@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from os import PathLike
 
-from waymark._http import live_event, picture_part
+from waymark._http import Revised, live_event, picture_part
 from waymark._sync.base import Base, Events, Stream
 from waymark._values import UNSET, Unset, given, present, to_json
 from waymark.api import (
@@ -17,6 +17,7 @@ from waymark.api import (
     Health,
     LiveEvent,
     Map,
+    Order,
     Parent,
     PoseBody,
     Readiness,
@@ -96,6 +97,10 @@ class Maps(Base):
         """All maps, by name."""
         return self._all(Map, "maps")
 
+    def find_maps(self, *, name: str | None = None, sort: Order = "name") -> tuple[Map, ...]:
+        """The maps with this part of the name."""
+        return self._all(Map, "maps", name=name, sort=sort)
+
     def map(self, map: str) -> Map:
         """One map."""
         return self._send(Map, "map", map)
@@ -138,6 +143,10 @@ class Maps(Base):
         """The walls, as stored."""
         return self._send(WallsBody, "walls", map)
 
+    def walls_revised(self, map: str) -> Revised[WallsBody]:
+        """The walls, as stored, with their revision for `if_match`."""
+        return self._revised(WallsBody, "walls", map)
+
     def set_underlay(self, map: str, image: Picture, place: UnderlayPlace) -> Underlay:
         """Replaces the picture that is shown under a map. It changes no answer to a robot."""
         form = {name: repr(float(value)) for name, value in to_json(place).items()}
@@ -146,6 +155,10 @@ class Maps(Base):
     def underlay(self, map: str) -> Underlay:
         """Where the picture under a map lies; `Refused` with code `unknown_underlay` if there is none."""
         return self._send(Underlay, "underlay", map)
+
+    def underlay_revised(self, map: str) -> Revised[Underlay]:
+        """Where the picture under a map lies, with its revision for `if_match`."""
+        return self._revised(Underlay, "underlay", map)
 
     def underlay_image(self, map: str) -> bytes:
         """The picture under a map, as it was uploaded: PNG or JPEG."""
@@ -158,6 +171,10 @@ class Maps(Base):
     def visibility_settings(self, map: str) -> VisibilitySettingsBody:
         """The camera that visibility is computed for, and what counts as seen; every field is there."""
         return self._send(VisibilitySettingsBody, "visibility_settings", map)
+
+    def visibility_settings_revised(self, map: str) -> Revised[VisibilitySettingsBody]:
+        """The visibility settings with their revision for `if_match`."""
+        return self._revised(VisibilitySettingsBody, "visibility_settings", map)
 
     def set_visibility_settings(self, map: str, settings: VisibilitySettingsBody) -> VisibilitySettingsBody:
         """Replaces the visibility settings; absent fields take their defaults."""

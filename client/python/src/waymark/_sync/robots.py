@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from waymark._http import Revised
 from waymark._sync.base import Base
 from waymark._values import UNSET, Unset, given, present
 from waymark.api import (
@@ -22,6 +23,7 @@ from waymark.api import (
     Gathering,
     MappingProgressBody,
     ModalityMapBody,
+    Order,
     RecordingStatusBody,
     ReferenceRunBody,
     RelocalisationStatus,
@@ -60,6 +62,10 @@ class Robots(Base):
     def robots(self) -> tuple[Robot, ...]:
         """All robots, by name."""
         return self._all(Robot, "robots")
+
+    def find_robots(self, *, name: str | None = None, sort: Order = "name") -> tuple[Robot, ...]:
+        """The robots with this part of the name."""
+        return self._all(Robot, "robots", name=name, sort=sort)
 
     def robot(self, robot: str) -> Robot:
         """One robot: whether it is connected, its pose, and whether a second program uses its name."""
@@ -149,6 +155,10 @@ class Robots(Base):
     def modalities(self, map: str) -> ModalityMapBody:
         """Modality statistics by pose cell from reference runs, and the fusion mode."""
         return self._send(ModalityMapBody, "modalities", map)
+
+    def modalities_revised(self, map: str) -> Revised[ModalityMapBody]:
+        """The same with the revision of the fusion mode and the named areas, for `if_match`."""
+        return self._revised(ModalityMapBody, "modalities", map)
 
     def set_modalities(
         self,

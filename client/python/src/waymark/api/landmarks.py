@@ -117,9 +117,11 @@ class FindingBody:
 
 @dataclass(frozen=True, slots=True)
 class Landmark:
-    """A landmark. `failed_gates` is empty unless it is `inactive`."""
+    """A landmark. `failed_gates` is empty unless it is `inactive`; `revision` is another one after every edit or lesson
+    of it (`MapClient.if_match`)."""
 
     name: str
+    revision: str
     status: LandmarkStatus
     failed_gates: tuple[FailedGate, ...]
     views: int
@@ -129,6 +131,30 @@ class Landmark:
     place_sigma: PlaceSigma | None = None
     model: LandmarkModelBody | None = None
     finding: FindingBody | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class NewLandmark:
+    """A landmark to be made."""
+
+    name: str
+    size: Size | None = None
+    place: Place | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class LandmarkDeletion:
+    """A landmark to be deleted, if it still has this revision; without one, whatever is there."""
+
+    name: str
+    revision: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class BulkOutcome:
+    """Landmarks made or deleted."""
+
+    count: int
 
 
 @dataclass(frozen=True, slots=True)

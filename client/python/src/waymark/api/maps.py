@@ -10,6 +10,8 @@ from waymark.api.backups import BackupHealth
 Distance = Literal["both", "correlation", "hausdorff"]
 JobState = Literal["queued", "running", "done", "failed", "cancelled"]
 Point2 = tuple[float, float]
+# Of a list: by name, or by the time of the last edit or lesson; `-` reverses it.
+Order = Literal["name", "-name", "changed", "-changed"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,10 +29,12 @@ class Parent:
 
 @dataclass(frozen=True, slots=True)
 class Map:
-    """A map. `version` counts up with every change that an answer could depend on."""
+    """A map. `version` counts up with every change that an answer could depend on; `revision` is another one
+    after every edit or lesson of it or of what is in it (`MapClient.if_match`)."""
 
     name: str
     version: int
+    revision: str
     landmarks: int
     distance: Distance
     site: str | None = None
