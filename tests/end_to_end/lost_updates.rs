@@ -130,6 +130,8 @@ async fn the_command_line_changes_only_what_it_has_shown() {
     let file = folder.path().join("walls.txt");
     fs::write(&file, "0, 0, 9, 0\n").expect("a file");
     let file = file.to_str().expect("text");
+    // The local token is for the server's own port.
+    let token = tests::token(&inside.url()).await;
     for (word, line) in [
         ("DELETE ", "landmark delete poster --map hall --yes"),
         ("PATCH ", "landmark size poster 0.6x0.8 --map hall"),
@@ -138,7 +140,8 @@ async fn the_command_line_changes_only_what_it_has_shown() {
         ("PUT ", &format!("map import hall {file} --yes")),
     ] {
         let server = relay(inside.server.http_addr, word, inside.maps(), sized(3.0)).await;
-        let args: Vec<String> = line.split(' ').chain(["--server", &server]).map(str::to_owned).collect();
+        let args = line.split(' ').chain(["--server", &server, "--token", &token]);
+        let args: Vec<String> = args.map(str::to_owned).collect();
         let run = tokio::task::spawn_blocking(move || waymark(args, Duration::from_mins(1)));
         let run = run.await.expect("it ends");
         assert_eq!(run.status, 4, "`{line}`: {run:?}");

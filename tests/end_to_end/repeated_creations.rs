@@ -52,9 +52,11 @@ async fn cutting_relay(server: SocketAddr, path: &'static str) -> SocketAddr {
 async fn a_creation_through_a_cut_connection_is_made_once() {
     let inside = Inside::start(Limits::default()).await;
     let direct = inside.maps();
+    // The local token is for the server's own port.
+    let token = tests::token(&inside.url()).await;
     let through = async |path| {
         let relay = cutting_relay(inside.server.http_addr, path).await;
-        MapClient::new(&format!("http://{relay}")).expect("a client")
+        MapClient::new(&format!("http://{relay}")).expect("a client").with_token(&token)
     };
     let map = through("POST /api/v1/maps ").await.create_map(&NewMap::new("hall")).await.expect("map");
     assert_eq!(map.name, "hall");
@@ -90,20 +92,18 @@ async fn a_kill_between_commit_and_answer_and_a_repeat_are_one_effect() {
     let (mut replayed, mut jobs) = (0, BTreeSet::new());
     for kill in 0..KILLS {
         let url = format!("{}/api/v1/maps/hall/landmarks/p0/learn", server.url);
-        let send = |url: String| {
+        let send = |http: reqwest::Client, url: String| {
             let lesson = LandmarkLesson { generated_views: Some(kill as usize % 3) };
-            let request =
-                reqwest::Client::new().post(url).header("idempotency-key", format!("lesson-{kill}"));
-            request.json(&lesson).send()
+            http.post(url).header("idempotency-key", format!("lesson-{kill}")).json(&lesson).send()
         };
-        let first = tokio::spawn(send(url));
+        let first = tokio::spawn(send(tests::http(&server.url).await, url));
         // Another moment each time, about when the row is written.
         tokio::time::sleep(Duration::from_micros(700 * kill)).await;
         server.kill();
         drop(first.await);
         server = Child::start(data.path());
         let url = format!("{}/api/v1/maps/hall/landmarks/p0/learn", server.url);
-        let answer = send(url).await.expect("an answer");
+        let answer = send(tests::http(&server.url).await, url).await.expect("an answer");
         assert_eq!(answer.status(), 202);
         replayed += u64::from(answer.headers().contains_key("idempotency-replayed"));
         let job: Value = answer.json().await.expect("JSON");
