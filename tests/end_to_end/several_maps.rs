@@ -13,6 +13,7 @@ use tests::{Child, Inside, command::waymark, pictures};
 
 async fn call(url: &str, method: Method, path: &str, body: Option<Value>) -> (StatusCode, Value) {
     let request = tests::http(url).await.request(method, format!("{url}/api/v1{path}"));
+    let request = request.header("if-match", "*");
     let request = match body {
         Some(body) => request.json(&body),
         None => request,
