@@ -165,6 +165,8 @@ pub struct Limits {
     pub jobs_kept: usize,
     /// Answers to creations that are kept for repeats, for a day at most; the oldest go.
     pub kept_answers: usize,
+    /// Entries of the audit log; the oldest are forgotten.
+    pub audit_entries: usize,
 }
 
 impl Default for Limits {
@@ -194,13 +196,14 @@ impl Default for Limits {
             jobs: 64,
             jobs_kept: 1_000,
             kept_answers: 10_000,
+            audit_entries: 100_000,
         }
     }
 }
 
 impl Limits {
     /// Name and value of every bound that must not be 0.
-    fn counts(&self) -> [(&'static str, usize); 22] {
+    fn counts(&self) -> [(&'static str, usize); 23] {
         [
             ("limits.frame_bytes", self.frame_bytes),
             ("limits.frame_pixels", self.frame_pixels),
@@ -224,6 +227,7 @@ impl Limits {
             ("limits.write_queue", self.write_queue),
             ("limits.jobs", self.jobs),
             ("limits.kept_answers", self.kept_answers),
+            ("limits.audit_entries", self.audit_entries),
         ]
     }
 

@@ -10,7 +10,7 @@ use crate::{
     jobs::Jobs,
     publication::{Catalogue, CatalogueTasks},
     ros2::Ros2,
-    store::{OpenError, StoreError, landmarks, pictures},
+    store::{OpenError, StoreError, actor::Actor, landmarks, pictures},
 };
 use engine::{
     decode::ImageLimits,
@@ -253,14 +253,15 @@ fn engine(
 
 /// Stores findings about landmarks, until the last worker has stopped.
 async fn store_findings(store: Catalogue, mut found: Receiver<LandmarkFinding>, pulse: Pulse) {
-    while let Some(LandmarkFinding { map, landmark, health, finding, .. }) = found.recv().await {
+    while let Some(LandmarkFinding { map, landmark, name, health, finding }) = found.recv().await {
+        let actor = Actor::server("finding of robots", format!("/maps/{map}/landmarks/{name}"));
         let stored = store.write(move |tx| {
             Box::pin(async move {
                 let name = landmarks::name_of(tx, &map, landmark).await?;
                 landmarks::set_health(tx, &map, &name, health, finding.as_deref()).await.map(drop)
             })
         });
-        if let Err(error) = stored.await {
+        if let Err(error) = actor.scope(stored).await {
             tracing::error!(%error, "landmark_finding_not_stored");
         }
     }

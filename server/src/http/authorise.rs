@@ -5,13 +5,14 @@ use super::{
     API, AppState,
     cookie::session_cookie,
     error::{ApiError, method_not_allowed},
+    guard::RequestId,
 };
 use crate::{
     identity::{
-        Denial, Principal,
+        Denial, Principal, TokenId,
         authorisation::{self, Access, Forbidden, Scope},
     },
-    store::{StoreError, kind::Kind, now_ms},
+    store::{StoreError, actor::Actor, kind::Kind, now_ms},
 };
 use axum::{
     extract::{FromRequestParts, MatchedPath, RawPathParams, Request, State},
@@ -35,10 +36,32 @@ pub(crate) struct Peer(pub(crate) SocketAddr);
 /// The middleware.
 pub(super) async fn authorise(State(app): State<AppState>, request: Request, next: Next) -> Response {
     let (mut parts, body) = request.into_parts();
-    match admitted(&app, &mut parts).await {
-        Ok(()) => next.run(Request::from_parts(parts, body)).await,
-        Err(error) => refused(&app, &parts, error),
+    if let Err(error) = admitted(&app, &mut parts).await {
+        return refused(&app, &parts, error);
     }
+    match actor(&parts) {
+        Some(actor) => actor.scope(next.run(Request::from_parts(parts, body))).await,
+        None => next.run(Request::from_parts(parts, body)).await,
+    }
+}
+
+/// Who asks for a change, for the audit log.
+fn actor(parts: &Parts) -> Option<Actor> {
+    let principal = parts.extensions.get::<Principal>().filter(|_| !parts.method.is_safe())?;
+    let matched = parts.extensions.get::<MatchedPath>().map_or("", MatchedPath::as_str);
+    let below = |path: &str| path.strip_prefix(API).unwrap_or(path).to_owned();
+    let request = parts.extensions.get::<RequestId>().and_then(|id| id.0.to_str().ok());
+    let token = match principal.token {
+        TokenId::Local => None,
+        TokenId::Stored(number) => Some(number),
+    };
+    Some(Actor {
+        name: principal.name.clone(),
+        token,
+        action: format!("{} {}", parts.method, below(matched)),
+        target: below(parts.uri.path()),
+        request: request.map(str::to_owned),
+    })
 }
 
 async fn admitted(app: &AppState, parts: &mut Parts) -> Result<(), ApiError> {

@@ -19,6 +19,7 @@ use crate::{
     publication::Catalogue,
     store::{
         StoreError,
+        actor::Actor,
         jobs::{self, Ended, JobFilter, JobRow},
     },
 };
@@ -327,7 +328,8 @@ impl Jobs {
         if !self.store.write(move |tx| Box::pin(async move { jobs::begin(tx, id).await })).await? {
             return Ok(());
         }
-        let ended = match learn::run(&self.store, &self.config, row, &reporter).await {
+        let actor = Actor::server(&row.kind, format!("/jobs/{id}"));
+        let ended = match actor.scope(learn::run(&self.store, &self.config, row, &reporter)).await {
             // The row has ended together with the models.
             Ok(()) => {
                 tracing::info!(job = id, map = row.map, "job_done");

@@ -8,8 +8,11 @@
 //! use, and the next write to that map tries again.
 
 use super::{
+    actor::Actor,
+    audit,
     error::StoreError,
     kept_answers::Keeping,
+    note_head,
     on_commit::{CommittedChange, OnCommit},
 };
 use engine::{
@@ -81,23 +84,35 @@ pub(super) struct Command {
     caller: Weak<()>,
 }
 
-/// Wraps a closure for the channel. The write is wanted for as long as `caller` lives; the answer to what it made is kept in
-/// its transaction, as `keeping` says.
+/// What goes into the transaction of a write besides its change.
+pub(super) struct Beside {
+    /// The answer to what it made.
+    pub(super) keeping: Option<Keeping>,
+    /// Who asks for it; `None` for the server's own bookkeeping.
+    pub(super) actor: Option<Arc<Actor>>,
+    /// Most entries of the audit log.
+    pub(super) audit_entries: usize,
+}
+
+/// Wraps a closure for the channel. The write is wanted for as long as `caller` lives.
 pub(super) fn command<T, F>(
     write: F,
-    keeping: Option<Keeping>,
+    beside: Beside,
     caller: &Arc<()>,
 ) -> (Command, oneshot::Receiver<Result<T, StoreError>>)
 where
     T: Send + 'static,
     F: for<'t> FnOnce(&'t mut Tx) -> BoxFuture<'t, Result<T, StoreError>> + Send + 'static,
 {
+    let Beside { keeping, actor, audit_entries } = beside;
     let (reply, answer) = oneshot::channel();
     let run: Run = Box::new(move |tx| {
         Box::pin(async move {
             // Unwind safety: the closure's changes are in the transaction, which is rolled back.
             let all = async {
+                let before = audit::total_changes(tx).await?;
                 let made = write(tx).await?;
+                log(tx, actor.as_deref(), before, audit_entries).await?;
                 if let Some(keeping) = &keeping {
                     let answer = keeping.answer_to(&made);
                     keeping.keep(tx, answer).await?;
@@ -120,6 +135,16 @@ where
         })
     });
     (Command { run, caller: Arc::downgrade(caller) }, answer)
+}
+
+/// Writes the audit log: of every change that somebody asked for, and of what the server changes for all to see.
+async fn log(tx: &mut Tx, actor: Option<&Actor>, before: i64, max: usize) -> Result<(), StoreError> {
+    let is_shown = tx.changes.iter().any(|change| *change != CommittedChange::Jobs);
+    match actor {
+        Some(actor) if audit::total_changes(tx).await? != before => audit::append(tx, actor, max).await,
+        None if is_shown => audit::append(tx, &Actor::server("change", ""), max).await,
+        _ => Ok(()),
+    }
 }
 
 /// The writer's task.
@@ -168,6 +193,9 @@ impl Writer {
             }
         }
         pulse.end();
+        if let Err(error) = note_head(&mut self.tx.conn, "stop").await {
+            tracing::warn!(%error, "audit_head_not_read");
+        }
         if let Err(error) = checkpoint(&mut self.tx.conn).await {
             tracing::warn!(%error, follows = "the write-ahead log holds data: copy it with the file", "checkpoint_failed");
         }
