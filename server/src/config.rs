@@ -6,6 +6,7 @@
 
 mod backup;
 mod ros2;
+mod tls;
 
 pub use backup::BackupSettings;
 pub(crate) use backup::MAX_KEPT;
@@ -13,6 +14,7 @@ pub use ros2::{
     MAX_DOMAIN, MAX_KEY_PREFIX_BYTES, MAX_ROS2_ROBOTS, MAX_TRANSFORM_TOLERANCE_S, Middleware, PoseSource,
     RawRos2, RawRos2Camera, RawRos2Robot, Ros2Outputs, Ros2Robot,
 };
+pub use tls::{MAX_TLS_NAMES, OwnCertificate, RawTls, Tls};
 
 use engine::decode::ImageLimits;
 use figment::{
@@ -81,6 +83,8 @@ pub struct RawConfig {
     pub search_every_frame: bool,
     /// Allows plain-text listeners beyond loopback.
     pub insecure: bool,
+    /// Encryption, of HTTP and of robots' connections.
+    pub tls: RawTls,
     /// Backups.
     pub backup: BackupSettings,
     /// Robots of ROS 2.
@@ -101,6 +105,7 @@ impl Default for RawConfig {
             workers: 0,
             search_every_frame: true,
             insecure: false,
+            tls: RawTls::default(),
             backup: BackupSettings::default(),
             ros2: RawRos2::default(),
             limits: Limits::default(),
@@ -267,6 +272,8 @@ pub struct Config {
     pub workers: usize,
     /// Whether every frame is searched for all landmarks of its map.
     pub search_every_frame: bool,
+    /// Encryption; `None`: there is none.
+    pub tls: Option<Tls>,
     /// Backups.
     pub backup: BackupSettings,
     /// Robots of ROS 2.
@@ -331,6 +338,7 @@ impl TryFrom<RawConfig> for Config {
             fleet,
             workers: if raw.workers == 0 { cores } else { raw.workers },
             search_every_frame: raw.search_every_frame,
+            tls: tls::checked(raw.tls)?,
             backup: backup::checked(raw.backup)?,
             ros2: ros2::checked(raw.ros2)?,
             limits: raw.limits,
