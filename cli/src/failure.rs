@@ -135,6 +135,13 @@ impl Failure {
                 format!("No server answers at {endpoint} (zenoh)."),
             )
             .advise("Start one with `waymark serve`, or name its endpoint with --zenoh or WAYMARK_ZENOH."),
+            ClientError::Untrusted { url, detail } => {
+                let sentence = format!("The certificate of {url} is not trusted: {detail}.");
+                Self::new(Class::Denied, "untrusted", sentence).advise(
+                    "Give the certificate of its authority with --authority FILE, or once with waymark login --authority FILE.\n\
+                     The server's administrator has it: tls/authority.pem in the data directory.",
+                )
+            }
             other => Self::new(Class::Failed, "failed", other.to_string()),
         }
     }
@@ -172,6 +179,7 @@ mod tests {
             (Failure::usage("no").into(), 2),
             (ClientError::Http { url: "http://x".into(), detail: String::new() }.into(), 6),
             (ClientError::Unreachable { endpoint: "tcp/x:1".into(), detail: String::new() }.into(), 6),
+            (ClientError::Untrusted { url: "https://x".into(), detail: String::new() }.into(), 7),
             (anyhow::anyhow!("else"), 1),
         ] {
             let failure = Failure::of(&error);

@@ -141,8 +141,8 @@ fn ready(server: &RunningServer) {
     let link = server.page_link().filter(|_| std::io::stdout().is_terminal());
     let open = link.unwrap_or_else(|| "waymark open prints a link that opens the page".to_owned());
     let text = format!(
-        "pages   http://{}/\nrobots  {}\ntoken   {}\nopen    {open}\n",
-        server.http_addr,
+        "pages   {}/\nrobots  {}\ntoken   {}\nopen    {open}\n",
+        server.url(),
         server.zenoh_endpoint,
         server.local_token_file().display()
     );

@@ -10,6 +10,7 @@ use client::{ClientError, MapClient, api::Job};
 use serde::Serialize;
 use std::{
     io::{BufRead as _, IsTerminal as _},
+    path::PathBuf,
     sync::OnceLock,
     time::Duration,
 };
@@ -44,6 +45,9 @@ pub(crate) struct ServerArgs {
         value_name = "TOKEN"
     )]
     token: Option<TokenArg>,
+    /// PEM file of who signs the server's certificate [default: that of `waymark login`, or those of the system]
+    #[arg(long, global = true, env = "WAYMARK_AUTHORITY", help_heading = HEADING, value_name = "FILE")]
+    authority: Option<PathBuf>,
     /// Print results and errors as JSON.
     #[arg(long, global = true, help_heading = HEADING)]
     json: bool,
@@ -80,16 +84,26 @@ pub(crate) struct Session {
 impl ServerArgs {
     /// A session without a map.
     pub(crate) fn session(&self) -> anyhow::Result<Session> {
-        if let Some(token) = &self.token {
-            return self.session_with(Some(token));
+        let given = self.given_authority()?;
+        if let (Some(token), Some(authority)) = (&self.token, &given) {
+            return self.session_with(Some(token), Some(authority));
         }
-        let stored = Credentials::of_user().map(|file| file.token(&self.server)).transpose()?;
-        self.session_with(stored.flatten().as_ref())
+        let kept = Credentials::of_user().map(|file| file.entry(&self.server)).transpose()?.flatten();
+        let (token, authority) = kept.map(|kept| (kept.token, kept.authority)).unzip();
+        let authority = given.or(authority.flatten());
+        self.session_with(self.token.as_ref().or(token.as_ref()), authority.as_deref())
     }
 
-    /// A session with this token or none.
-    pub(crate) fn session_with(&self, token: Option<&TokenArg>) -> anyhow::Result<Session> {
-        let maps = MapClient::new(&self.server)?;
+    /// A session with this token or none, believing this authority alone or those of the system.
+    pub(crate) fn session_with(
+        &self,
+        token: Option<&TokenArg>,
+        authority: Option<&str>,
+    ) -> anyhow::Result<Session> {
+        let maps = match authority {
+            Some(pem) => MapClient::with_authority(&self.server, pem.as_bytes())?,
+            None => MapClient::new(&self.server)?,
+        };
         let maps = match token {
             Some(token) => maps.with_token(&token.0),
             None => maps,
@@ -100,6 +114,18 @@ impl ServerArgs {
     /// Address of the server, without a slash at the end.
     pub(crate) fn url(&self) -> &str {
         self.server.trim_end_matches('/')
+    }
+
+    /// The authority of the command line or the environment, PEM.
+    pub(crate) fn given_authority(&self) -> anyhow::Result<Option<String>> {
+        let read = |path: &PathBuf| {
+            std::fs::read_to_string(path).map_err(|error| {
+                let sentence = format!("The authority {} cannot be read: {error}.", path.display());
+                Failure::new(Class::NotFound, "no_authority", sentence)
+                    .advise("The server's administrator has it: tls/authority.pem in the data directory.")
+            })
+        };
+        Ok(self.authority.as_ref().map(read).transpose()?)
     }
 
     /// The token of the command line or the environment.

@@ -64,6 +64,20 @@ pub enum ClientError {
         /// What went wrong.
         detail: String,
     },
+    /// The server's certificate is not signed by whom this client believes, or not for this name.
+    #[error(
+        "the certificate of {url} is not trusted: {detail}. Give the certificate of its authority: \
+         MapClient::with_authority, in commands --authority"
+    )]
+    Untrusted {
+        /// Address asked.
+        url: String,
+        /// What is wrong with it.
+        detail: String,
+    },
+    /// A file of authorities that cannot be used.
+    #[error("the authority is no certificate in PEM: {0}")]
+    Authority(String),
     /// The server refused, and said why.
     #[error("{status} {code}{}{detail}", if field.is_empty() { ": ".to_owned() } else { format!(" in {field}: ") })]
     Refused {

@@ -288,7 +288,8 @@ impl Config {
     /// The listeners that other machines can reach, by setting, with their addresses: they are not encrypted.
     pub fn plain_text_beyond_loopback(&self) -> Vec<(&'static str, String)> {
         let zenoh = zenoh_address(&self.zenoh_endpoint).ok().filter(|a| !is_loopback(a.ip()));
-        let http = (!is_loopback(self.http_addr.ip())).then(|| ("http", self.http_addr.to_string()));
+        let is_http_plain = self.tls.is_none() && !is_loopback(self.http_addr.ip());
+        let http = is_http_plain.then(|| ("http", self.http_addr.to_string()));
         http.into_iter().chain(zenoh.map(|_| ("zenoh", self.zenoh_endpoint.clone()))).collect()
     }
 }
@@ -302,8 +303,11 @@ impl TryFrom<RawConfig> for Config {
             .parse()
             .map_err(|e| invalid("http", format!("`{}` is not ADDRESS:PORT ({e})", raw.http)))?;
         let zenoh_ip = zenoh_address(&raw.zenoh)?.ip();
-        for (field, value, ip) in [("http", &raw.http, http_addr.ip()), ("zenoh", &raw.zenoh, zenoh_ip)] {
-            if !raw.insecure && !is_loopback(ip) {
+        let tls = tls::checked(raw.tls)?;
+        for (field, value, is_plain, ip) in
+            [("http", &raw.http, tls.is_none(), http_addr.ip()), ("zenoh", &raw.zenoh, true, zenoh_ip)]
+        {
+            if is_plain && !raw.insecure && !is_loopback(ip) {
                 return Err(ConfigError::NotLoopback { field, value: value.clone() });
             }
         }
@@ -338,7 +342,7 @@ impl TryFrom<RawConfig> for Config {
             fleet,
             workers: if raw.workers == 0 { cores } else { raw.workers },
             search_every_frame: raw.search_every_frame,
-            tls: tls::checked(raw.tls)?,
+            tls,
             backup: backup::checked(raw.backup)?,
             ros2: ros2::checked(raw.ros2)?,
             limits: raw.limits,

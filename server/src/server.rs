@@ -25,7 +25,7 @@ use engine::{
 };
 use protos::Name;
 use std::{
-    net::{IpAddr, Ipv4Addr, SocketAddr},
+    net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr},
     path::Path,
     sync::Arc,
     time::{Duration, Instant},
@@ -35,6 +35,7 @@ use tokio::{
     sync::{mpsc::Receiver, watch},
     task::JoinHandle,
 };
+use tokio_rustls::TlsAcceptor;
 
 /// Why the server did not start.
 #[derive(Debug, thiserror::Error)]
@@ -97,6 +98,8 @@ pub struct RunningServer {
     pub ros2: Arc<Ros2>,
     sessions: Arc<Sessions>,
     local_token: LocalToken,
+    /// The first name of the certificate, or else the address; `None` without TLS.
+    tls_name: Option<String>,
     stop: watch::Sender<bool>,
     vitals: Arc<Vitals>,
     tasks: Tasks,
@@ -123,7 +126,9 @@ impl Server {
         let config = Arc::new(config);
         let (store, writer) = Catalogue::open(&config).await?;
         let (stop, stopping) = watch::channel(false);
-        let _certificates = open_certificates(&config, &stopping)?;
+        let certificates = open_certificates(&config, &stopping)?;
+        let tls = certificates.as_ref().map(|all| http::encryption::acceptor(all.current())).transpose();
+        let tls = tls.map_err(|e| StartError::Certificates(e.to_string()))?;
         let at = |source| StartError::Http { addr: config.http_addr, source };
         let listener = TcpListener::bind(config.http_addr).await.map_err(at)?;
         let http_addr = listener.local_addr().map_err(at)?;
@@ -159,9 +164,12 @@ impl Server {
             local_token_file: Some(local_token.path().to_owned()),
         };
         let app = App::new(config.clone(), store, services, &engine, stopping.clone());
-        let http = serve(listener, app, &config, vitals.begin("the HTTP listener"), stopping);
+        let http = serve((listener, tls), app, &config, vitals.begin("the HTTP listener"), stopping);
         let watch = tokio::spawn(vitals.clone().watch());
         let zenoh_endpoint = bus.endpoint().to_owned();
+        let tls_name = config.tls.as_ref().map(|tls| {
+            tls.names.first().cloned().unwrap_or_else(|| http_addr.ip().to_canonical().to_string())
+        });
         let tasks = Tasks {
             workers,
             bus,
@@ -183,6 +191,7 @@ impl Server {
             ros2,
             sessions,
             local_token,
+            tls_name,
             stop,
             vitals,
             tasks,
@@ -238,7 +247,7 @@ impl Teaching {
 }
 
 fn serve(
-    listener: TcpListener,
+    (listener, tls): (TcpListener, Option<TlsAcceptor>),
     app: App,
     config: &Config,
     pulse: Pulse,
@@ -246,7 +255,7 @@ fn serve(
 ) -> JoinHandle<()> {
     let (router, limits) = (http::router(app), config.limits.clone());
     tokio::spawn(async move {
-        http::listen::serve(listener, router, limits, stopping).await;
+        http::listen::serve(listener, router, tls, limits, stopping).await;
         drop(pulse);
     })
 }
@@ -322,11 +331,24 @@ impl RunningServer {
     /// no randomness for it.
     pub fn page_link(&self) -> Option<String> {
         let code = self.sessions.code(TokenId::Local, Instant::now()).ok()?;
+        Some(format!("{}/open?code={code}", self.local_url()))
+    }
+
+    /// Address of the pages and of the HTTP interface for other machines; for this one where no other can reach it.
+    pub fn url(&self) -> String {
+        let Some(name) = &self.tls_name else { return self.local_url() };
+        let name = if name.parse::<Ipv6Addr>().is_ok() { format!("[{name}]") } else { name.clone() };
+        format!("https://{name}:{}", self.http_addr.port())
+    }
+
+    /// The same for this machine. With TLS, plain text is answered on loopback alone.
+    fn local_url(&self) -> String {
         let mut at = self.http_addr;
         if at.ip().is_unspecified() {
             at.set_ip(IpAddr::V4(Ipv4Addr::LOCALHOST));
         }
-        Some(format!("http://{at}/open?code={code}"))
+        let is_plain = self.tls_name.is_none() || at.ip().to_canonical().is_loopback();
+        format!("{}://{at}", if is_plain { "http" } else { "https" })
     }
 
     /// Returns when a part of the server has ended untold, with its name and the reason: stop, and start again from disk.

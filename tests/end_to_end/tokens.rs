@@ -18,6 +18,7 @@ use tests::{
     Child, Inside, SOON,
     command::{program, waymark},
     pictures::picture,
+    plain_http,
 };
 
 fn code(result: Result<impl std::fmt::Debug, ClientError>) -> String {
@@ -46,7 +47,11 @@ async fn the_local_token_is_found_at_the_first_request_and_after_a_restart() {
     assert!(file.exists(), "a kill removes nothing");
     let server = Child::start(data.path());
     assert_ne!(fs::read_to_string(&file).expect("the local token"), first);
-    let stale = reqwest::Client::new().get(format!("{}/api/v1/maps", server.url)).bearer_auth(first.trim());
+    let stale = plain_http()
+        .build()
+        .expect("a client")
+        .get(format!("{}/api/v1/maps", server.url))
+        .bearer_auth(first.trim());
     assert_eq!(stale.send().await.expect("an answer").status(), 401);
     assert_eq!(server.maps().maps().await.expect("maps").len(), 1);
 }
@@ -139,7 +144,8 @@ async fn commands_sign_in_with_a_token_and_out_again() {
     assert!(status == 7 && refused.contains("needs operator"), "{status} {refused}");
     let (status, link) = run("", &["open"]);
     assert!(status == 0 && link.starts_with(&format!("{url}/open?code=")), "{link}");
-    let opened = reqwest::get(link.lines().next().expect("the link")).await.expect("the page");
+    let http = plain_http().build().expect("a client");
+    let opened = http.get(link.lines().next().expect("the link")).send().await.expect("the page");
     assert_eq!(opened.status(), 200);
 
     assert_eq!(run("", &["logout"]).0, 0);
@@ -173,7 +179,7 @@ fn no_token_and_no_code_is_in_the_log() {
     let link = run(&["open"]).stdout;
     let local = fs::read_to_string(data.path().join("data/local-token")).expect("the local token");
     tokio::runtime::Runtime::new().expect("a runtime").block_on(async {
-        let http = reqwest::Client::new();
+        let http = plain_http().build().expect("a client");
         http.get(link.trim()).send().await.expect("the page");
         http.get(format!("{url}/api/v1/maps")).bearer_auth(token.trim()).send().await.expect("maps");
     });

@@ -18,11 +18,15 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// A server's entry.
-#[derive(Deserialize)]
+/// What is kept for a server.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Entry {
-    token: String,
+pub(crate) struct Entry {
+    /// Who asks.
+    pub(crate) token: TokenArg,
+    /// Who signs the server's certificate, PEM; `None`: an authority of the system.
+    #[serde(default)]
+    pub(crate) authority: Option<String>,
 }
 
 type Entries = BTreeMap<String, Entry>;
@@ -48,19 +52,19 @@ impl Credentials {
         &self.0
     }
 
-    /// The token of a server.
-    pub(crate) fn token(&self, server: &str) -> anyhow::Result<Option<TokenArg>> {
-        Ok(self.read()?.remove(key(server)).map(|entry| TokenArg(entry.token)))
+    /// What is kept for a server.
+    pub(crate) fn entry(&self, server: &str) -> anyhow::Result<Option<Entry>> {
+        Ok(self.read()?.remove(key(server)))
     }
 
-    /// Keeps a token for a server.
-    pub(crate) fn store(&self, server: &str, token: &TokenArg) -> anyhow::Result<()> {
+    /// Keeps token and authority for a server.
+    pub(crate) fn store(&self, server: &str, entry: Entry) -> anyhow::Result<()> {
         let mut entries = self.read()?;
-        entries.insert(key(server).to_owned(), Entry { token: token.0.clone() });
+        entries.insert(key(server).to_owned(), entry);
         self.write(&entries)
     }
 
-    /// Forgets the token of a server. Whether there was one.
+    /// Forgets token and authority of a server. Whether there was one.
     pub(crate) fn forget(&self, server: &str) -> anyhow::Result<bool> {
         let mut entries = self.read()?;
         let was_there = entries.remove(key(server)).is_some();
@@ -88,10 +92,13 @@ impl Credentials {
 
     fn write(&self, entries: &Entries) -> anyhow::Result<()> {
         let mut text = String::from("# Tokens of `waymark login`, by server. Secret.\n");
-        for (server, Entry { token }) in entries {
-            // Strings of JSON are strings of TOML.
-            let (server, token) = (serde_json::to_string(server)?, serde_json::to_string(token)?);
+        // Strings of JSON are strings of TOML.
+        for (server, Entry { token, authority }) in entries {
+            let (server, token) = (serde_json::to_string(server)?, serde_json::to_string(&token.0)?);
             write!(text, "\n[{server}]\ntoken = {token}\n")?;
+            if let Some(authority) = authority {
+                writeln!(text, "authority = {}", serde_json::to_string(authority)?)?;
+            }
         }
         let cannot = || format!("cannot write {}", self.0.display());
         fs::create_dir_all(self.0.parent().unwrap_or(Path::new(""))).with_context(cannot)?;
@@ -127,21 +134,24 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let file = Credentials::within(Some(folder.path().into()), None).unwrap();
         let (near, far) = ("http://127.0.0.1:8080", "http://server.example:80/");
-        let token = |n: u32| TokenArg(format!("wmk_{n}_secret"));
-        assert_eq!((file.token(near).unwrap(), file.forget(near).unwrap()), (None, false));
+        let entry = |n: u32| Entry {
+            token: TokenArg(format!("wmk_{n}_secret")),
+            authority: (n == 2).then(|| "-----BEGIN\nMII\"\n-----END\n".to_owned()),
+        };
+        assert_eq!((file.entry(near).unwrap(), file.forget(near).unwrap()), (None, false));
         for (server, n) in [(near, 1), (far, 2), (near, 3)] {
-            file.store(server, &token(n)).unwrap();
+            file.store(server, entry(n)).unwrap();
         }
-        assert_eq!(file.token("http://127.0.0.1:8080/").unwrap(), Some(token(3)));
+        assert_eq!(file.entry("http://127.0.0.1:8080/").unwrap(), Some(entry(3)));
         assert!(file.forget(near).unwrap());
-        assert_eq!((file.token(near).unwrap(), file.token(far).unwrap()), (None, Some(token(2))));
+        assert_eq!((file.entry(near).unwrap(), file.entry(far).unwrap()), (None, Some(entry(2))));
         #[cfg(unix)]
         {
             use std::os::unix::fs::PermissionsExt as _;
             let mode = |mode| fs::set_permissions(file.path(), fs::Permissions::from_mode(mode)).unwrap();
             assert_eq!(fs::metadata(file.path()).unwrap().permissions().mode() & 0o777, 0o600);
             mode(0o644);
-            assert!(file.token(far).unwrap_err().to_string().contains("Others may read"));
+            assert!(file.entry(far).unwrap_err().to_string().contains("Others may read"));
         }
         assert_eq!(fs::read_dir(folder.path().join("waymark")).unwrap().count(), 1, "no draft is left");
     }

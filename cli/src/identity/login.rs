@@ -1,6 +1,10 @@
 //! `waymark login` and `waymark logout`: the token that commands send to a server.
 
-use super::{TokenArg, credentials::Credentials, prompt};
+use super::{
+    TokenArg,
+    credentials::{Credentials, Entry},
+    prompt,
+};
 use crate::{
     failure::{Class, Failure},
     session::ServerArgs,
@@ -35,11 +39,13 @@ pub(crate) async fn login(args: &Args) -> anyhow::Result<()> {
             .advise("An administrator makes one: waymark token create NAME --role ROLE")
             .into());
     }
-    let session = args.server.session_with(Some(&token))?;
+    let authority = args.server.given_authority()?;
+    let session = args.server.session_with(Some(&token), authority.as_deref())?;
     let who = session.explained(session.maps().whoami().await.map_err(Into::into)).await?;
-    file.store(url, &token)?;
+    let kept = if authority.is_some() { "token and the authority are" } else { "token is" };
+    file.store(url, Entry { token, authority })?;
     session.show(&who, &sentence(url, &who))?;
-    session.note(&format!("  The token is in {}.", file.path().display()));
+    session.note(&format!("  The {kept} in {}.", file.path().display()));
     Ok(())
 }
 
@@ -58,7 +64,7 @@ pub(crate) fn logout(args: &Args) -> anyhow::Result<()> {
     let was_there = file()?.forget(url)?;
     let text =
         if was_there { format!("signed out of {url}") } else { format!("there was no token for {url}") };
-    args.server.session_with(None)?.show(&json!({ "server": url, "signed_out": was_there }), &text)
+    args.server.session_with(None, None)?.show(&json!({ "server": url, "signed_out": was_there }), &text)
 }
 
 #[cfg(test)]

@@ -7,10 +7,12 @@ pub(crate) mod open;
 mod prompt;
 pub(crate) mod token;
 
+use serde::Deserialize;
 use std::{convert::Infallible, fmt, str::FromStr};
 
 /// The text of a token, not shown.
-#[derive(Clone, PartialEq, Eq)]
+#[derive(Clone, PartialEq, Eq, Deserialize)]
+#[serde(transparent)]
 pub(crate) struct TokenArg(pub(crate) String);
 
 impl FromStr for TokenArg {

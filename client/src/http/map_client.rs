@@ -6,6 +6,7 @@ use super::{
     creation::{KEY, execute, fresh_key},
     local_token::{self, LocalTokenError},
     operation::{Operation, PathValue, path_of, query_of},
+    tls,
 };
 use crate::ClientError;
 use protos::api::{Page, PageQuery, Problem};
@@ -57,10 +58,24 @@ pub struct Revised<T> {
 impl MapClient {
     /// A client of the server at `base`, such as `http://127.0.0.1:8080`. Nothing is sent yet. On this machine and for this
     /// user no token is needed; else [`MapClient::with_token`].
+    ///
+    /// With `https`, the server's certificate must be signed by an authority of the system, or see
+    /// [`MapClient::with_authority`].
     pub fn new(base: &str) -> Result<Self, ClientError> {
+        Self::believing(base, None)
+    }
+
+    /// The same for a server whose certificate is signed by one of these authorities, PEM, and by no other: for one with
+    /// its built-in authority, the file `tls/authority.pem` of its data directory.
+    pub fn with_authority(base: &str, authority_pem: &[u8]) -> Result<Self, ClientError> {
+        Self::believing(base, Some(authority_pem))
+    }
+
+    fn believing(base: &str, authority_pem: Option<&[u8]>) -> Result<Self, ClientError> {
         // Ignores proxies of the environment: the server is in the robot's own network.
-        let http = reqwest::Client::builder().no_proxy().timeout(REQUEST_TIMEOUT).build();
-        let http = http.map_err(|e| ClientError::Http { url: base.to_owned(), detail: e.to_string() })?;
+        let builder = reqwest::Client::builder().no_proxy().timeout(REQUEST_TIMEOUT);
+        let http = tls::encrypted(builder, base, authority_pem)?.build();
+        let http = http.map_err(|e| ClientError::Http { url: base.to_owned(), detail: reason(&e) })?;
         let base = base.trim_end_matches('/').to_owned();
         let local_port = local_token::local_port(&base);
         Ok(Self { http, base, token: Arc::default(), local_port, key: None, revision: None })
@@ -238,7 +253,10 @@ impl MapClient {
 
     fn unsent(&self, error: &reqwest::Error) -> ClientError {
         let url = error.url().map_or_else(|| self.base.clone(), ToString::to_string);
-        ClientError::Http { url, detail: reason(error) }
+        match tls::untrusted(error) {
+            Some(detail) => ClientError::Untrusted { url, detail },
+            None => ClientError::Http { url, detail: reason(error) },
+        }
     }
 }
 

@@ -21,6 +21,7 @@ mod operation;
 mod recognise;
 mod reference_runs;
 mod robots;
+mod tls;
 mod tokens;
 mod underlay;
 mod views;

@@ -6,6 +6,7 @@ use super::{
     cookie::session_cookie,
     error::{ApiError, method_not_allowed},
     guard::RequestId,
+    peer::Peer,
 };
 use crate::{
     identity::{
@@ -22,16 +23,12 @@ use axum::{
 };
 use protos::api::Role;
 use serde_json::json;
-use std::{net::SocketAddr, path::Path, time::Instant};
+use std::{path::Path, time::Instant};
 
 /// Sent by the page with what changes something: forms and pictures of other sites cannot send it.
 pub(super) const PAGE_HEADER: HeaderName = HeaderName::from_static("x-waymark-page");
 /// Set by proxies: then the peer is not who asks.
 const FORWARDED: [&str; 2] = ["forwarded", "x-forwarded-for"];
-
-/// Address of whoever holds the other end of the connection.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Peer(pub(crate) SocketAddr);
 
 /// The middleware.
 pub(super) async fn authorise(State(app): State<AppState>, request: Request, next: Next) -> Response {
@@ -197,7 +194,7 @@ pub(super) fn refused(app: &AppState, parts: &Parts, error: ApiError) -> Respons
     let is_unauthenticated = error.status == StatusCode::UNAUTHORIZED;
     let mut response = error.into_response();
     if is_unauthenticated {
-        let peer = parts.extensions.get::<Peer>().map(|peer| peer.0.ip().to_canonical());
+        let peer = parts.extensions.get::<Peer>().map(|peer| peer.addr.ip().to_canonical());
         let is_local = peer.is_some_and(|ip| ip.is_loopback())
             && FORWARDED.iter().all(|name| !parts.headers.contains_key(*name));
         let file = app.local_token_file.as_deref().filter(|_| is_local);

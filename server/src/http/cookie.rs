@@ -14,10 +14,15 @@ fn cookie_name(headers: &HeaderMap) -> String {
     format!("{COOKIE}{port}")
 }
 
-/// Sets the cookie; an age of 0 removes it.
-pub(super) fn set_cookie(headers: &HeaderMap, value: &str, max_age_s: u64) -> HeaderValue {
-    let name = cookie_name(headers);
-    let text = format!("{name}={value}; HttpOnly; SameSite=Strict; Path=/; Max-Age={max_age_s}");
+/// Sets the cookie; an age of 0 removes it. One that was set over an encrypted connection is sent over such ones alone.
+pub(super) fn set_cookie(
+    headers: &HeaderMap,
+    is_encrypted: bool,
+    value: &str,
+    max_age_s: u64,
+) -> HeaderValue {
+    let (name, secure) = (cookie_name(headers), if is_encrypted { "; Secure" } else { "" });
+    let text = format!("{name}={value}; HttpOnly; SameSite=Strict; Path=/; Max-Age={max_age_s}{secure}");
     // Digits, and the alphabet of base64url.
     HeaderValue::from_str(&text).unwrap_or(HeaderValue::from_static(""))
 }
@@ -54,7 +59,9 @@ mod tests {
         ] {
             assert_eq!(session_cookie(&headers(host)), value, "{host}");
         }
-        let set = set_cookie(&headers("x:80"), "v", 5);
+        let set = set_cookie(&headers("x:80"), false, "v", 5);
         assert_eq!(set, "waymark_session_80=v; HttpOnly; SameSite=Strict; Path=/; Max-Age=5");
+        let set = set_cookie(&headers("x:80"), true, "v", 5);
+        assert_eq!(set, "waymark_session_80=v; HttpOnly; SameSite=Strict; Path=/; Max-Age=5; Secure");
     }
 }

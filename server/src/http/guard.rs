@@ -3,7 +3,7 @@
 //! A browser reaches the server on behalf of any page it shows; so a request must name this server as its host and, if it
 //! changes anything, come from its own pages or from no page at all. Who asks is the matter of `authorise`.
 
-use super::{AppState, error::ApiError};
+use super::{AppState, error::ApiError, peer::Peer};
 use axum::{
     body::HttpBody,
     extract::{Request, State},
@@ -44,7 +44,10 @@ pub(super) async fn guard(State(app): State<AppState>, mut request: Request, nex
     let (method, path) = (request.method().clone(), request.uri().path().to_owned());
     let started = Instant::now();
     let deadline = Duration::from_secs(app.config.limits.request_timeout_s);
-    let loopback = app.config.http_addr.ip().to_canonical().is_loopback();
+    // With TLS, plain text comes from this machine alone, and a certificate proves the name that a page was asked by.
+    let is_encrypted = request.extensions().get::<Peer>().is_some_and(|peer| peer.is_encrypted);
+    let is_loopback = app.config.tls.is_some() || app.config.http_addr.ip().to_canonical().is_loopback();
+    let loopback = is_loopback && !is_encrypted;
     let mut response = match check_origin(request.method(), request.headers(), loopback) {
         Err(error) => error.into_response(),
         Ok(()) => match tokio::time::timeout(deadline, placed(&app, request, next)).await {
@@ -115,7 +118,7 @@ fn check_origin(method: &Method, headers: &HeaderMap, loopback: bool) -> Result<
     let host = text(header::HOST).unwrap_or_default();
     // A name that a stranger's DNS points at 127.0.0.1 must not make this server part of the stranger's site.
     if loopback && !is_loopback_host(host) {
-        let detail = "this server listens on loopback and answers only to a loopback host";
+        let detail = "without encryption this server answers only to a loopback host";
         return Err(ApiError::new(StatusCode::FORBIDDEN, "host_not_allowed", detail).field("host"));
     }
     if method.is_safe() {

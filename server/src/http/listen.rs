@@ -1,20 +1,25 @@
-//! The accept loop: bounded connections, a deadline for the head of a request and for the reading of an answer, a graceful
-//! end. axum's own `serve` installs no timer, so hyper's deadline would not work there.
+//! The accept loop: bounded connections, a deadline for the handshake, for the head of a request and for the reading of an
+//! answer, a graceful end. axum's own `serve` installs no timer, so hyper's deadline would not work there.
 
-use super::authorise::Peer;
+use super::{
+    encryption::{self, Spoken},
+    peer::Peer,
+};
 use crate::config::Limits;
 use axum::{Router, extract::Request};
 use hyper::{body::Incoming, server::conn::http1, service::service_fn};
 use hyper_util::{
     rt::{TokioIo, TokioTimer},
-    server::graceful::GracefulShutdown,
+    server::graceful::{GracefulShutdown, Watcher},
 };
-use std::{net::SocketAddr, sync::Arc, time::Duration};
+use std::{io, net::SocketAddr, pin::Pin, sync::Arc, time::Duration};
 use tokio::{
-    net::TcpListener,
+    io::{AsyncRead, AsyncWrite},
+    net::{TcpListener, TcpStream},
     sync::{Semaphore, watch},
 };
 use tokio_io_timeout::TimeoutStream;
+use tokio_rustls::TlsAcceptor;
 use tower::ServiceExt as _;
 
 /// Largest head of a request, in bytes.
@@ -24,40 +29,49 @@ const STOP_GRACE: Duration = Duration::from_secs(5);
 /// Pause after a failed accept: usually too many open files.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 
-/// Serves until `stopping` is true.
+/// How connections are served.
+#[derive(Clone)]
+struct Serving {
+    http: http1::Builder,
+    tls: Option<TlsAcceptor>,
+    router: Router,
+    /// For who speaks plain text from another machine where TLS is on.
+    refusing: Router,
+    header_timeout: Duration,
+    write_timeout: Duration,
+}
+
+/// Serves until `stopping` is true: with `tls`, encrypted, and plain text to clients of this machine alone.
 pub(crate) async fn serve(
     listener: TcpListener,
     router: Router,
+    tls: Option<TlsAcceptor>,
     limits: Limits,
     mut stopping: watch::Receiver<bool>,
 ) {
     let places = Arc::new(Semaphore::new(limits.connections));
     let graceful = GracefulShutdown::new();
-    let mut builder = http1::Builder::new();
-    builder
-        .timer(TokioTimer::new())
-        .header_read_timeout(Duration::from_secs(limits.header_timeout_s))
-        .max_buf_size(HEAD_MAX);
+    let header_timeout = Duration::from_secs(limits.header_timeout_s);
+    let mut http = http1::Builder::new();
+    http.timer(TokioTimer::new()).header_read_timeout(header_timeout).max_buf_size(HEAD_MAX);
+    let serving = Serving {
+        http,
+        tls,
+        router,
+        refusing: encryption::refusing(),
+        header_timeout,
+        write_timeout: Duration::from_secs(limits.write_timeout_s),
+    };
     loop {
         let accepted = tokio::select! {
             _ = stopping.wait_for(|stop| *stop) => break,
             accepted = accept(&listener, &places) => accepted,
         };
         let Some((stream, peer, place)) = accepted else { continue };
-        let mut stream = TimeoutStream::new(stream);
-        // Runs only while there is something to write, and starts again with every part that is taken.
-        stream.set_write_timeout(Some(Duration::from_secs(limits.write_timeout_s)));
-        let stream = TokioIo::new(Box::pin(stream));
-        let router = router.clone();
-        let answer = service_fn(move |mut request: Request<Incoming>| {
-            request.extensions_mut().insert(Peer(peer));
-            router.clone().oneshot(request)
-        });
-        let connection = builder.serve_connection(stream, answer);
-        let connection = graceful.watch(connection);
+        let (serving, watcher) = (serving.clone(), graceful.watcher());
         tokio::spawn(async move {
-            if let Err(error) = connection.await {
-                tracing::debug!(%error, "connection");
+            if let Err(error) = serving.connection(stream, peer, watcher).await {
+                tracing::debug!(error, "connection");
             }
             drop(place);
         });
@@ -66,6 +80,55 @@ pub(crate) async fn serve(
     if tokio::time::timeout(STOP_GRACE, graceful.shutdown()).await.is_err() {
         tracing::warn!("some HTTP requests did not end in time");
     }
+}
+
+impl Serving {
+    /// Serves one connection to its end.
+    async fn connection(self, stream: TcpStream, peer: SocketAddr, watcher: Watcher) -> Result<(), String> {
+        let Some(tls) = &self.tls else {
+            return self.http(self.timed(stream), &self.router, Peer::plain(peer), watcher).await;
+        };
+        let spoken = tokio::time::timeout(self.header_timeout, encryption::spoken(&stream, peer));
+        match within(spoken.await)? {
+            Spoken::Tls => {
+                let handshake = tls.accept(self.timed(stream));
+                let stream = within(tokio::time::timeout(self.header_timeout, handshake).await)?;
+                self.http(stream, &self.router, Peer { addr: peer, is_encrypted: true }, watcher).await
+            }
+            Spoken::LocalPlain => {
+                self.http(self.timed(stream), &self.router, Peer::plain(peer), watcher).await
+            }
+            Spoken::Plain => self.http(self.timed(stream), &self.refusing, Peer::plain(peer), watcher).await,
+        }
+    }
+
+    /// A stream that gives up when what it writes is not taken.
+    fn timed(&self, stream: TcpStream) -> Pin<Box<TimeoutStream<TcpStream>>> {
+        let mut stream = TimeoutStream::new(stream);
+        // Runs only while there is something to write, and starts again with every part that is taken.
+        stream.set_write_timeout(Some(self.write_timeout));
+        Box::pin(stream)
+    }
+
+    async fn http(
+        &self,
+        stream: impl AsyncRead + AsyncWrite + Unpin + Send + 'static,
+        router: &Router,
+        peer: Peer,
+        watcher: Watcher,
+    ) -> Result<(), String> {
+        let router = router.clone();
+        let answer = service_fn(move |mut request: Request<Incoming>| {
+            request.extensions_mut().insert(peer);
+            router.clone().oneshot(request)
+        });
+        let connection = self.http.serve_connection(TokioIo::new(stream), answer);
+        watcher.watch(connection).await.map_err(|error| error.to_string())
+    }
+}
+
+fn within<T>(done: Result<io::Result<T>, tokio::time::error::Elapsed>) -> Result<T, String> {
+    done.map_err(|elapsed| elapsed.to_string())?.map_err(|error| error.to_string())
 }
 
 async fn accept(
@@ -91,6 +154,7 @@ async fn accept(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::identity::certificates::Certificates;
     use axum::{
         body::Bytes,
         response::{Sse, sse::Event},
@@ -100,7 +164,6 @@ mod tests {
     use std::convert::Infallible;
     use tokio::{
         io::{AsyncReadExt, AsyncWriteExt},
-        net::TcpStream,
         time::timeout,
     };
 
@@ -124,7 +187,7 @@ mod tests {
         let at = listener.local_addr().unwrap();
         let (stop, stopping) = watch::channel(false);
         let limits = Limits { connections: 1, write_timeout_s: WRITE_TIMEOUT_S, ..Limits::default() };
-        tokio::spawn(serve(listener, router, limits, stopping));
+        tokio::spawn(serve(listener, router, None, limits, stopping));
         (at, stop)
     }
 
@@ -165,5 +228,44 @@ mod tests {
         let mut events = String::new();
         asked(at, "/quiet").await.read_to_string(&mut events).await.unwrap();
         assert_eq!(events.matches("data: here").count(), 2, "{events}");
+    }
+
+    #[tokio::test]
+    async fn plain_text_from_another_machine_gets_the_refusal_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let settings = crate::config::Tls { names: Vec::new(), own: None, client_authority: None };
+        let certificates = Certificates::open(&settings, folder.path(), 1_800_000_000_000).unwrap();
+        let mut http = http1::Builder::new();
+        http.timer(TokioTimer::new());
+        let second = Duration::from_secs(1);
+        let serving = Serving {
+            http,
+            tls: Some(encryption::acceptor(certificates.current()).unwrap()),
+            router: Router::new().fallback(async || "secret"),
+            refusing: encryption::refusing(),
+            header_timeout: second,
+            write_timeout: second,
+        };
+        let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+        let at = listener.local_addr().unwrap();
+        for (peer, status, is_answered) in
+            [("127.0.0.1:9", "HTTP/1.1 200", true), ("192.0.2.4:9", "HTTP/1.1 426", false)]
+        {
+            let mut client = asked(at, "/").await;
+            let (accepted, _) = listener.accept().await.unwrap();
+            let graceful = GracefulShutdown::new();
+            let served = serving.clone().connection(accepted, peer.parse().unwrap(), graceful.watcher());
+            let mut answer = String::new();
+            let (served, read) = tokio::join!(served, client.read_to_string(&mut answer));
+            assert!(served.is_ok() && read.is_ok());
+            assert!(answer.starts_with(status), "{peer}: {answer}");
+            assert_eq!((answer.contains("secret"), answer.contains("https://")), (is_answered, !is_answered));
+        }
+        // A handshake that does not come.
+        let _silent = TcpStream::connect(at).await.unwrap();
+        let (accepted, peer) = listener.accept().await.unwrap();
+        let graceful = GracefulShutdown::new();
+        let served = timeout(Duration::from_secs(10), serving.connection(accepted, peer, graceful.watcher()));
+        assert!(served.await.unwrap().unwrap_err().contains("deadline"));
     }
 }

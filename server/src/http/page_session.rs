@@ -7,6 +7,7 @@ use super::{
     cookie::{session_cookie, set_cookie},
     error::ApiError,
     extract::{json, too_large},
+    peer::Peer,
 };
 use crate::{
     identity::{CODE_VALID, Principal, SESSION_VALID, TokenId},
@@ -16,7 +17,7 @@ use axum::{
     Extension, Json, Router,
     body::to_bytes,
     extract::{Query, Request, State, rejection::QueryRejection},
-    http::{HeaderMap, HeaderValue, StatusCode, header, request::Parts},
+    http::{HeaderValue, StatusCode, header, request::Parts},
     response::{IntoResponse, Response},
     routing::{get, post},
 };
@@ -59,8 +60,8 @@ struct OpenQuery {
 /// Takes the code of a link, and leads to the page.
 async fn open(
     State(app): State<AppState>,
-    headers: HeaderMap,
     query: Result<Query<OpenQuery>, QueryRejection>,
+    parts: Parts,
 ) -> Response {
     let code = query.ok().map(|Query(OpenQuery { code })| code);
     let token = code.and_then(|code| app.sessions.redeem(&code, Instant::now()));
@@ -69,7 +70,7 @@ async fn open(
         |place: HeaderValue| (StatusCode::SEE_OTHER, [(header::LOCATION, place), no_store()]).into_response();
     match token.filter(is_valid) {
         None => to(LINK_ENDED),
-        Some(token) => match begun(&app, &headers, token) {
+        Some(token) => match begun(&app, &parts, token) {
             Ok(cookie) => ([(header::SET_COOKIE, cookie)], to(HeaderValue::from_static("/"))).into_response(),
             Err(error) => error.into_response(),
         },
@@ -95,7 +96,7 @@ async fn login(State(app): State<AppState>, request: Request) -> Response {
         let LoginForm { token } = json(&bytes, "")?;
         let principal = app.store.tokens().principal_of(token.trim(), now_ms());
         let unknown = |_denial| unauthenticated("the token is not valid", Role::Viewer).field("token");
-        begun(&app, &parts.headers, principal.map_err(unknown)?.token)
+        begun(&app, &parts, principal.map_err(unknown)?.token)
     };
     match begun.await {
         Ok(cookie) => (StatusCode::NO_CONTENT, [(header::SET_COOKIE, cookie)]).into_response(),
@@ -111,11 +112,16 @@ async fn logout(State(app): State<AppState>, parts: Parts) -> Response {
     if let Some(cookie) = session_cookie(&parts.headers) {
         app.sessions.close(cookie);
     }
-    (StatusCode::NO_CONTENT, [(header::SET_COOKIE, set_cookie(&parts.headers, "", 0))]).into_response()
+    (StatusCode::NO_CONTENT, [(header::SET_COOKIE, cookie(&parts, "", 0))]).into_response()
 }
 
 /// A session for a token: its cookie.
-fn begun(app: &AppState, headers: &HeaderMap, token: TokenId) -> Result<HeaderValue, ApiError> {
+fn begun(app: &AppState, parts: &Parts, token: TokenId) -> Result<HeaderValue, ApiError> {
     let value = app.sessions.open(token, Instant::now()).map_err(|e| ApiError::internal(&e))?;
-    Ok(set_cookie(headers, &value, SESSION_VALID.as_secs()))
+    Ok(cookie(parts, &value, SESSION_VALID.as_secs()))
+}
+
+fn cookie(parts: &Parts, value: &str, max_age_s: u64) -> HeaderValue {
+    let is_encrypted = parts.extensions.get::<Peer>().is_some_and(|peer| peer.is_encrypted);
+    set_cookie(&parts.headers, is_encrypted, value, max_age_s)
 }

@@ -26,6 +26,7 @@ from waymark.errors import (
     Superseded,
     Unexpected,
     Unreachable,
+    Untrusted,
     WaymarkError,
 )
 from waymark.image import Capture, Image
@@ -87,6 +88,7 @@ __all__ = [
     "Superseded",
     "Unexpected",
     "Unreachable",
+    "Untrusted",
     "WallBody",
     "WaymarkError",
     "api",

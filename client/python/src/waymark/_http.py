@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import ssl
 import uuid
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from os import PathLike
 from typing import Any, Generic, Literal, TypeAlias, TypeVar
 from urllib.parse import quote
 
@@ -24,7 +26,7 @@ from waymark.api import (
     LivePresence,
     Size,
 )
-from waymark.errors import InvalidInput, JobFailed, Refused, Unexpected, Unreachable
+from waymark.errors import InvalidInput, JobFailed, Refused, Unexpected, Unreachable, Untrusted
 from waymark.image import Picture, as_image
 
 T = TypeVar("T")
@@ -254,8 +256,23 @@ def refusal(response: httpx.Response, reason: str = "") -> Refused:
     )
 
 
-def unreachable(base: str, error: httpx.HTTPError) -> Unreachable:
+def trusted(base: str, authority: str | PathLike[str] | None) -> ssl.SSLContext | bool:
+    """Whom a client believes."""
+    if authority is None and not base.lower().startswith("https:"):
+        return True
+    try:
+        return ssl.create_default_context(cafile=authority)
+    except (OSError, ssl.SSLError) as error:
+        raise InvalidInput(f"{authority} is no certificate in PEM: {error}", field="authority") from error
+
+
+def unreachable(base: str, error: httpx.HTTPError) -> Unreachable | Untrusted:
     """No answer from the server."""
+    cause: BaseException | None = error
+    while cause is not None:
+        if isinstance(cause, ssl.SSLCertVerificationError):
+            return Untrusted(f"the certificate of {base} is not trusted: {cause.verify_message}")
+        cause = cause.__cause__ or cause.__context__
     return Unreachable(f"no answer from {base}: {error or type(error).__name__}")
 
 

@@ -25,6 +25,7 @@ ADVICE: dict[str, str] = {
     "too_large": "send a JPEG (`Image.jpeg`), or raise the server's `limits.frame_bytes`",
     "too_many": "stop a robot or a camera that is not needed, or raise the server's limits",
     "unreachable": "is `waymark serve` running, is this its endpoint?",
+    "untrusted": "give `MapClient` the `authority` that signs it, and a name that is in it",
     "no_answer": "the frame or its answer was dropped, or the work takes longer: send again, or give a longer `wait_s`",
     "superseded": "send the next frame of a camera when the last is answered",
     "no_encoder": "pip install 'waymark-client[jpeg]', or send the raw image",
@@ -83,6 +84,12 @@ class Unreachable(WaymarkError):
     """No server there, or the connection broke."""
 
     default_code = "unreachable"
+
+
+class Untrusted(WaymarkError):
+    """The server's certificate is not signed by whom this client believes, or not for this name."""
+
+    default_code = "untrusted"
 
 
 class NoAnswer(WaymarkError):

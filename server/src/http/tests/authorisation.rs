@@ -236,7 +236,7 @@ async fn only_a_local_client_is_told_where_the_local_token_is() {
     let service = service().await;
     let challenge = async |peer: &str, forwarded: bool| {
         let mut request = request("GET", "/api/v1/maps", "");
-        request.extensions_mut().insert(authorise::Peer(peer.parse().unwrap()));
+        request.extensions_mut().insert(peer::Peer::plain(peer.parse().unwrap()));
         if forwarded {
             request.headers_mut().insert("x-forwarded-for", "10.0.0.1".parse().unwrap());
         }

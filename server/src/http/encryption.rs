@@ -1,0 +1,101 @@
+//! Encryption of HTTP. In: an accepted connection. Out: what is spoken on it: TLS, plain text by a client of this machine, or
+//! plain text that would have been readable on the way, which is refused.
+
+use super::error::ApiError;
+use crate::identity::certificates::ServerCertificate;
+use axum::{Router, http::StatusCode};
+use rustls::{
+    ServerConfig,
+    crypto::ring,
+    server::{ClientHello, ResolvesServerCert},
+    sign::CertifiedKey,
+};
+use std::{io, net::SocketAddr, sync::Arc};
+use tokio::{net::TcpStream, sync::watch};
+use tokio_rustls::TlsAcceptor;
+
+/// First byte of a handshake of TLS. No method of HTTP begins so.
+const HANDSHAKE: u8 = 0x16;
+
+/// The certificate in use, looked up for each connection.
+#[derive(Debug)]
+struct Current(watch::Receiver<Arc<ServerCertificate>>);
+
+impl ResolvesServerCert for Current {
+    fn resolve(&self, _: ClientHello<'_>) -> Option<Arc<CertifiedKey>> {
+        Some(self.0.borrow().certified.clone())
+    }
+}
+
+/// What is spoken on a connection.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Spoken {
+    /// TLS.
+    Tls,
+    /// Plain text that no other machine can read.
+    LocalPlain,
+    /// Plain text from another machine.
+    Plain,
+}
+
+/// TLS 1.2 or 1.3 with the server's certificate in use.
+pub(crate) fn acceptor(
+    certificate: watch::Receiver<Arc<ServerCertificate>>,
+) -> Result<TlsAcceptor, rustls::Error> {
+    let provider = Arc::new(ring::default_provider());
+    let builder = ServerConfig::builder_with_provider(provider).with_safe_default_protocol_versions()?;
+    let mut config = builder.with_no_client_auth().with_cert_resolver(Arc::new(Current(certificate)));
+    config.alpn_protocols = vec![b"http/1.1".to_vec()];
+    Ok(TlsAcceptor::from(Arc::new(config)))
+}
+
+/// Looks at the first byte, which stays to be read. Errors: the connection ends before it.
+pub(super) async fn spoken(stream: &TcpStream, peer: SocketAddr) -> io::Result<Spoken> {
+    let mut first = [0];
+    if stream.peek(&mut first).await? == 0 {
+        return Err(io::ErrorKind::UnexpectedEof.into());
+    }
+    Ok(match first[0] {
+        HANDSHAKE => Spoken::Tls,
+        _ if peer.ip().to_canonical().is_loopback() => Spoken::LocalPlain,
+        _ => Spoken::Plain,
+    })
+}
+
+/// Answers everything by a refusal that names what is to be asked.
+pub(super) fn refusing() -> Router {
+    Router::new().fallback(async || {
+        let detail = "this server is encrypted: ask for https:// in place of http://. What was sent could be read on the \
+                      way: revoke a token that was in it";
+        ApiError::new(StatusCode::UPGRADE_REQUIRED, "not_encrypted", detail)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tokio::{io::AsyncWriteExt as _, net::TcpListener};
+
+    #[tokio::test]
+    async fn what_is_spoken_is_told_by_the_first_byte_and_by_who_speaks() {
+        let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+        let at = listener.local_addr().unwrap();
+        let [near, mapped, far]: [SocketAddr; 3] =
+            ["127.0.0.9:1", "[::ffff:127.0.0.1]:1", "192.0.2.4:1"].map(|text| text.parse().unwrap());
+        for (bytes, peer, expected) in [
+            (&[HANDSHAKE, 3, 1][..], far, Spoken::Tls),
+            (&[HANDSHAKE, 3, 1], near, Spoken::Tls),
+            (b"GET / ", near, Spoken::LocalPlain),
+            (b"GET / ", mapped, Spoken::LocalPlain),
+            (b"POST /", far, Spoken::Plain),
+        ] {
+            let mut client = TcpStream::connect(at).await.unwrap();
+            let (accepted, _) = listener.accept().await.unwrap();
+            client.write_all(bytes).await.unwrap();
+            assert_eq!(spoken(&accepted, peer).await.unwrap(), expected, "{bytes:?} {peer}");
+        }
+        drop(TcpStream::connect(at).await.unwrap());
+        let (accepted, _) = listener.accept().await.unwrap();
+        assert!(spoken(&accepted, near).await.is_err());
+    }
+}
