@@ -165,6 +165,10 @@ pub struct Limits {
     pub jobs_kept: usize,
     /// Answers to creations that are kept for repeats, for a day at most; the oldest go.
     pub kept_answers: usize,
+    /// Commits of each map that are kept; the oldest go.
+    pub kept_commits: usize,
+    /// Bytes of each map that are stored only for its kept commits, about; the oldest commits go.
+    pub history_bytes: usize,
 }
 
 impl Default for Limits {
@@ -194,13 +198,15 @@ impl Default for Limits {
             jobs: 64,
             jobs_kept: 1_000,
             kept_answers: 10_000,
+            kept_commits: 1_000,
+            history_bytes: 4 << 30,
         }
     }
 }
 
 impl Limits {
     /// Name and value of every bound that must not be 0.
-    fn counts(&self) -> [(&'static str, usize); 22] {
+    fn counts(&self) -> [(&'static str, usize); 24] {
         [
             ("limits.frame_bytes", self.frame_bytes),
             ("limits.frame_pixels", self.frame_pixels),
@@ -224,6 +230,8 @@ impl Limits {
             ("limits.write_queue", self.write_queue),
             ("limits.jobs", self.jobs),
             ("limits.kept_answers", self.kept_answers),
+            ("limits.kept_commits", self.kept_commits),
+            ("limits.history_bytes", self.history_bytes),
         ]
     }
 

@@ -5,13 +5,14 @@ use super::{
     API, AppState,
     cookie::session_cookie,
     error::{ApiError, method_not_allowed},
+    history,
 };
 use crate::{
     identity::{
         Denial, Principal,
         authorisation::{self, Access, Forbidden, Scope},
     },
-    store::{StoreError, kind::Kind, now_ms},
+    store::{StoreError, history::Author, kind::Kind, now_ms},
 };
 use axum::{
     extract::{FromRequestParts, MatchedPath, RawPathParams, Request, State},
@@ -35,8 +36,12 @@ pub(crate) struct Peer(pub(crate) SocketAddr);
 /// The middleware.
 pub(super) async fn authorise(State(app): State<AppState>, request: Request, next: Next) -> Response {
     let (mut parts, body) = request.into_parts();
-    match admitted(&app, &mut parts).await {
-        Ok(()) => next.run(Request::from_parts(parts, body)).await,
+    let author = match admitted(&app, &mut parts).await {
+        Ok(()) => author(&parts),
+        Err(error) => Err(error),
+    };
+    match author {
+        Ok(author) => author.scope(next.run(Request::from_parts(parts, body))).await,
         Err(error) => refused(&app, &parts, error),
     }
 }
@@ -57,6 +62,15 @@ async fn admitted(app: &AppState, parts: &mut Parts) -> Result<(), ApiError> {
     check_scope(app, parts, &principal, scope).await?;
     parts.extensions.insert(principal);
     Ok(())
+}
+
+/// In whose name the request changes maps, by what, and why.
+fn author(parts: &Parts) -> Result<Author, ApiError> {
+    let matched = parts.extensions.get::<MatchedPath>().map_or("", MatchedPath::as_str);
+    let operation = format!("{} {}", parts.method, matched.strip_prefix(API).unwrap_or(matched));
+    let name = parts.extensions.get::<Principal>().map(|principal| principal.name.clone());
+    let why = history::why(&parts.headers)?;
+    Ok(Author { name: name.unwrap_or_else(|| Author::default().name), operation, why, job: None })
 }
 
 /// Who asks. `role` is what the operation needs, for the refusal.

@@ -17,6 +17,7 @@ mod extract;
 mod gathering;
 mod guard;
 mod health;
+mod history;
 mod landmarks;
 mod learning;
 mod live;

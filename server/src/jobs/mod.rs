@@ -19,6 +19,7 @@ use crate::{
     publication::Catalogue,
     store::{
         StoreError,
+        history::Author,
         jobs::{self, Ended, JobFilter, JobRow},
     },
 };
@@ -327,7 +328,14 @@ impl Jobs {
         if !self.store.write(move |tx| Box::pin(async move { jobs::begin(tx, id).await })).await? {
             return Ok(());
         }
-        let ended = match learn::run(&self.store, &self.config, row, &reporter).await {
+        let author = Author {
+            name: row.author.clone(),
+            job: Some(id),
+            operation: row.kind.clone(),
+            why: row.why.clone(),
+        };
+        let work = learn::run(&self.store, &self.config, row, &reporter);
+        let ended = match author.scope(work).await {
             // The row has ended together with the models.
             Ok(()) => {
                 tracing::info!(job = id, map = row.map, "job_done");

@@ -33,6 +33,7 @@ pub(crate) mod tokens;
 pub(crate) mod jobs;
 pub(crate) mod kept_answers;
 pub(crate) mod revisions;
+pub(crate) mod history;
 
 pub(crate) use error::StoreError;
 pub(crate) use on_commit::{CommittedChange, OnCommit};
@@ -103,8 +104,12 @@ impl Store {
         let jobs = Arc::new(Notify::new());
         let mut conn = opened.writer;
         on_commit.opened(&mut conn).await.map_err(OpenError::Load)?;
+        let history = history::HistoryLimits {
+            commits: config.limits.kept_commits,
+            bytes: config.limits.history_bytes,
+        };
         let (commands, received) = mpsc::channel(config.limits.write_queue);
-        let writer = writer::Writer::new(conn, received, on_commit, vitals.clone(), jobs.clone());
+        let writer = writer::Writer::new(conn, received, history, on_commit, vitals.clone(), jobs.clone());
         let (close, closed) = oneshot::channel();
         let task = tokio::spawn(writer.run(closed, vitals.begin(WRITER)));
         let task = WriterTask { task, close, reads: opened.reads.clone(), _lock: opened.lock };
@@ -122,7 +127,8 @@ impl Store {
         F: for<'t> FnOnce(&'t mut Tx) -> BoxFuture<'t, Result<T, StoreError>> + Send + 'static,
     {
         let caller = Arc::new(());
-        let (command, answer) = writer::command(write, kept_answers::Keeping::current(), &caller);
+        let (command, answer) =
+            writer::command(write, kept_answers::Keeping::current(), history::Author::current(), &caller);
         self.commands.send(command).await.map_err(|_gone| StoreError::Closed)?;
         let answer = answer.await;
         drop(caller);

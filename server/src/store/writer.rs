@@ -1,6 +1,8 @@
 //! The only connection that writes, owned by one task. A write is a closure that runs inside BEGIN IMMEDIATE. The order is
 //! commit -> publish the snapshot -> acknowledge, so a crash undoes nothing that was matched or acknowledged.
 //!
+//! What a write changed of maps becomes commits of their history in the same transaction ([`history::close`]).
+//!
 //! A write whose caller drops it before its transaction begins is skipped. After that it runs to its end in this task, with
 //! what must follow the commit ([`Tx::after`]).
 //!
@@ -9,6 +11,7 @@
 
 use super::{
     error::StoreError,
+    history::{self, Author, HistoryLimits},
     kept_answers::Keeping,
     on_commit::{CommittedChange, OnCommit},
 };
@@ -32,6 +35,9 @@ type After = Box<dyn FnOnce() + Send>;
 pub(crate) struct Tx {
     /// The writer's connection, inside a transaction.
     pub(super) conn: SqliteConnection,
+    /// In whose name it writes.
+    pub(super) author: Arc<Author>,
+    pub(super) history: HistoryLimits,
     changes: Vec<CommittedChange>,
     after: Vec<After>,
 }
@@ -86,6 +92,7 @@ pub(super) struct Command {
 pub(super) fn command<T, F>(
     write: F,
     keeping: Option<Keeping>,
+    author: Arc<Author>,
     caller: &Arc<()>,
 ) -> (Command, oneshot::Receiver<Result<T, StoreError>>)
 where
@@ -97,7 +104,9 @@ where
         Box::pin(async move {
             // Unwind safety: the closure's changes are in the transaction, which is rolled back.
             let all = async {
+                tx.author = author;
                 let made = write(tx).await?;
+                history::close(tx).await?;
                 if let Some(keeping) = &keeping {
                     let answer = keeping.answer_to(&made);
                     keeping.keep(tx, answer).await?;
@@ -139,11 +148,12 @@ impl Writer {
     pub(super) fn new(
         conn: SqliteConnection,
         commands: mpsc::Receiver<Command>,
+        history: HistoryLimits,
         on_commit: Arc<dyn OnCommit>,
         vitals: Arc<Vitals>,
         jobs: Arc<Notify>,
     ) -> Self {
-        let tx = Tx { conn, changes: Vec::new(), after: Vec::new() };
+        let tx = Tx { conn, author: Arc::default(), history, changes: Vec::new(), after: Vec::new() };
         Self { tx, commands, on_commit, vitals, jobs }
     }
 
