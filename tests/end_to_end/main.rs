@@ -13,6 +13,7 @@ mod gathered_drive;
 mod guided;
 mod guides;
 mod hang_ups;
+mod history;
 mod http_contract;
 mod imports;
 mod laser;
