@@ -3,6 +3,7 @@
 
 mod answers;
 pub mod arg_parsers;
+mod audit;
 mod backup;
 mod camera;
 mod camera_arg;
@@ -75,6 +76,8 @@ enum Command {
     Logout(identity::login::Args),
     /// A link that opens the page once, with your rights, within ten minutes.
     Open(identity::open::Args),
+    /// Who changed what on a server: list, verify.
+    Audit(audit::Args),
     /// Write the whole state of a running server to one file
     ///
     /// Maps, pictures, models, robots and jobs, as they were at one moment; the server goes on meanwhile. The file is
@@ -195,6 +198,7 @@ pub fn main() -> ExitCode {
         Command::Login(args) => run(identity::login::login(args)).map(done),
         Command::Logout(args) => identity::login::logout(args).map(done),
         Command::Open(args) => run(identity::open::run(args)).map(done),
+        Command::Audit(args) => run(audit::run(args)).map(done),
         Command::Backup(args) => run(backup::run(args)).map(done),
         Command::Restore(args) => run(restore::run(args)).map(done),
         Command::Map(args) => run(map::run(args)).map(done),

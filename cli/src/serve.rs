@@ -59,6 +59,12 @@ pub(super) struct Serve {
     /// Vision threads [default: one per core].
     #[arg(long, value_name = "N")]
     workers: Option<usize>,
+    /// Encrypts connections, with a certificate of the server's own authority unless the settings name files.
+    #[arg(long)]
+    tls: bool,
+    /// A DNS name or address by which clients reach this server, for its certificate; may be given several times.
+    #[arg(long, value_name = "NAME", requires = "tls")]
+    tls_name: Vec<String>,
     /// Allows addresses beyond loopback. Nothing is encrypted, and robots are not asked who they are: only for a
     /// network that is trusted as a whole.
     #[arg(long)]
@@ -85,6 +91,8 @@ impl Serve {
             raw.workers = workers;
         }
         raw.insecure |= self.insecure;
+        raw.tls.enabled |= self.tls;
+        raw.tls.names.extend(self.tls_name);
         Ok(Config::try_from(raw)?)
     }
 

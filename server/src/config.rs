@@ -6,6 +6,7 @@
 
 mod backup;
 mod ros2;
+mod tls;
 
 pub use backup::BackupSettings;
 pub(crate) use backup::MAX_KEPT;
@@ -13,6 +14,7 @@ pub use ros2::{
     MAX_DOMAIN, MAX_KEY_PREFIX_BYTES, MAX_ROS2_ROBOTS, MAX_TRANSFORM_TOLERANCE_S, Middleware, PoseSource,
     RawRos2, RawRos2Camera, RawRos2Robot, Ros2Outputs, Ros2Robot,
 };
+pub use tls::{MAX_TLS_NAMES, OwnCertificate, RawTls, Tls};
 
 use engine::decode::ImageLimits;
 use figment::{
@@ -81,6 +83,8 @@ pub struct RawConfig {
     pub search_every_frame: bool,
     /// Allows plain-text listeners beyond loopback.
     pub insecure: bool,
+    /// Encryption, of HTTP and of robots' connections.
+    pub tls: RawTls,
     /// Backups.
     pub backup: BackupSettings,
     /// Robots of ROS 2.
@@ -101,6 +105,7 @@ impl Default for RawConfig {
             workers: 0,
             search_every_frame: true,
             insecure: false,
+            tls: RawTls::default(),
             backup: BackupSettings::default(),
             ros2: RawRos2::default(),
             limits: Limits::default(),
@@ -169,6 +174,8 @@ pub struct Limits {
     pub kept_commits: usize,
     /// Bytes of each map that are stored only for its kept commits, about; the oldest commits go.
     pub history_bytes: usize,
+    /// Entries of the audit log; the oldest are forgotten.
+    pub audit_entries: usize,
 }
 
 impl Default for Limits {
@@ -200,13 +207,14 @@ impl Default for Limits {
             kept_answers: 10_000,
             kept_commits: 1_000,
             history_bytes: 4 << 30,
+            audit_entries: 100_000,
         }
     }
 }
 
 impl Limits {
     /// Name and value of every bound that must not be 0.
-    fn counts(&self) -> [(&'static str, usize); 24] {
+    fn counts(&self) -> [(&'static str, usize); 25] {
         [
             ("limits.frame_bytes", self.frame_bytes),
             ("limits.frame_pixels", self.frame_pixels),
@@ -232,6 +240,7 @@ impl Limits {
             ("limits.kept_answers", self.kept_answers),
             ("limits.kept_commits", self.kept_commits),
             ("limits.history_bytes", self.history_bytes),
+            ("limits.audit_entries", self.audit_entries),
         ]
     }
 
@@ -271,6 +280,8 @@ pub struct Config {
     pub workers: usize,
     /// Whether every frame is searched for all landmarks of its map.
     pub search_every_frame: bool,
+    /// Encryption; `None`: there is none.
+    pub tls: Option<Tls>,
     /// Backups.
     pub backup: BackupSettings,
     /// Robots of ROS 2.
@@ -335,6 +346,7 @@ impl TryFrom<RawConfig> for Config {
             fleet,
             workers: if raw.workers == 0 { cores } else { raw.workers },
             search_every_frame: raw.search_every_frame,
+            tls: tls::checked(raw.tls)?,
             backup: backup::checked(raw.backup)?,
             ros2: ros2::checked(raw.ros2)?,
             limits: raw.limits,

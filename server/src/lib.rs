@@ -5,6 +5,7 @@
 
 pub mod config;
 mod identity;
+pub mod audit_files;
 pub mod backup;
 pub mod bus;
 pub mod ros2;

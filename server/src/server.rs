@@ -6,11 +6,11 @@ use crate::{
     config::Config,
     gather::{self, Gatherer, GatheringTap, OfferedFrame},
     http::{self, App, Services},
-    identity::{Sessions, TokenId, local_token::LocalToken},
+    identity::{Sessions, TokenId, certificates::Certificates, local_token::LocalToken},
     jobs::Jobs,
     publication::{Catalogue, CatalogueTasks},
     ros2::Ros2,
-    store::{OpenError, StoreError, landmarks, pictures},
+    store::{OpenError, StoreError, actor::Actor, landmarks, now_ms, pictures},
 };
 use engine::{
     decode::ImageLimits,
@@ -45,6 +45,9 @@ pub enum StartError {
     /// Robots cannot connect.
     #[error(transparent)]
     Bus(#[from] BusError),
+    /// There is no certificate.
+    #[error("no certificate for encryption: {0}")]
+    Certificates(String),
     /// There is no token for this machine.
     #[error("{0}")]
     LocalToken(String),
@@ -119,14 +122,13 @@ impl Server {
     pub async fn start(config: Config) -> Result<RunningServer, StartError> {
         let config = Arc::new(config);
         let (store, writer) = Catalogue::open(&config).await?;
+        let (stop, stopping) = watch::channel(false);
+        let _certificates = open_certificates(&config, &stopping)?;
         let at = |source| StartError::Http { addr: config.http_addr, source };
         let listener = TcpListener::bind(config.http_addr).await.map_err(at)?;
         let http_addr = listener.local_addr().map_err(at)?;
-        let local_token = LocalToken::write(&config.data, http_addr.port())
-            .map_err(|e| StartError::LocalToken(e.to_string()))?;
-        store.tokens().set_local(local_token.secret());
+        let local_token = write_local_token(&config, &store, http_addr.port())?;
         let sessions = Arc::<Sessions>::default();
-        let (stop, stopping) = watch::channel(false);
         let (snapshots, vitals) = (store.snapshots().clone(), store.vitals().clone());
         let (tap, offered) = gather::gathering_tap();
         let teaching = Teaching::start(&config, &store, (&tap, offered), &stopping).await?;
@@ -147,7 +149,6 @@ impl Server {
         let publisher = Arc::new(ros2.publisher(outbox.clone()));
         vitals.probe("the outbox", move || outbox.is_running());
         let workers = Workers::start(&engine, config.workers, &publisher).map_err(StartError::Threads)?;
-        let zenoh_endpoint = bus.endpoint().to_owned();
         let (backups, backups_task) = Backups::start(&config, vitals.panics().clone(), stopping.clone());
         let services = Services {
             jobs: teaching.jobs,
@@ -160,6 +161,7 @@ impl Server {
         let app = App::new(config.clone(), store, services, &engine, stopping.clone());
         let http = serve(listener, app, &config, vitals.begin("the HTTP listener"), stopping);
         let watch = tokio::spawn(vitals.clone().watch());
+        let zenoh_endpoint = bus.endpoint().to_owned();
         let tasks = Tasks {
             workers,
             bus,
@@ -186,6 +188,26 @@ impl Server {
             tasks,
         })
     }
+}
+
+/// The token for programs of this user on this machine.
+fn write_local_token(config: &Config, store: &Catalogue, port: u16) -> Result<LocalToken, StartError> {
+    let written = LocalToken::write(&config.data, port);
+    let written = written.map_err(|e| StartError::LocalToken(e.to_string()))?;
+    store.tokens().set_local(written.secret());
+    Ok(written)
+}
+
+/// The certificates, if connections are encrypted; they renew themselves until the server stops.
+fn open_certificates(
+    config: &Config,
+    stopping: &watch::Receiver<bool>,
+) -> Result<Option<Arc<Certificates>>, StartError> {
+    let Some(settings) = &config.tls else { return Ok(None) };
+    let opened = Certificates::open(settings, &config.data, now_ms());
+    let opened = Arc::new(opened.map_err(|e| StartError::Certificates(e.to_string()))?);
+    tokio::spawn(opened.clone().keep_valid(stopping.clone()));
+    Ok(Some(opened))
 }
 
 /// What learns from photographs and drives.
@@ -253,14 +275,15 @@ fn engine(
 
 /// Stores findings about landmarks, until the last worker has stopped.
 async fn store_findings(store: Catalogue, mut found: Receiver<LandmarkFinding>, pulse: Pulse) {
-    while let Some(LandmarkFinding { map, landmark, health, finding, .. }) = found.recv().await {
+    while let Some(LandmarkFinding { map, landmark, name, health, finding }) = found.recv().await {
+        let actor = Actor::server("finding of robots", format!("/maps/{map}/landmarks/{name}"));
         let stored = store.write(move |tx| {
             Box::pin(async move {
                 let name = landmarks::name_of(tx, &map, landmark).await?;
                 landmarks::set_health(tx, &map, &name, health, finding.as_deref()).await.map(drop)
             })
         });
-        if let Err(error) = stored.await {
+        if let Err(error) = actor.scope(stored).await {
             tracing::error!(%error, "landmark_finding_not_stored");
         }
     }

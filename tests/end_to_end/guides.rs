@@ -74,6 +74,11 @@ fn the_commands_of_ros2_work() {
 }
 
 #[test]
+fn the_commands_of_the_audit_log_work() {
+    run("audit-log");
+}
+
+#[test]
 fn the_commands_of_back_up_and_restore_work() {
     run("backup");
 }

@@ -2,6 +2,7 @@
 
 mod administration;
 mod api_client;
+mod audit;
 mod backups;
 mod bad_frames;
 mod clocks;

@@ -275,4 +275,6 @@ fn settings_of_the_guide_are_understood() {
     let router = std::fs::read_to_string(root().join("client/ros2/router.json5")).expect("a file");
     let router = zenoh::Config::from_json5(&router).expect("settings of zenoh");
     assert!(router.get_json("connect/endpoints").expect("endpoints").contains("tcp/maps.example:7447"));
+    let places = router.get_json("transport/link/tx/queue/size/interactive_high");
+    assert_eq!(places.expect("room for the messages of a frame"), "8");
 }

@@ -218,7 +218,7 @@ impl Guide {
         self.server = None;
         let mut shell = self.shell(&format!("exec {command}"));
         shell.env("WAYMARK_HTTP", "127.0.0.1:0").env("WAYMARK_ZENOH", "tcp/127.0.0.1:0");
-        shell.env("WAYMARK_DATA", self.folder.join("server")).stdout(Stdio::piped());
+        shell.stdout(Stdio::piped());
         let mut process = shell.spawn().expect("bash");
         let stdout = process.stdout.take().expect("its output");
         let mut lines = BufReader::new(stdout).lines().map(|line| line.expect("a line"));

@@ -224,6 +224,7 @@ impl RosRobot {
     }
 }
 
+/// A session with the settings of `client/ros2/router.json5`.
 async fn open(mode: &str, connect: &str, listen: Option<&str>) -> Session {
     let listen = listen.map_or(String::new(), |endpoint| format!("\"{endpoint}\""));
     let config = zenoh::Config::from_json5(&format!(
@@ -232,6 +233,7 @@ async fn open(mode: &str, connect: &str, listen: Option<&str>) -> Session {
             connect: {{ endpoints: ["{connect}"] }},
             listen: {{ endpoints: [{listen}] }},
             scouting: {{ multicast: {{ enabled: false }} }},
+            transport: {{ link: {{ tx: {{ queue: {{ size: {{ interactive_high: 8 }} }} }} }} }},
         }}"#
     ));
     let opened = tokio::time::timeout(SOON, zenoh::open(config.expect("settings of zenoh"))).await;

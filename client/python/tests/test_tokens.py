@@ -3,6 +3,7 @@ what their role allows and no more."""
 
 from __future__ import annotations
 
+import dataclasses
 import os
 from pathlib import Path
 
@@ -43,6 +44,15 @@ def test_tokens_are_made_listed_and_revoked(server: Server) -> None:
                 viewer.maps()
             assert revoked.value.code == "unauthenticated" and "revoked" in revoked.value.detail
         maps.delete_map("tokens")
+        newest = maps.audit(target="/tokens", most=2)
+        assert [(each.action, each.actor) for each in newest] == [
+            ("DELETE /tokens/{token}", "local"),
+            ("POST /tokens", "local"),
+        ]
+        check = maps.check_audit()
+        assert check.fault is None and maps.check_audit(check.head).fault is None
+        noted = dataclasses.replace(check.head, sha256="0" * 64)
+        assert maps.check_audit(noted).fault == f"entry {noted.seq} has another digest than was noted"
     with MapClient(server.http, token="wmk_1_x") as stranger, pytest.raises(Refused):
         stranger.maps()
 

@@ -1,6 +1,7 @@
 //! The teacher's and the administrator's side, over HTTP: one method for each operation of the API, a file for each
 //! resource. In and out: the types of [`protos::api`].
 
+mod audit;
 mod backups;
 mod cameras;
 mod creation;
@@ -39,6 +40,7 @@ pub use views::{LandmarkRegion, NewView};
 /// Every operation that [`MapClient`] has a method for.
 pub fn operations() -> impl Iterator<Item = &'static Operation> {
     let all = [
+        audit::OPERATIONS,
         backups::OPERATIONS,
         cameras::OPERATIONS,
         gathering::OPERATIONS,

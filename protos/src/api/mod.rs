@@ -7,6 +7,7 @@
 //! A body of a request refuses unknown fields. A body that is only answered ignores them, so that a newer server can say
 //! more. With the feature `openapi` every type has a schema; the server makes its OpenAPI document of them.
 
+pub mod audit;
 pub mod backups;
 pub mod cameras;
 pub mod failed_gates;
@@ -35,6 +36,7 @@ pub mod visibility;
 pub mod visibility_settings;
 pub mod walls;
 
+pub use audit::*;
 pub use backups::*;
 pub use cameras::*;
 pub use failed_gates::*;

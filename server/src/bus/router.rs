@@ -12,6 +12,10 @@ const LEASE_MS: u64 = 2000;
 /// A message for a robot whose queue is full is dropped after this wait. All answers share one sending thread, so this bounds
 /// what one robot that does not read costs the others: a thousandth of a second a message.
 const WAIT_BEFORE_DROP_US: u64 = 1000;
+/// Batches that wait for each link at the priority of answers and poses. Each message is a batch of its own there: a frame
+/// of ROS gives up to four at once (pose, detections, initial pose, transform), and zenoh's two lose the third of them
+/// while the sending task waits for a core. At most 64 KiB each, allocated when they are needed.
+const ANSWER_BATCHES: usize = 8;
 /// A robot that does not take a reply to its own query for this long is disconnected.
 const WAIT_BEFORE_CLOSE_US: u64 = 1_000_000;
 /// Longest wait for the router to open.
@@ -57,13 +61,16 @@ fn config(endpoint: &str, robots: usize, frame_bytes: usize) -> zenoh::Result<ze
             transport: {{
                 unicast: {{ max_sessions: {sessions}, max_links: 1 }},
                 link: {{
-                    tx: {{ lease: {LEASE_MS}, queue: {{ congestion_control: {{
-                        drop: {{
-                            wait_before_drop: {WAIT_BEFORE_DROP_US},
-                            max_wait_before_drop_fragments: {WAIT_BEFORE_DROP_US},
+                    tx: {{ lease: {LEASE_MS}, queue: {{
+                        size: {{ interactive_high: {ANSWER_BATCHES} }},
+                        congestion_control: {{
+                            drop: {{
+                                wait_before_drop: {WAIT_BEFORE_DROP_US},
+                                max_wait_before_drop_fragments: {WAIT_BEFORE_DROP_US},
+                            }},
+                            block: {{ wait_before_close: {WAIT_BEFORE_CLOSE_US} }},
                         }},
-                        block: {{ wait_before_close: {WAIT_BEFORE_CLOSE_US} }},
-                    }} }} }},
+                    }} }},
                     rx: {{ max_message_size: {message_bytes} }},
                 }},
                 shared_memory: {{ enabled: false }},
@@ -90,6 +97,10 @@ mod tests {
         let config = config("tcp/127.0.0.1:7447", 10, 1000).unwrap();
         assert_eq!(config.get_json("transport/unicast/max_sessions").unwrap(), "18");
         assert_eq!(config.get_json("transport/link/rx/max_message_size").unwrap(), "66536");
+        let of_queue =
+            |setting: &str| config.get_json(&format!("transport/link/tx/queue/{setting}")).unwrap();
+        assert_eq!(of_queue("size/interactive_high"), "8");
+        assert_eq!(of_queue("congestion_control/drop/wait_before_drop"), "1000");
         assert_eq!(config.get_json("scouting/multicast/enabled").unwrap(), "false");
         assert_eq!(config.get_json("adminspace/enabled").unwrap(), "false");
     }

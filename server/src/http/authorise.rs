@@ -5,14 +5,15 @@ use super::{
     API, AppState,
     cookie::session_cookie,
     error::{ApiError, method_not_allowed},
+    guard::RequestId,
     history,
 };
 use crate::{
     identity::{
-        Denial, Principal,
+        Denial, Principal, TokenId,
         authorisation::{self, Access, Forbidden, Scope},
     },
-    store::{StoreError, history::Author, kind::Kind, now_ms},
+    store::{StoreError, actor::Actor, kind::Kind, now_ms},
 };
 use axum::{
     extract::{FromRequestParts, MatchedPath, RawPathParams, Request, State},
@@ -36,14 +37,36 @@ pub(crate) struct Peer(pub(crate) SocketAddr);
 /// The middleware.
 pub(super) async fn authorise(State(app): State<AppState>, request: Request, next: Next) -> Response {
     let (mut parts, body) = request.into_parts();
-    let author = match admitted(&app, &mut parts).await {
-        Ok(()) => author(&parts),
-        Err(error) => Err(error),
-    };
-    match author {
-        Ok(author) => author.scope(next.run(Request::from_parts(parts, body))).await,
+    if let Err(error) = admitted(&app, &mut parts).await {
+        return refused(&app, &parts, error);
+    }
+    match actor(&parts) {
+        Ok(Some(actor)) => actor.scope(next.run(Request::from_parts(parts, body))).await,
+        Ok(None) => next.run(Request::from_parts(parts, body)).await,
         Err(error) => refused(&app, &parts, error),
     }
+}
+
+/// Who asks for a change, and why, for the audit log and the history of maps. Errors: the reason is none.
+fn actor(parts: &Parts) -> Result<Option<Actor>, ApiError> {
+    let principal = parts.extensions.get::<Principal>().filter(|_| !parts.method.is_safe());
+    let Some(principal) = principal else { return Ok(None) };
+    let matched = parts.extensions.get::<MatchedPath>().map_or("", MatchedPath::as_str);
+    let below = |path: &str| path.strip_prefix(API).unwrap_or(path).to_owned();
+    let request = parts.extensions.get::<RequestId>().and_then(|id| id.0.to_str().ok());
+    let token = match principal.token {
+        TokenId::Local => None,
+        TokenId::Stored(number) => Some(number),
+    };
+    Ok(Some(Actor {
+        name: principal.name.clone(),
+        token,
+        action: format!("{} {}", parts.method, below(matched)),
+        target: below(parts.uri.path()),
+        request: request.map(str::to_owned),
+        job: None,
+        why: history::why(&parts.headers)?,
+    }))
 }
 
 async fn admitted(app: &AppState, parts: &mut Parts) -> Result<(), ApiError> {
@@ -62,15 +85,6 @@ async fn admitted(app: &AppState, parts: &mut Parts) -> Result<(), ApiError> {
     check_scope(app, parts, &principal, scope).await?;
     parts.extensions.insert(principal);
     Ok(())
-}
-
-/// In whose name the request changes maps, by what, and why.
-fn author(parts: &Parts) -> Result<Author, ApiError> {
-    let matched = parts.extensions.get::<MatchedPath>().map_or("", MatchedPath::as_str);
-    let operation = format!("{} {}", parts.method, matched.strip_prefix(API).unwrap_or(matched));
-    let name = parts.extensions.get::<Principal>().map(|principal| principal.name.clone());
-    let why = history::why(&parts.headers)?;
-    Ok(Author { name: name.unwrap_or_else(|| Author::default().name), operation, why, job: None })
 }
 
 /// Who asks. `role` is what the operation needs, for the refusal.

@@ -20,6 +20,9 @@ use std::{
 
 /// Carries the id of a request, in and out.
 const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
+/// The id of a request, for its log lines and for the audit log.
+#[derive(Debug, Clone)]
+pub(super) struct RequestId(pub(super) HeaderValue);
 /// Longest id taken over from a client.
 const REQUEST_ID_MAX: usize = 64;
 /// Bodies up to this size need no place, bytes.
@@ -35,8 +38,9 @@ const CSP_DOCS: &str = "default-src 'none'; script-src 'self'; style-src 'self' 
 static NEXT_ID: AtomicU64 = AtomicU64::new(1);
 
 /// The middleware.
-pub(super) async fn guard(State(app): State<AppState>, request: Request, next: Next) -> Response {
+pub(super) async fn guard(State(app): State<AppState>, mut request: Request, next: Next) -> Response {
     let id = request_id(request.headers());
+    request.extensions_mut().insert(RequestId(id.clone()));
     let (method, path) = (request.method().clone(), request.uri().path().to_owned());
     let started = Instant::now();
     let deadline = Duration::from_secs(app.config.limits.request_timeout_s);

@@ -8,7 +8,10 @@ use super::{
 };
 use crate::{
     identity::Principal,
-    store::{maps, robots, walls},
+    store::{
+        actor::{Actor, inherited},
+        maps, robots, walls,
+    },
 };
 use axum::{Extension, Json, extract::State, http::StatusCode};
 use engine::{
@@ -123,7 +126,7 @@ async fn finish(
     maps::get(app.store.reads(), &map).await?;
     let (progress, walls) = app.motion.mappings().finish(&map).map_err(refused)?;
     // Whoever asked may go away: it is stored all the same.
-    tokio::spawn(async move {
+    tokio::spawn(inherited(Actor::current(), async move {
         let storing = AssertUnwindSafe(store(&app, &map, walls)).catch_unwind().await;
         let stored = storing.unwrap_or_else(|cause| {
             let panics = app.store.vitals().panics();
@@ -134,7 +137,7 @@ async fn finish(
             tracing::warn!(map, reason, "a map that was made is not stored");
         }
         app.motion.mappings().stored(&map, stored);
-    });
+    }));
     Ok((StatusCode::ACCEPTED, Json(shown(progress))))
 }
 

@@ -4,6 +4,7 @@
 //! pages. Handlers parse, call the store, the jobs or the engine, and shape the answer; they decide nothing.
 
 mod answers;
+mod audit;
 mod authorise;
 mod backups;
 mod bulk;

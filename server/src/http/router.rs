@@ -1,7 +1,7 @@
 //! Every route, with the layers around them and the OpenAPI document made from them.
 
 use super::{
-    API, App, AppState, authorise, backups, bulk, cameras, creation, documented,
+    API, App, AppState, audit, authorise, backups, bulk, cameras, creation, documented,
     error::{ApiError, method_not_allowed, not_found},
     examples::with_examples,
     gathering, guard, health, history, landmarks, learning, live, mapping, maps, modalities, page_session,
@@ -59,6 +59,7 @@ fn api(limits: &Limits) -> OpenApiRouter<AppState> {
         .merge(backups::router())
         .merge(live::router())
         .merge(tokens::router())
+        .merge(audit::router())
         .merge(page_session::api())
         .merge(health::router())
 }

@@ -71,6 +71,8 @@ pub(crate) const TABLE: &[Rule] = &[
     server("GET", "/tokens", Admin),
     server("POST", "/tokens", Admin),
     server("DELETE", "/tokens/{token}", Admin),
+    server("GET", "/audit", Admin),
+    server("GET", "/audit/check", Admin),
     server("GET", "/backups", Admin),
     server("POST", "/backups", Admin),
     server("GET", "/backups/{backup}", Admin),

@@ -1,10 +1,12 @@
 //! The file `local-token` in the data directory: an administrator's token for programs of this user on this machine.
 //! It is written anew at each start, readable by its owner alone, and removed at the end.
 
-use super::secret::{NoRandomness, Secret, TokenText};
+use super::{
+    private_file,
+    secret::{NoRandomness, Secret, TokenText},
+};
 use std::{
-    fs::{self, File, OpenOptions},
-    io::{self, Write as _},
+    fs, io,
     path::{Path, PathBuf},
 };
 
@@ -46,15 +48,7 @@ impl LocalToken {
             |source| LocalTokenError::File { path, source }
         };
         let path = data.canonicalize().map_err(at(data))?.join(FILE);
-        let draft = path.with_extension("new");
-        // One that a crash has left behind; its mode is not known.
-        match fs::remove_file(&draft) {
-            Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(at(&draft)(error)),
-            _ => {}
-        }
-        let mut file = private(&draft).map_err(at(&draft))?;
-        let written = writeln!(file, "{text}").and_then(|()| file.sync_all());
-        written.and_then(|()| fs::rename(&draft, &path)).map_err(at(&path))?;
+        private_file::write(&path, &format!("{text}\n")).map_err(at(&path))?;
         Ok(Self { path, secret, port })
     }
 
@@ -77,15 +71,6 @@ impl LocalToken {
             tracing::warn!(%error, path = %self.path.display(), follows, "local_token_not_removed");
         }
     }
-}
-
-/// A new file that nobody else can read, not even for a moment.
-fn private(path: &Path) -> io::Result<File> {
-    let mut options = OpenOptions::new();
-    options.write(true).create_new(true);
-    #[cfg(unix)]
-    std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
-    options.open(path)
 }
 
 #[cfg(test)]

@@ -3,9 +3,13 @@
 //! A principal is known by a token (of the database, or the local one of this start) or by a session of the page, which
 //! stands for the token that opened it. Tokens are read from memory ([`registry`]); the publication fills it after each
 //! commit, so a revoked token is refused by the next request.
+//!
+//! The server's own certificate and those of robots come of [`certificates`].
 
 pub(crate) mod authorisation;
+pub(crate) mod certificates;
 pub(crate) mod local_token;
+pub(crate) mod private_file;
 mod registry;
 mod secret;
 mod sessions;

@@ -19,7 +19,7 @@ use crate::{
     publication::Catalogue,
     store::{
         StoreError,
-        history::Author,
+        actor::Actor,
         jobs::{self, Ended, JobFilter, JobRow},
     },
 };
@@ -328,14 +328,12 @@ impl Jobs {
         if !self.store.write(move |tx| Box::pin(async move { jobs::begin(tx, id).await })).await? {
             return Ok(());
         }
-        let author = Author {
-            name: row.author.clone(),
-            job: Some(id),
-            operation: row.kind.clone(),
+        let actor = Actor {
+            job: Some((id, row.author.clone())),
             why: row.why.clone(),
+            ..Actor::server(&row.kind, format!("/jobs/{id}"))
         };
-        let work = learn::run(&self.store, &self.config, row, &reporter);
-        let ended = match author.scope(work).await {
+        let ended = match actor.scope(learn::run(&self.store, &self.config, row, &reporter)).await {
             // The row has ended together with the models.
             Ok(()) => {
                 tracing::info!(job = id, map = row.map, "job_done");

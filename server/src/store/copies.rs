@@ -4,7 +4,7 @@
 //! A copy reads one snapshot of the write-ahead log: the writer goes on, and what it commits meanwhile is not in the copy.
 
 use super::{
-    StoreError, migrations,
+    StoreError, audit, migrations,
     open::{FILE, read_options},
     pictures,
     statements::statements,
@@ -36,6 +36,8 @@ statements! {
                 JOIN landmarks l ON l.id = v.landmark_id JOIN maps m ON m.id = l.map_id WHERE v.image_sha256 = ?1 LIMIT 1";
 }
 
+/// First schema with an audit log.
+const AUDIT_SCHEMA: i64 = 30;
 /// Most faults that are listed.
 const MAX_FAULTS: usize = 20;
 
@@ -78,15 +80,20 @@ pub(crate) fn known_schema() -> i64 {
 /// Writes one committed state of the database in `data` to the new file `to`. Returns once it is on the disk.
 pub(crate) async fn copy(data: &Path, to: &Path) -> Result<(), StoreError> {
     let at = || StoreError::during("copy the database");
-    let mut conn = read_options(&data.join(FILE)).connect().await.map_err(at())?;
+    let mut conn = open_live(&data.join(FILE)).await?;
     let copied =
         sqlx::query("VACUUM INTO ?1").bind(to.to_string_lossy().into_owned()).execute(&mut conn).await;
     conn.close().await.map_err(at())?;
     copied.map_err(at()).map(drop)
 }
 
+/// Opens the database of a server that may run, to read it.
+pub(crate) async fn open_live(file: &Path) -> Result<SqliteConnection, StoreError> {
+    read_options(file).connect().await.map_err(StoreError::during("open the database"))
+}
+
 /// Opens a file that nobody writes. Errors: it is no database.
-async fn open_file(file: &Path) -> Result<SqliteConnection, StoreError> {
+pub(crate) async fn open_file(file: &Path) -> Result<SqliteConnection, StoreError> {
     read_options(file).immutable(true).connect().await.map_err(StoreError::during("open the copy"))
 }
 
@@ -111,6 +118,10 @@ pub(crate) async fn examine(file: &Path) -> Result<(Contents, Vec<String>), Stor
         faults.push(format!("{dangling} rows refer to others that are not there"));
     }
     check_models(&mut conn, &mut faults).await?;
+    if schema(&mut conn).await? >= AUDIT_SCHEMA {
+        let chain = audit::check(&mut conn, None).await?;
+        faults.extend(chain.fault.map(|fault| format!("the audit log: {fault}")));
+    }
     let pictures = check_pictures(&mut conn, &mut faults).await?;
     faults.truncate(MAX_FAULTS);
     Ok((Contents { pictures, ..contents(&mut conn).await? }, faults))

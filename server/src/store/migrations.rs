@@ -34,6 +34,7 @@ const FILES: &[(&str, &str)] = files![
     "0021_model_contents",
     "0022_history",
     "0023_commits",
+    "0030_audit",
 ];
 
 /// The steps in order.

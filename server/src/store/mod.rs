@@ -32,6 +32,8 @@ pub(crate) mod robots;
 pub(crate) mod tokens;
 pub(crate) mod jobs;
 pub(crate) mod kept_answers;
+pub(crate) mod actor;
+pub(crate) mod audit;
 pub(crate) mod revisions;
 pub(crate) mod history;
 
@@ -43,8 +45,9 @@ pub(crate) use writer::{PART as WRITER, Tx};
 use crate::config::Config;
 use engine::vitals::Vitals;
 use futures::future::BoxFuture;
+use protos::api::AuditHead;
 use sha2::{Digest as _, Sha256};
-use sqlx::SqlitePool;
+use sqlx::{SqliteConnection, SqlitePool};
 use std::{fmt::Write as _, sync::Arc, time::SystemTime};
 use tokio::sync::{Mutex, MutexGuard, Notify, mpsc, oneshot};
 
@@ -60,6 +63,8 @@ pub(crate) struct Store {
     keys: kept_answers::KeysAtWork,
     /// Most answers that are kept for repeats.
     kept_answers: usize,
+    /// Most entries of the audit log.
+    audit_entries: usize,
 }
 
 /// Awaited so that the file is closed in good order.
@@ -108,27 +113,33 @@ impl Store {
             commits: config.limits.kept_commits,
             bytes: config.limits.history_bytes,
         };
+        note_head(&mut conn, "start").await.map_err(OpenError::Load)?;
         let (commands, received) = mpsc::channel(config.limits.write_queue);
         let writer = writer::Writer::new(conn, received, history, on_commit, vitals.clone(), jobs.clone());
         let (close, closed) = oneshot::channel();
         let task = tokio::spawn(writer.run(closed, vitals.begin(WRITER)));
         let task = WriterTask { task, close, reads: opened.reads.clone(), _lock: opened.lock };
         let (turn, keys) = (Arc::default(), kept_answers::KeysAtWork::default());
-        let kept_answers = config.limits.kept_answers;
-        Ok((Self { commands, reads: opened.reads, vitals, jobs, turn, keys, kept_answers }, task))
+        let (kept_answers, audit_entries) = (config.limits.kept_answers, config.limits.audit_entries);
+        let reads = opened.reads;
+        Ok((Self { commands, reads, vitals, jobs, turn, keys, kept_answers, audit_entries }, task))
     }
 
     /// Runs `write` in its own transaction. When this returns `Ok`, it is committed and visible. A caller that drops this
     /// future before the transaction begins takes the write back; later it runs to its end. The answer to a creation with a key
-    /// is kept in the same transaction ([`kept_answers`]).
+    /// is kept in the same transaction ([`kept_answers`]), and so is the entry of the audit log ([`audit`]).
     pub(crate) async fn write<T, F>(&self, write: F) -> Result<T, StoreError>
     where
         T: Send + 'static,
         F: for<'t> FnOnce(&'t mut Tx) -> BoxFuture<'t, Result<T, StoreError>> + Send + 'static,
     {
         let caller = Arc::new(());
-        let (command, answer) =
-            writer::command(write, kept_answers::Keeping::current(), history::Author::current(), &caller);
+        let beside = writer::Beside {
+            keeping: kept_answers::Keeping::current(),
+            actor: actor::Actor::current(),
+            audit_entries: self.audit_entries,
+        };
+        let (command, answer) = writer::command(write, beside, &caller);
         self.commands.send(command).await.map_err(|_gone| StoreError::Closed)?;
         let answer = answer.await;
         drop(caller);
@@ -154,6 +165,13 @@ impl Store {
     pub(crate) fn vitals(&self) -> &Arc<Vitals> {
         &self.vitals
     }
+}
+
+/// Writes the newest place of the audit log to the server's own log: a note outside of the database.
+async fn note_head(conn: &mut SqliteConnection, at: &str) -> Result<(), StoreError> {
+    let head = AuditHead::from(audit::head(conn).await?);
+    tracing::info!(seq = head.seq, sha256 = head.sha256, at, "audit_head");
+    Ok(())
 }
 
 /// ms since the Unix epoch, for display.

@@ -27,6 +27,7 @@ async fn every_statement_prepares_on_the_migrated_schema() {
         tokens::ALL,
         jobs::ALL,
         kept_answers::ALL,
+        audit::ALL,
         revisions::ALL,
         map_rows::ALL,
     ];

@@ -10,9 +10,12 @@
 //! use, and the next write to that map tries again.
 
 use super::{
+    actor::Actor,
+    audit,
     error::StoreError,
     history::{self, Author, HistoryLimits},
     kept_answers::Keeping,
+    note_head,
     on_commit::{CommittedChange, OnCommit},
 };
 use engine::{
@@ -36,7 +39,7 @@ pub(crate) struct Tx {
     /// The writer's connection, inside a transaction.
     pub(super) conn: SqliteConnection,
     /// In whose name it writes.
-    pub(super) author: Arc<Author>,
+    pub(super) author: Author,
     pub(super) history: HistoryLimits,
     changes: Vec<CommittedChange>,
     after: Vec<After>,
@@ -87,26 +90,37 @@ pub(super) struct Command {
     caller: Weak<()>,
 }
 
-/// Wraps a closure for the channel. The write is wanted for as long as `caller` lives; the answer to what it made is kept in
-/// its transaction, as `keeping` says.
+/// What goes into the transaction of a write besides its change.
+pub(super) struct Beside {
+    /// The answer to what it made.
+    pub(super) keeping: Option<Keeping>,
+    /// Who asks for it; `None` for the server's own bookkeeping.
+    pub(super) actor: Option<Arc<Actor>>,
+    /// Most entries of the audit log.
+    pub(super) audit_entries: usize,
+}
+
+/// Wraps a closure for the channel. The write is wanted for as long as `caller` lives.
 pub(super) fn command<T, F>(
     write: F,
-    keeping: Option<Keeping>,
-    author: Arc<Author>,
+    beside: Beside,
     caller: &Arc<()>,
 ) -> (Command, oneshot::Receiver<Result<T, StoreError>>)
 where
     T: Send + 'static,
     F: for<'t> FnOnce(&'t mut Tx) -> BoxFuture<'t, Result<T, StoreError>> + Send + 'static,
 {
+    let Beside { keeping, actor, audit_entries } = beside;
     let (reply, answer) = oneshot::channel();
     let run: Run = Box::new(move |tx| {
         Box::pin(async move {
             // Unwind safety: the closure's changes are in the transaction, which is rolled back.
             let all = async {
-                tx.author = author;
+                tx.author = actor.as_deref().map(Author::from).unwrap_or_default();
+                let before = audit::total_changes(tx).await?;
                 let made = write(tx).await?;
                 history::close(tx).await?;
+                log(tx, actor.as_deref(), before, audit_entries).await?;
                 if let Some(keeping) = &keeping {
                     let answer = keeping.answer_to(&made);
                     keeping.keep(tx, answer).await?;
@@ -131,6 +145,16 @@ where
     (Command { run, caller: Arc::downgrade(caller) }, answer)
 }
 
+/// Writes the audit log: of every change that somebody asked for, and of what the server changes for all to see.
+async fn log(tx: &mut Tx, actor: Option<&Actor>, before: i64, max: usize) -> Result<(), StoreError> {
+    let is_shown = tx.changes.iter().any(|change| *change != CommittedChange::Jobs);
+    match actor {
+        Some(actor) if audit::total_changes(tx).await? != before => audit::append(tx, actor, max).await,
+        None if is_shown => audit::append(tx, &Actor::server("change", ""), max).await,
+        _ => Ok(()),
+    }
+}
+
 /// The writer's task.
 pub(super) struct Writer {
     tx: Tx,
@@ -153,7 +177,7 @@ impl Writer {
         vitals: Arc<Vitals>,
         jobs: Arc<Notify>,
     ) -> Self {
-        let tx = Tx { conn, author: Arc::default(), history, changes: Vec::new(), after: Vec::new() };
+        let tx = Tx { conn, author: Author::default(), history, changes: Vec::new(), after: Vec::new() };
         Self { tx, commands, on_commit, vitals, jobs }
     }
 
@@ -178,6 +202,9 @@ impl Writer {
             }
         }
         pulse.end();
+        if let Err(error) = note_head(&mut self.tx.conn, "stop").await {
+            tracing::warn!(%error, "audit_head_not_read");
+        }
         if let Err(error) = checkpoint(&mut self.tx.conn).await {
             tracing::warn!(%error, follows = "the write-ahead log holds data: copy it with the file", "checkpoint_failed");
         }

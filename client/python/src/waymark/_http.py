@@ -110,6 +110,8 @@ OPERATIONS: dict[str, tuple[str, str]] = {
     "tokens": ("GET", "/tokens"),
     "revoke_token": ("DELETE", "/tokens/{token}"),
     "whoami": ("GET", "/whoami"),
+    "audit": ("GET", "/audit"),
+    "check_audit": ("GET", "/audit/check"),
     "page_link": ("POST", "/session/links"),
     "set_underlay": ("PUT", "/maps/{map}/underlay"),
     "underlay": ("GET", "/maps/{map}/underlay"),

@@ -44,7 +44,7 @@ pub(in crate::store) async fn close(tx: &mut Tx) -> Result<(), StoreError> {
         let changed = difference::between(&mut tx.conn, map, (id - 1, id)).await?;
         let summary = difference::summary(&mut tx.conn, &changed, id).await?;
         let summary = serde_json::to_string(&summary).unwrap_or_default();
-        let Author { name, job, operation, why } = &*tx.author;
+        let Author { name, job, operation, why } = tx.author.clone();
         let closed =
             sqlx::query(CLOSE).bind(id).bind(now_ms()).bind(name).bind(job).bind(operation).bind(why);
         closed.bind(summary).execute(&mut tx.conn).await.map_err(at())?;

@@ -15,10 +15,9 @@ pub(super) use close::{close, close_outside};
 use difference::Difference;
 pub(crate) use difference::{LandmarkChange, between, names_at, summary};
 
-use super::{StoreError, kind::Kind, statements::statements};
+use super::{StoreError, actor::Actor, kind::Kind, statements::statements};
 use protos::api::ChangeSummary;
 use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
-use std::sync::Arc;
 
 statements! {
     PAGE = "SELECT id, parent_id, created_ms, author, job, operation, why, summary FROM commits \
@@ -55,19 +54,11 @@ impl Default for Author {
     }
 }
 
-tokio::task_local! {
-    static AUTHOR: Arc<Author>;
-}
-
-impl Author {
-    /// Runs `work` in its name: what that writes has it as author.
-    pub(crate) async fn scope<T>(self, work: impl Future<Output = T>) -> T {
-        AUTHOR.scope(Arc::new(self), work).await
-    }
-
-    /// That of the present task.
-    pub(crate) fn current() -> Arc<Self> {
-        AUTHOR.try_with(Arc::clone).unwrap_or_default()
+impl From<&Actor> for Author {
+    fn from(actor: &Actor) -> Self {
+        let (job, asked) = actor.job.clone().unzip();
+        let name = asked.unwrap_or_else(|| actor.name.clone());
+        Self { name, job, operation: actor.action.clone(), why: actor.why.clone() }
     }
 }
 

@@ -355,7 +355,12 @@ async fn a_commit_says_who_and_why() {
         why: Some("the wall was moved".into()),
     };
     let walls = [[0.0, 0.0, 4.0, 0.0]];
-    author.clone().scope(do_one(&store, write!(|tx| walls::replace(tx, "a", &walls)))).await;
+    let actor = Actor {
+        name: author.name.clone(),
+        why: author.why.clone(),
+        ..Actor::server(&author.operation, "/maps/a/walls")
+    };
+    actor.scope(do_one(&store, write!(|tx| walls::replace(tx, "a", &walls)))).await;
     do_one(&store, write!(|tx| landmarks::delete(tx, "a", "p1"))).await;
     let rows = page(store.reads(), 1, i64::MAX, 9).await.unwrap();
     assert_eq!((rows[1].author.clone(), rows[0].parent), (author, Some(rows[1].id)));

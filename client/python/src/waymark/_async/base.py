@@ -169,6 +169,10 @@ class AsyncBase:
 
     async def _all(self, kind: type[T], call: str, *at: str | int, **query: Any) -> tuple[T, ...]:
         """Every page of a list. What is `None` in the query is left out."""
+        return await self._first(None, kind, call, *at, **query)
+
+    async def _first(self, most: int | None, kind: type[T], call: str, *at: str | int, **query: Any) -> tuple[T, ...]:
+        """The `most` first items of a list, or all."""
         params = query_of(query)
         items: list[T] = []
         cursor: str | None = None
@@ -176,8 +180,8 @@ class AsyncBase:
             response = await self._checked(call, at, params=params | ({"cursor": cursor} if cursor else {}))
             page = parsed(_Page, response)
             items.extend(parsed_items(kind, page.items, response))
-            if page.next is None:
-                return tuple(items)
+            if page.next is None or (most is not None and len(items) >= most):
+                return tuple(items[:most])
             cursor = page.next
 
     async def _stream(self, call: str, *at: str | int) -> AsyncEvents:

@@ -168,6 +168,10 @@ class Base:
 
     def _all(self, kind: type[T], call: str, *at: str | int, **query: Any) -> tuple[T, ...]:
         """Every page of a list. What is `None` in the query is left out."""
+        return self._first(None, kind, call, *at, **query)
+
+    def _first(self, most: int | None, kind: type[T], call: str, *at: str | int, **query: Any) -> tuple[T, ...]:
+        """The `most` first items of a list, or all."""
         params = query_of(query)
         items: list[T] = []
         cursor: str | None = None
@@ -175,8 +179,8 @@ class Base:
             response = self._checked(call, at, params=params | ({"cursor": cursor} if cursor else {}))
             page = parsed(_Page, response)
             items.extend(parsed_items(kind, page.items, response))
-            if page.next is None:
-                return tuple(items)
+            if page.next is None or (most is not None and len(items) >= most):
+                return tuple(items[:most])
             cursor = page.next
 
     def _stream(self, call: str, *at: str | int) -> Events:

@@ -6,6 +6,7 @@ the Unix epoch; the last part of a field's name is its unit. Covariances are ove
 quads and poses of the wire are in `waymark.wire`.
 """
 
+from waymark.api.audit import AuditCheck, AuditEntry, AuditHead
 from waymark.api.backups import Backup, BackupHealth, BackupManifest, BackupMap, BackupState
 from waymark.api.gathering import (
     AcceptanceBody,
@@ -137,6 +138,9 @@ __all__ = [
     "AdviceBody",
     "AreaBody",
     "AreaStatsBody",
+    "AuditCheck",
+    "AuditEntry",
+    "AuditHead",
     "Backup",
     "BackupHealth",
     "BackupManifest",

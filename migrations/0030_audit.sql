@@ -1,0 +1,41 @@
+-- Who changed what, when. Each entry is stored in the transaction of its change and carries the digest of the one before, so
+-- that one that is changed, left out or put in between breaks the chain.
+CREATE TABLE audit (
+    -- 1, 2, 3, ... without gaps.
+    seq     INTEGER PRIMARY KEY CHECK (seq > 0),
+    time_ms INTEGER NOT NULL,
+    -- Name of the token; `server` for what it does by itself.
+    actor   TEXT    NOT NULL CHECK (length(actor) BETWEEN 1 AND 64),
+    -- Number of the token; NULL for the local one and for the server.
+    token   INTEGER,
+    -- Method and path of the operation, as in the authorisation table, or what the server did.
+    action  TEXT    NOT NULL CHECK (length(action) BETWEEN 1 AND 128),
+    -- What it was done to: the path of the request.
+    target  TEXT    NOT NULL CHECK (length(target) <= 512),
+    -- Id of the request, as in the log and in its answer.
+    request TEXT    CHECK (length(request) <= 64),
+    -- Over the digest before and every other column.
+    sha256  BLOB    NOT NULL CHECK (length(sha256) = 32)
+) STRICT;
+
+-- The last entry that was forgotten for want of room; 0 and zeros before the first.
+CREATE TABLE audit_start (
+    id     INTEGER PRIMARY KEY CHECK (id = 1),
+    seq    INTEGER NOT NULL CHECK (seq >= 0),
+    sha256 BLOB    NOT NULL CHECK (length(sha256) = 32)
+) STRICT;
+INSERT INTO audit_start (id, seq, sha256) VALUES (1, 0, zeroblob(32));
+
+CREATE INDEX audit_by_actor ON audit (actor, seq);
+
+CREATE TRIGGER audit_is_not_changed BEFORE UPDATE ON audit
+BEGIN
+    SELECT RAISE(ABORT, 'entries of the audit log are not changed');
+END;
+
+-- Only the oldest is forgotten, once it is noted as the start.
+CREATE TRIGGER audit_is_not_removed BEFORE DELETE ON audit
+WHEN OLD.seq <> (SELECT seq FROM audit_start) OR OLD.sha256 <> (SELECT sha256 FROM audit_start)
+BEGIN
+    SELECT RAISE(ABORT, 'entries of the audit log are not removed');
+END;
