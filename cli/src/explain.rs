@@ -49,6 +49,9 @@ pub(crate) async fn explained(failure: Failure, maps: Option<&MapClient>, map: O
         "unknown_track" => failure.advised("waymark gathering show GATHERING lists the tracks."),
         "unknown_view" => failure.advised("waymark view list LANDMARK shows the numbers."),
         "unknown_reference_run" => failure.advised("waymark run list shows the numbers."),
+        "unknown_commit" => failure.advised("waymark version list shows the commits that are kept."),
+        "changed_since" => failure
+            .advised("waymark version list shows what came later; rollback goes back behind all of it."),
         "unknown_token" => failure.advised("waymark token list shows the numbers."),
         "unauthenticated" => {
             failure.advised("Sign in with a token: waymark login, or give it with WAYMARK_TOKEN.")

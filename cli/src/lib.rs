@@ -35,6 +35,7 @@ mod shell;
 pub mod simulated_errors;
 pub mod stopwatch;
 pub mod survey;
+mod version;
 mod view;
 
 use clap::{CommandFactory as _, Parser, Subcommand};
@@ -95,6 +96,14 @@ enum Command {
     Map(map::Args),
     /// Landmarks: teach, list, show, place, size, rename, delete, accept.
     Landmark(landmark::Args),
+    /// What was changed of a map, by whom and why: list, diff; and the way back: rollback, undo
+    ///
+    /// Every change of a map is a commit. For example:
+    ///   waymark version list
+    ///   waymark version diff 12
+    ///   waymark version rollback 12 --why "wrong poster"
+    #[command(verbatim_doc_comment)]
+    Version(version::Args),
     /// Training views of a landmark: list, show, image, delete.
     View(view::Args),
     /// Robots that may send frames: add, list, show, remove.
@@ -194,6 +203,7 @@ pub fn main() -> ExitCode {
         Command::Restore(args) => run(restore::run(args)).map(done),
         Command::Map(args) => run(map::run(args)).map(done),
         Command::Landmark(args) => run(landmark::run(args)).map(done),
+        Command::Version(args) => run(version::run(args)).map(done),
         Command::View(args) => run(view::run(args)).map(done),
         Command::Robot(args) => run(robot::run(args)).map(done),
         Command::Camera(args) => run(camera::run(args)).map(done),

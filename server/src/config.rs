@@ -170,6 +170,10 @@ pub struct Limits {
     pub jobs_kept: usize,
     /// Answers to creations that are kept for repeats, for a day at most; the oldest go.
     pub kept_answers: usize,
+    /// Commits of each map that are kept; the oldest go.
+    pub kept_commits: usize,
+    /// Bytes of each map that are stored only for its kept commits, about; the oldest commits go.
+    pub history_bytes: usize,
     /// Entries of the audit log; the oldest are forgotten.
     pub audit_entries: usize,
 }
@@ -201,6 +205,8 @@ impl Default for Limits {
             jobs: 64,
             jobs_kept: 1_000,
             kept_answers: 10_000,
+            kept_commits: 1_000,
+            history_bytes: 4 << 30,
             audit_entries: 100_000,
         }
     }
@@ -208,7 +214,7 @@ impl Default for Limits {
 
 impl Limits {
     /// Name and value of every bound that must not be 0.
-    fn counts(&self) -> [(&'static str, usize); 23] {
+    fn counts(&self) -> [(&'static str, usize); 25] {
         [
             ("limits.frame_bytes", self.frame_bytes),
             ("limits.frame_pixels", self.frame_pixels),
@@ -232,6 +238,8 @@ impl Limits {
             ("limits.write_queue", self.write_queue),
             ("limits.jobs", self.jobs),
             ("limits.kept_answers", self.kept_answers),
+            ("limits.kept_commits", self.kept_commits),
+            ("limits.history_bytes", self.history_bytes),
             ("limits.audit_entries", self.audit_entries),
         ]
     }

@@ -84,6 +84,11 @@ fn the_commands_of_back_up_and_restore_work() {
 }
 
 #[test]
+fn the_commands_of_take_a_change_back_work() {
+    run("history");
+}
+
+#[test]
 fn the_commands_of_deploy_work() {
     run("deploy");
 }

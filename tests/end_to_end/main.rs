@@ -15,6 +15,7 @@ mod gathered_drive;
 mod guided;
 mod guides;
 mod hang_ups;
+mod history;
 mod http_contract;
 mod imports;
 mod laser;

@@ -147,6 +147,26 @@ def test_backups_are_made_saved_and_deleted(server: Server, tmp_path: Path) -> N
         maps.delete_backup(made.name)
 
 
+def test_a_wrong_change_is_taken_back(server: Server) -> None:
+    with server.maps() as maps:
+        hall(maps, "annex")
+        good = maps.commits("annex")[0].id
+        maps.with_reason("für immer").delete_landmark("annex", "poster")
+        deleted = maps.commits("annex")[0]
+        assert (deleted.author, deleted.why, deleted.summary.landmarks) == ("local", "für immer", ("poster",))
+        assert maps.commit("annex", deleted.id) == deleted and deleted.parent == good
+        found = maps.difference("annex", good)
+        assert (found.to_commit, found.landmarks.items[0].change) == (deleted.id, "removed")
+        done = maps.roll_back("annex", good)
+        assert done.changed and maps.landmark("annex", "poster").place is not None
+        assert maps.difference("annex", good, done.commit.id).landmarks.items == ()
+        maps.undo_commit("annex", done.commit.id)
+        assert maps.landmarks("annex") == ()
+        with pytest.raises(Refused, match="since"):
+            maps.undo_commit("annex", done.commit.id)
+        maps.delete_map("annex")
+
+
 def test_maps_are_stored_with_all_their_fields(server: Server) -> None:
     with server.maps() as maps:
         hall(maps, "ground")

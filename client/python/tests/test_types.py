@@ -44,6 +44,8 @@ NOT_DESCRIBED = {
     "IntrinsicsMonitorBody",
     "IntrinsicsSuspicionBody",
     "TrajectoriesBody",
+    # A page.
+    "LandmarkDifferencePage",
     # A part of a form; one of several forms.
     "CaptureMetadata",
     "FindingBody",

@@ -5,7 +5,7 @@
 use super::{
     creation::{KEY, execute, fresh_key},
     local_token::{self, LocalTokenError},
-    operation::{Operation, PathValue, path_of, query_of},
+    operation::{Operation, PathValue, escaped, path_of, query_of},
     tls,
 };
 use crate::ClientError;
@@ -21,6 +21,8 @@ use std::{
     time::Duration,
 };
 
+/// Carries the reason of a change.
+const WHY: &str = "waymark-why";
 /// Longest wait for one request.
 const REQUEST_TIMEOUT: Duration = Duration::from_mins(1);
 
@@ -34,6 +36,7 @@ pub struct MapClient {
     local_port: Option<u16>,
     key: Option<String>,
     revision: Option<String>,
+    why: Option<String>,
 }
 
 /// A token, not shown.
@@ -78,7 +81,7 @@ impl MapClient {
         let http = http.map_err(|e| ClientError::Http { url: base.to_owned(), detail: reason(&e) })?;
         let base = base.trim_end_matches('/').to_owned();
         let local_port = local_token::local_port(&base);
-        Ok(Self { http, base, token: Arc::default(), local_port, key: None, revision: None })
+        Ok(Self { http, base, token: Arc::default(), local_port, key: None, revision: None, why: None })
     }
 
     /// The same client with this token, as `waymark token create` prints it. No other is taken.
@@ -112,6 +115,12 @@ impl MapClient {
         Self { revision: Some(revision.to_owned()), ..self.clone() }
     }
 
+    /// The same with this reason for its changes: the history of the map has it. One line, 1 to 200 characters.
+    #[must_use]
+    pub fn with_reason(&self, why: &str) -> Self {
+        Self { why: Some(why.to_owned()), ..self.clone() }
+    }
+
     /// The token that requests carry now.
     pub(super) fn token(&self) -> Option<String> {
         self.token.read().unwrap_or_else(PoisonError::into_inner).as_ref().map(|token| token.0.clone())
@@ -131,6 +140,9 @@ impl MapClient {
         if operation.takes_revision() {
             let known = self.revision.as_ref().map(|revision| format!("\"{revision}\""));
             request = request.header(IF_MATCH, known.unwrap_or_else(|| "*".to_owned()));
+        }
+        if let Some(why) = self.why.as_ref().filter(|_| operation.method != Method::GET) {
+            request = request.header(WHY, escaped(why));
         }
         Ok(request)
     }

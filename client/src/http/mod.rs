@@ -9,6 +9,7 @@ mod events;
 mod form;
 mod gathering;
 mod health;
+mod history;
 mod landmarks;
 mod learning;
 mod live;
@@ -45,6 +46,7 @@ pub fn operations() -> impl Iterator<Item = &'static Operation> {
         cameras::OPERATIONS,
         gathering::OPERATIONS,
         health::OPERATIONS,
+        history::OPERATIONS,
         landmarks::OPERATIONS,
         learning::OPERATIONS,
         live::OPERATIONS,

@@ -33,19 +33,21 @@ const CREATIONS: [&str; 9] = [
 ];
 
 /// Paths of what has a revision: their changes say which one they are meant for.
-const REVISED: [&str; 6] = [
+const REVISED: [&str; 8] = [
     "/maps/{map}",
     "/maps/{map}/walls",
     "/maps/{map}/underlay",
     "/maps/{map}/visibility-settings",
     "/maps/{map}/modalities",
     "/maps/{map}/landmarks/{landmark}",
+    "/maps/{map}/rollback",
+    "/maps/{map}/commits/{commit}/undo",
 ];
 
 impl Operation {
     /// Whether it asks for an `If-Match`: the client sends `*` unless [`crate::MapClient::if_match`] says another.
     pub fn takes_revision(&self) -> bool {
-        REVISED.contains(&self.path) && [Method::PUT, Method::PATCH, Method::DELETE].contains(&self.method)
+        REVISED.contains(&self.path) && self.method != Method::GET
     }
 
     /// Whether it creates and takes an `Idempotency-Key`: the client sends a fresh one each time.
@@ -114,7 +116,7 @@ pub(super) fn query_of(fields: &impl Serialize) -> String {
 }
 
 /// Percent-encodes all but unreserved characters (RFC 3986).
-fn escaped(text: &str) -> String {
+pub(super) fn escaped(text: &str) -> String {
     let plain = |b: u8| b.is_ascii_alphanumeric() || b"-_.~".contains(&b);
     text.bytes().map(|b| if plain(b) { char::from(b).to_string() } else { format!("%{b:02X}") }).collect()
 }

@@ -44,7 +44,7 @@ pub struct MapSnapshot {
     pub wall_index: Arc<WallIndex>,
     /// Modality statistics of the reference runs, by pose cell.
     pub modalities: Arc<ModalityMap>,
-    /// Number of reference runs that `modalities` rests on, and the latest.
+    /// Number of reference runs that `modalities` rests on, and a digest of which ones.
     pub reference_runs: (i64, i64),
     /// The camera and the limits that define "visible".
     pub visibility_settings: VisibilitySettings,

@@ -6,6 +6,7 @@ use super::{
     cookie::session_cookie,
     error::{ApiError, method_not_allowed},
     guard::RequestId,
+    history,
     peer::Peer,
 };
 use crate::{
@@ -37,14 +38,16 @@ pub(super) async fn authorise(State(app): State<AppState>, request: Request, nex
         return refused(&app, &parts, error);
     }
     match actor(&parts) {
-        Some(actor) => actor.scope(next.run(Request::from_parts(parts, body))).await,
-        None => next.run(Request::from_parts(parts, body)).await,
+        Ok(Some(actor)) => actor.scope(next.run(Request::from_parts(parts, body))).await,
+        Ok(None) => next.run(Request::from_parts(parts, body)).await,
+        Err(error) => refused(&app, &parts, error),
     }
 }
 
-/// Who asks for a change, for the audit log.
-fn actor(parts: &Parts) -> Option<Actor> {
-    let principal = parts.extensions.get::<Principal>().filter(|_| !parts.method.is_safe())?;
+/// Who asks for a change, and why, for the audit log and the history of maps. Errors: the reason is none.
+fn actor(parts: &Parts) -> Result<Option<Actor>, ApiError> {
+    let principal = parts.extensions.get::<Principal>().filter(|_| !parts.method.is_safe());
+    let Some(principal) = principal else { return Ok(None) };
     let matched = parts.extensions.get::<MatchedPath>().map_or("", MatchedPath::as_str);
     let below = |path: &str| path.strip_prefix(API).unwrap_or(path).to_owned();
     let request = parts.extensions.get::<RequestId>().and_then(|id| id.0.to_str().ok());
@@ -52,13 +55,15 @@ fn actor(parts: &Parts) -> Option<Actor> {
         TokenId::Local => None,
         TokenId::Stored(number) => Some(number),
     };
-    Some(Actor {
+    Ok(Some(Actor {
         name: principal.name.clone(),
         token,
         action: format!("{} {}", parts.method, below(matched)),
         target: below(parts.uri.path()),
         request: request.map(str::to_owned),
-    })
+        job: None,
+        why: history::why(&parts.headers)?,
+    }))
 }
 
 async fn admitted(app: &AppState, parts: &mut Parts) -> Result<(), ApiError> {

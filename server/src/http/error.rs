@@ -91,26 +91,32 @@ impl IntoResponse for ApiError {
     }
 }
 
+/// Code and field of a refusal because there is none of that kind.
+fn unknown(what: Kind) -> (&'static str, &'static str) {
+    match what {
+        Kind::Map => ("unknown_map", "map"),
+        Kind::Landmark => ("unknown_landmark", "landmark"),
+        Kind::View => ("unknown_view", "view"),
+        Kind::Robot => ("unknown_robot", "robot"),
+        Kind::Camera => ("unknown_camera", "camera"),
+        Kind::Job => ("unknown_job", "job"),
+        Kind::Gathering => ("unknown_gathering", "gathering"),
+        Kind::Track => ("unknown_track", "track"),
+        Kind::ReferenceRun => ("unknown_reference_run", "run"),
+        Kind::Underlay => ("unknown_underlay", "underlay"),
+        Kind::Token => ("unknown_token", "token"),
+        Kind::Backup => ("unknown_backup", "backup"),
+        Kind::Commit => ("unknown_commit", "commit"),
+        Kind::Model | Kind::Picture => ("not_found", "path"),
+    }
+}
+
 impl From<StoreError> for ApiError {
     fn from(error: StoreError) -> Self {
         let detail = error.to_string();
         match error {
             StoreError::NotFound { what, .. } => {
-                let (code, field) = match what {
-                    Kind::Map => ("unknown_map", "map"),
-                    Kind::Landmark => ("unknown_landmark", "landmark"),
-                    Kind::View => ("unknown_view", "view"),
-                    Kind::Robot => ("unknown_robot", "robot"),
-                    Kind::Camera => ("unknown_camera", "camera"),
-                    Kind::Job => ("unknown_job", "job"),
-                    Kind::Gathering => ("unknown_gathering", "gathering"),
-                    Kind::Track => ("unknown_track", "track"),
-                    Kind::ReferenceRun => ("unknown_reference_run", "run"),
-                    Kind::Underlay => ("unknown_underlay", "underlay"),
-                    Kind::Token => ("unknown_token", "token"),
-                    Kind::Backup => ("unknown_backup", "backup"),
-                    Kind::Model | Kind::Picture => ("not_found", "path"),
-                };
+                let (code, field) = unknown(what);
                 Self::new(StatusCode::NOT_FOUND, code, detail).field(field)
             }
             StoreError::Exists { .. } => Self::new(StatusCode::CONFLICT, "exists", detail).field("name"),
@@ -123,6 +129,9 @@ impl From<StoreError> for ApiError {
                     .with("given", size(given))
             }
             StoreError::InUse(_) => Self::new(StatusCode::CONFLICT, "in_use", detail),
+            StoreError::ChangedSince { by, .. } => {
+                Self::new(StatusCode::CONFLICT, "changed_since", detail).field("commit").with("by", json!(by))
+            }
             StoreError::Frames(error) => {
                 let code = match error {
                     MapLinkError::Cycle => "cycle",

@@ -19,6 +19,7 @@ mod extract;
 mod gathering;
 mod guard;
 mod health;
+mod history;
 mod landmarks;
 mod learning;
 mod live;

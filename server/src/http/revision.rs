@@ -20,7 +20,7 @@ use utoipa::openapi::{
 /// Most revisions of one condition.
 const MAX_REVISIONS: usize = 8;
 
-/// What has a revision: its path below [`API`], and the methods that change it.
+/// What has a revision: its path below [`API`], and the methods that change it. A way back is a change of the map.
 pub(super) const REVISED: &[(&str, &[&str])] = &[
     ("/maps/{map}", &["patch", "delete"]),
     ("/maps/{map}/walls", &["put"]),
@@ -28,6 +28,8 @@ pub(super) const REVISED: &[(&str, &[&str])] = &[
     ("/maps/{map}/visibility-settings", &["put"]),
     ("/maps/{map}/modalities", &["put"]),
     ("/maps/{map}/landmarks/{landmark}", &["patch", "delete"]),
+    ("/maps/{map}/rollback", &["post"]),
+    ("/maps/{map}/commits/{commit}/undo", &["post"]),
 ];
 
 /// The revisions that a change is meant for. Errors: `precondition_required`, `invalid_value`.
@@ -87,6 +89,7 @@ impl<T: Serialize> IntoResponse for Revised<T> {
 fn operation<'a>(item: &'a mut PathItem, method: &str) -> Option<&'a mut Operation> {
     match method {
         "get" => item.get.as_mut(),
+        "post" => item.post.as_mut(),
         "put" => item.put.as_mut(),
         "patch" => item.patch.as_mut(),
         "delete" => item.delete.as_mut(),

@@ -4,8 +4,8 @@ use super::{
     API, App, AppState, audit, authorise, backups, bulk, cameras, creation, documented,
     error::{ApiError, method_not_allowed, not_found},
     examples::with_examples,
-    gathering, guard, health, landmarks, learning, live, mapping, maps, modalities, page_session, pages,
-    recognise, reference_runs, relocalisation, revision, robots, ros2,
+    gathering, guard, health, history, landmarks, learning, live, mapping, maps, modalities, page_session,
+    pages, recognise, reference_runs, relocalisation, revision, robots, ros2,
     security::with_security,
     tokens, underlay, views, visibility, visibility_settings, walls,
 };
@@ -40,6 +40,7 @@ fn api(limits: &Limits) -> OpenApiRouter<AppState> {
         .merge(maps::router())
         .merge(walls::router())
         .merge(underlay::router(limits.upload_bytes))
+        .merge(history::router())
         .merge(mapping::router())
         .merge(landmarks::router())
         .merge(bulk::router())
@@ -68,7 +69,7 @@ pub(super) fn parts(limits: &Limits) -> (Router<AppState>, openapi::OpenApi) {
     let (routes, document) =
         OpenApiRouter::with_openapi(Document::openapi()).nest(API, api(limits)).split_for_parts();
     let document = creation::with_keys(with_examples(document, API));
-    let document = documented::with_errors(revision::with_revisions(document));
+    let document = documented::with_errors(revision::with_revisions(history::with_reasons(document)));
     (routes, with_security(document, API))
 }
 

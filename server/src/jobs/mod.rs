@@ -328,7 +328,11 @@ impl Jobs {
         if !self.store.write(move |tx| Box::pin(async move { jobs::begin(tx, id).await })).await? {
             return Ok(());
         }
-        let actor = Actor::server(&row.kind, format!("/jobs/{id}"));
+        let actor = Actor {
+            job: Some((id, row.author.clone())),
+            why: row.why.clone(),
+            ..Actor::server(&row.kind, format!("/jobs/{id}"))
+        };
         let ended = match actor.scope(learn::run(&self.store, &self.config, row, &reporter)).await {
             // The row has ended together with the models.
             Ok(()) => {

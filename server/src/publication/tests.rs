@@ -186,7 +186,8 @@ async fn damaged_and_outdated_models_are_named_and_not_used() {
     }
     assert_eq!(store.snapshots().get("a").unwrap().learnt.len(), 2);
     // One byte in the middle of the blob, and the digest as it was.
-    let damage = "UPDATE models SET model = CAST(substr(model, 1, 500) || x'00ff' || substr(model, 503) AS BLOB) WHERE landmark_id = 2";
+    let damage = "UPDATE model_contents SET bytes = CAST(substr(bytes, 1, 500) || x'00ff' || substr(bytes, 503) AS BLOB) \
+                  WHERE sha256 = (SELECT sha256 FROM models WHERE landmark_id = 2)";
     let write = store.write(move |tx| {
         Box::pin(async move {
             sqlx::query(damage).execute(tx.conn()).await.map(drop).map_err(StoreError::during("damage"))

@@ -1,4 +1,5 @@
-//! On whose behalf a write is made. In: the request or the work that a task does. Out: what the audit log names.
+//! On whose behalf a write is made. In: the request or the work that a task does. Out: what the audit log and the history of
+//! maps name.
 
 use std::{future::Future, sync::Arc};
 
@@ -22,13 +23,18 @@ pub(crate) struct Actor {
     pub(crate) target: String,
     /// Id of the request.
     pub(crate) request: Option<String>,
+    /// Of a job that writes: its number, and who asked for it.
+    pub(crate) job: Option<(i64, String)>,
+    /// The reason that was given, for the history of maps.
+    pub(crate) why: Option<String>,
 }
 
 impl Actor {
     /// The server itself, which does `action` to `target`.
     pub(crate) fn server(action: &str, target: impl Into<String>) -> Self {
         let name = "server".to_owned();
-        Self { name, token: None, action: action.to_owned(), target: target.into(), request: None }
+        let (action, target) = (action.to_owned(), target.into());
+        Self { name, token: None, action, target, request: None, job: None, why: None }
     }
 
     /// Does `work` on behalf of this actor.

@@ -28,7 +28,8 @@ statements! {
     VIEWS = "SELECT v.* FROM views v JOIN landmarks l ON l.id = v.landmark_id WHERE l.map_id = ?1 ORDER BY v.id";
     MODELS = "SELECT m.* FROM models m JOIN landmarks l ON l.id = m.landmark_id WHERE l.map_id = ?1 ORDER BY m.landmark_id";
     WALLS = "SELECT * FROM laser_segments WHERE map_id = ?1 ORDER BY ordinal";
-    MODEL_BYTES = "SELECT m.model, m.sha256, l.name AS landmark, p.name AS map FROM models m \
+    MODEL_BYTES = "SELECT c.bytes AS model, m.sha256, l.name AS landmark, p.name AS map FROM models m \
+                   JOIN model_contents c ON c.sha256 = m.sha256 \
                    JOIN landmarks l ON l.id = m.landmark_id JOIN maps p ON p.id = l.map_id ORDER BY m.landmark_id";
     QUARANTINED = "SELECT count(*) FROM damaged_pictures WHERE sha256 = ?1";
     SHOWN_BY = "SELECT 'view ' || v.id || ' of landmark ' || l.name || ', map ' || m.name FROM views v \

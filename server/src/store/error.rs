@@ -51,6 +51,16 @@ pub(crate) enum StoreError {
     /// Something else rests on it.
     #[error("{0}")]
     InUse(String),
+    /// A commit cannot be taken back, because a later one has changed the same.
+    #[error(
+        "commit {by} has changed {what} since: take that back first, or roll back to a commit before both"
+    )]
+    ChangedSince {
+        /// What it has changed.
+        what: String,
+        /// Number of the later commit.
+        by: i64,
+    },
     /// The map links are impossible.
     #[error(transparent)]
     Frames(#[from] map::map_links::MapLinkError),

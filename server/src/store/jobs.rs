@@ -5,12 +5,13 @@ use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
 
 statements! {
     COUNT_OPEN = "SELECT count(*) FROM jobs WHERE state IN ('queued', 'running')";
-    INSERT = "INSERT INTO jobs (kind, map, request, state, created_ms) VALUES (?1, ?2, ?3, 'queued', ?4) RETURNING id";
-    GET = "SELECT id, kind, map, request, state, message, result, attempts FROM jobs WHERE id = ?1";
-    LIST = "SELECT id, kind, map, request, state, message, result, attempts FROM jobs WHERE id < ?1 \
+    INSERT = "INSERT INTO jobs (kind, map, request, state, created_ms, author, why) \
+              VALUES (?1, ?2, ?3, 'queued', ?4, ?5, ?6) RETURNING id";
+    GET = "SELECT id, kind, map, request, state, message, result, attempts, author, why FROM jobs WHERE id = ?1";
+    LIST = "SELECT id, kind, map, request, state, message, result, attempts, author, why FROM jobs WHERE id < ?1 \
             AND (?2 IS NULL OR state = ?2) AND (?3 IS NULL OR map IN (SELECT value FROM json_each(?3))) ORDER BY id DESC LIMIT ?4";
     COUNT = "SELECT count(*) FROM jobs WHERE (?1 IS NULL OR state = ?1) AND (?2 IS NULL OR map IN (SELECT value FROM json_each(?2)))";
-    OPEN = "SELECT id, kind, map, request, state, message, result, attempts FROM jobs \
+    OPEN = "SELECT id, kind, map, request, state, message, result, attempts, author, why FROM jobs \
             WHERE state IN ('queued', 'running') ORDER BY id";
     BEGIN = "UPDATE jobs SET state = 'running', attempts = attempts + 1 \
              WHERE id = ?1 AND state IN ('queued', 'running')";
@@ -40,6 +41,10 @@ pub(crate) struct JobRow {
     pub(crate) result: Option<String>,
     /// How often it was begun, less those times that a stop of the server put it back.
     pub(crate) attempts: u32,
+    /// Who asked for it.
+    pub(crate) author: String,
+    /// The reason given then.
+    pub(crate) why: Option<String>,
 }
 
 /// How a job ended.
@@ -62,6 +67,8 @@ fn job_row(row: &SqliteRow) -> Result<JobRow, sqlx::Error> {
         message: row.try_get("message")?,
         result: row.try_get("result")?,
         attempts: row.try_get("attempts")?,
+        author: row.try_get("author")?,
+        why: row.try_get("why")?,
     })
 }
 
@@ -90,6 +97,8 @@ pub(crate) async fn create(
         .bind(map)
         .bind(request)
         .bind(now_ms())
+        .bind(&tx.author.name)
+        .bind(&tx.author.why)
         .fetch_one(&mut tx.conn)
         .await;
     let id = id.map_err(StoreError::during("queue job"))?;
@@ -108,6 +117,8 @@ pub(crate) async fn create(
         message: String::new(),
         result: None,
         attempts: 0,
+        author: tx.author.name.clone(),
+        why: tx.author.why.clone(),
     })
 }
 

@@ -19,6 +19,7 @@ pub(crate) enum Kind {
     Underlay,
     Token,
     Backup,
+    Commit,
 }
 
 impl fmt::Display for Kind {
@@ -38,6 +39,7 @@ impl fmt::Display for Kind {
             Self::Underlay => "underlay of map",
             Self::Token => "token",
             Self::Backup => "backup",
+            Self::Commit => "commit",
         })
     }
 }

@@ -290,11 +290,12 @@ pub(crate) async fn update(
     let map = maps::get(&mut tx.conn, map).await?;
     let old = get(&mut tx.conn, &map.name, name).await?;
     let geometry = change(old.geometry);
+    // First, so that the history has the health that belongs to the old place.
+    set_geometry(tx, old.id, &geometry).await?;
     if geometry != old.geometry && old.health != LandmarkHealth::Sound {
         // The finding was about another place.
         set_health(tx, &map.name, name, LandmarkHealth::Sound, None).await?;
     }
-    set_geometry(tx, old.id, &geometry).await?;
     maps::bump(tx, map.id).await?;
     get(&mut tx.conn, &map.name, name).await
 }

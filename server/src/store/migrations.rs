@@ -31,6 +31,9 @@ const FILES: &[(&str, &str)] = files![
     "0017_tokens",
     "0018_idempotency",
     "0019_revisions",
+    "0021_model_contents",
+    "0022_history",
+    "0023_commits",
     "0030_audit",
 ];
 

@@ -35,6 +35,7 @@ pub(crate) mod kept_answers;
 pub(crate) mod actor;
 pub(crate) mod audit;
 pub(crate) mod revisions;
+pub(crate) mod history;
 
 pub(crate) use error::StoreError;
 pub(crate) use on_commit::{CommittedChange, OnCommit};
@@ -108,9 +109,13 @@ impl Store {
         let jobs = Arc::new(Notify::new());
         let mut conn = opened.writer;
         on_commit.opened(&mut conn).await.map_err(OpenError::Load)?;
+        let history = history::HistoryLimits {
+            commits: config.limits.kept_commits,
+            bytes: config.limits.history_bytes,
+        };
         note_head(&mut conn, "start").await.map_err(OpenError::Load)?;
         let (commands, received) = mpsc::channel(config.limits.write_queue);
-        let writer = writer::Writer::new(conn, received, on_commit, vitals.clone(), jobs.clone());
+        let writer = writer::Writer::new(conn, received, history, on_commit, vitals.clone(), jobs.clone());
         let (close, closed) = oneshot::channel();
         let task = tokio::spawn(writer.run(closed, vitals.begin(WRITER)));
         let task = WriterTask { task, close, reads: opened.reads.clone(), _lock: opened.lock };

@@ -2,6 +2,7 @@
 
 use super::{StoreError, Tx, kind::Kind, maps, now_ms, statements::statements, text_revision, within};
 use map::modality_stats::{FusionMode, MAX_AREAS, NamedArea, PoseCell, StatsByModality};
+use sha2::{Digest as _, Sha256};
 use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
 use std::collections::BTreeMap;
 
@@ -13,7 +14,7 @@ statements! {
     SET = "UPDATE maps SET fusion = ?2, areas = ?3 WHERE id = ?1";
     RUNS = "SELECT id, robot, created_ms, way_m, cells FROM runs WHERE map_id = ?1 ORDER BY id";
     COUNT = "SELECT count(*) FROM runs WHERE map_id = ?1";
-    LATEST = "SELECT coalesce(max(id), 0) FROM runs WHERE map_id = ?1";
+    NUMBERS = "SELECT id FROM runs WHERE map_id = ?1 ORDER BY id";
     INSERT = "INSERT INTO runs (map_id, robot, created_ms, way_m, cells) VALUES (?1, ?2, ?3, ?4, ?5) RETURNING id";
     DELETE = "DELETE FROM runs WHERE map_id = ?1 AND id = ?2";
 }
@@ -160,15 +161,20 @@ pub(crate) async fn delete(tx: &mut Tx, map: &str, id: i64) -> Result<(), StoreE
     maps::bump(tx, map.id).await
 }
 
-/// Count and latest number of a map's reference runs. Numbers are never used again.
+/// Count of a map's reference runs, and the beginning of the digest of their numbers: runs never change and their numbers are
+/// never used for others.
 pub(crate) async fn run_numbers(
     conn: &mut sqlx::SqliteConnection,
     map_id: i64,
 ) -> Result<(i64, i64), StoreError> {
     let at = || StoreError::during("count runs");
-    let count: i64 = sqlx::query_scalar(COUNT).bind(map_id).fetch_one(&mut *conn).await.map_err(at())?;
-    let latest: i64 = sqlx::query_scalar(LATEST).bind(map_id).fetch_one(&mut *conn).await.map_err(at())?;
-    Ok((count, latest))
+    let numbers: Vec<i64> = sqlx::query_scalar(NUMBERS).bind(map_id).fetch_all(conn).await.map_err(at())?;
+    let mut digest = Sha256::new();
+    for number in &numbers {
+        digest.update(number.to_le_bytes());
+    }
+    let first = digest.finalize().first_chunk::<8>().copied().unwrap_or_default();
+    Ok((numbers.len() as i64, i64::from_le_bytes(first)))
 }
 
 #[cfg(test)]

@@ -1,4 +1,5 @@
-//! Models as bytes with their digest. The store does not interpret them.
+//! Models as bytes, stored once under their digest. The store does not interpret them. The schema deletes bytes with the last
+//! row that refers to them, of today or of a kept commit.
 
 use super::{StoreError, Tx, kind::Kind, landmarks::ModelSummary, statements::statements};
 use sha2::{Digest as _, Sha256};
@@ -7,10 +8,14 @@ use std::collections::BTreeSet;
 use vision::model::LandmarkId;
 
 statements! {
-    PUT = "INSERT INTO models (landmark_id, model, sha256, params_hash, active, reasons, facts, views, generated_views, \
-           learnt_ms, looks_like) SELECT ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?12 \
-           WHERE EXISTS (SELECT 1 FROM landmarks WHERE id = ?1 AND map_id = ?11) \
-           ON CONFLICT (landmark_id) DO UPDATE SET model = excluded.model, sha256 = excluded.sha256, \
+    // The bytes of a digest are known: stored again, they mend what is damaged.
+    PUT_BYTES = "INSERT INTO model_contents (sha256, bytes) SELECT ?1, ?2 \
+                 WHERE EXISTS (SELECT 1 FROM landmarks WHERE id = ?3 AND map_id = ?4) \
+                 ON CONFLICT (sha256) DO UPDATE SET bytes = excluded.bytes";
+    PUT = "INSERT INTO models (landmark_id, sha256, params_hash, active, reasons, facts, views, generated_views, \
+           learnt_ms, looks_like) SELECT ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?11 \
+           WHERE EXISTS (SELECT 1 FROM landmarks WHERE id = ?1 AND map_id = ?10) \
+           ON CONFLICT (landmark_id) DO UPDATE SET sha256 = excluded.sha256, \
            params_hash = excluded.params_hash, active = excluded.active, reasons = excluded.reasons, \
            facts = excluded.facts, views = excluded.views, generated_views = excluded.generated_views, \
            learnt_ms = excluded.learnt_ms, looks_like = excluded.looks_like";
@@ -18,13 +23,16 @@ statements! {
                WHERE l.map_id = ?1 AND m.looks_like IS NULL ORDER BY m.landmark_id";
     REFUSED = "SELECT m.landmark_id FROM models m JOIN landmarks l ON l.id = m.landmark_id \
                WHERE l.map_id = ?1 AND m.looks_like IS NOT NULL";
-    REPLACE = "UPDATE models SET model = ?3, sha256 = ?4, facts = json_set(facts, '$.points', ?5) \
+    REPLACE_BYTES = "INSERT INTO model_contents (sha256, bytes) SELECT ?3, ?4 \
+                     WHERE EXISTS (SELECT 1 FROM models WHERE landmark_id = ?1 AND sha256 = ?2) \
+                     ON CONFLICT (sha256) DO UPDATE SET bytes = excluded.bytes";
+    REPLACE = "UPDATE models SET sha256 = ?3, facts = json_set(facts, '$.points', ?4) \
                WHERE landmark_id = ?1 AND sha256 = ?2";
     WITHOUT_POINTS_JOB = "SELECT m.landmark_id FROM models m JOIN landmarks l ON l.id = m.landmark_id \
                         WHERE l.map_id = ?1 AND m.points_asked = 0 \
                         AND EXISTS (SELECT 1 FROM views v WHERE v.landmark_id = m.landmark_id)";
     ASK_POINTS = "UPDATE models SET points_asked = 1 WHERE landmark_id = ?1";
-    GET = "SELECT model FROM models WHERE landmark_id = ?1";
+    GET = "SELECT c.bytes FROM models m JOIN model_contents c ON c.sha256 = m.sha256 WHERE m.landmark_id = ?1";
 }
 
 /// Digest of a stored model.
@@ -46,10 +54,18 @@ pub(crate) fn digest(bytes: &[u8]) -> ModelDigest {
 
 /// Stores a model unless its landmark is gone from the map meanwhile; says whether it did.
 pub(crate) async fn put(tx: &mut Tx, map_id: i64, new: &NewModel) -> Result<bool, StoreError> {
+    let sha256 = digest(&new.bytes);
+    sqlx::query(PUT_BYTES)
+        .bind(&sha256[..])
+        .bind(&new.bytes)
+        .bind(new.landmark.0 as i64)
+        .bind(map_id)
+        .execute(&mut tx.conn)
+        .await
+        .map_err(StoreError::during("store the bytes of a model"))?;
     let done = sqlx::query(PUT)
         .bind(new.landmark.0 as i64)
-        .bind(&new.bytes)
-        .bind(&digest(&new.bytes)[..])
+        .bind(&sha256[..])
         .bind(&new.params_hash.to_le_bytes()[..])
         .bind(new.summary.active)
         .bind(&new.summary.reasons)
@@ -73,11 +89,19 @@ pub(crate) async fn replace(
     (was, bytes): (ModelDigest, &[u8]),
     points: usize,
 ) -> Result<bool, StoreError> {
+    let sha256 = digest(bytes);
+    sqlx::query(REPLACE_BYTES)
+        .bind(landmark.0 as i64)
+        .bind(&was[..])
+        .bind(&sha256[..])
+        .bind(bytes)
+        .execute(&mut tx.conn)
+        .await
+        .map_err(StoreError::during("store the bytes of a model"))?;
     let done = sqlx::query(REPLACE)
         .bind(landmark.0 as i64)
         .bind(&was[..])
-        .bind(bytes)
-        .bind(&digest(bytes)[..])
+        .bind(&sha256[..])
         .bind(points as i64)
         .execute(&mut tx.conn)
         .await

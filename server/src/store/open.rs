@@ -11,7 +11,7 @@ use std::{
     time::Duration,
 };
 
-use super::{StoreError, migrations, pictures, restored};
+use super::{StoreError, history, migrations, pictures, restored};
 
 /// First version without the write-ahead-log corruption of 3.7.0 to 3.51.2 (sqlite.org/wal.html#walresetbug).
 pub(crate) const SQLITE_MIN: (u32, u32, u32) = (3, 51, 3);
@@ -97,6 +97,7 @@ pub(super) async fn open(data: &Path) -> Result<Opened, OpenError> {
     check_integrity(&mut writer).await?;
     migrations::migrator().run(&mut writer).await.map_err(OpenError::Migrate)?;
     pictures::move_underlays(&mut writer).await.map_err(OpenError::Open)?;
+    history::close_outside(&mut writer).await.map_err(OpenError::Open)?;
     let reads = SqlitePoolOptions::new()
         .max_connections(READERS)
         .acquire_timeout(BUSY_TIMEOUT)
@@ -160,10 +161,11 @@ async fn check_pragmas(conn: &mut SqliteConnection) -> Result<(), OpenError> {
     Ok(())
 }
 
-/// Checks every table but the pictures, which are most of a large file. Each picture has a digest, which is compared whenever
-/// it is read, and once by `pictures::check_all` after the start.
+/// Checks every table but the pictures and the bytes of models, which are most of a large file. Each has a digest, which is
+/// compared whenever it is read: models in use at the start, pictures once by `pictures::check_all` after it.
 async fn check_integrity(conn: &mut SqliteConnection) -> Result<(), OpenError> {
-    let tables = "SELECT name FROM sqlite_schema WHERE type = 'table' AND name <> 'pictures'";
+    let tables = "SELECT name FROM sqlite_schema WHERE type = 'table' \
+                  AND name NOT IN ('pictures', 'model_contents')";
     let tables: Vec<String> =
         sqlx::query_scalar(tables).fetch_all(&mut *conn).await.map_err(OpenError::Open)?;
     for table in std::iter::once("sqlite_schema").chain(tables.iter().map(String::as_str)) {

@@ -22,10 +22,9 @@ use vision::{
 };
 
 statements! {
-    STAMP = "SELECT m.id AS map, m.walls_version, l.id AS landmark, count(v.id) AS views, \
-             coalesce(max(v.id), 0) AS last_view, l.width_m, l.height_m, l.x_m, l.y_m, l.z_m, l.theta_rad, l.roll_rad, \
+    STAMP = "SELECT m.id AS map, m.walls_version, l.id AS landmark, l.revision, l.width_m, l.height_m, l.x_m, l.y_m, l.z_m, l.theta_rad, l.roll_rad, \
              l.tilt_rad, l.place_covariance, l.size_from_views FROM maps m JOIN landmarks l ON l.map_id = m.id \
-             LEFT JOIN views v ON v.landmark_id = l.id WHERE m.name = ?1 AND l.name = ?2 GROUP BY l.id";
+             WHERE m.name = ?1 AND l.name = ?2";
 }
 
 /// Two sizes are the same up to the rounding of their text.
@@ -34,15 +33,14 @@ const SAME_SIZE_M: f64 = 1e-6;
 /// How often a write is prepared before its caller is told to try again.
 pub(super) const ATTEMPTS: usize = 5;
 
-/// What a landmark's place and the novelty of its views rest on (optimistic locking). Views never change and their numbers
-/// are never used again, so count and last number identify a set of views.
+/// What a landmark's place and the novelty of its views rest on (optimistic locking). The revision changes with the views, and
+/// never comes back.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Stamp {
     map: i64,
     walls_version: i64,
     landmark: i64,
-    views: i64,
-    last_view: i64,
+    revision: i64,
     pub(super) geometry: LandmarkGeometry,
 }
 
@@ -69,8 +67,7 @@ pub(super) async fn stamp(
         map: number("map")?,
         walls_version: number("walls_version")?,
         landmark: number("landmark")?,
-        views: number("views")?,
-        last_view: number("last_view")?,
+        revision: number("revision")?,
         geometry: landmarks::geometry(&row).map_err(at())?,
     }))
 }
@@ -325,7 +322,8 @@ mod tests {
         let another = async || drop(add(&store, teaching(3)).await.unwrap());
         assert!(refused(&store, 2, another).await, "another view, and another place");
         let deleted = async || {
-            let last = stamp(store.reads(), "a", "p1").await.unwrap().unwrap().last_view;
+            let landmark = landmarks::get(store.reads(), "a", "p1").await.unwrap().id;
+            let last = views::page(store.reads(), landmark, 0, 9).await.unwrap().last().unwrap().id;
             store.write(move |tx| Box::pin(views::delete(tx, "a", "p1", last))).await.unwrap();
         };
         assert!(refused(&store, 2, deleted).await, "a view less");

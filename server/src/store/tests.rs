@@ -31,7 +31,7 @@ async fn every_statement_prepares_on_the_migrated_schema() {
         revisions::ALL,
         map_rows::ALL,
     ];
-    for (name, sql) in all.into_iter().flatten() {
+    for (name, sql) in all.into_iter().chain(history::EVERY).flatten() {
         if let Err(error) = opened.writer.prepare(sql.into_sql_str()).await {
             panic!("{name}: {error}");
         }

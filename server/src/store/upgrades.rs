@@ -2,7 +2,7 @@
 //! a server of each step's time wrote after it.
 
 use super::{
-    gatherings, jobs, landmarks, maps,
+    gatherings, history, jobs, landmarks, maps,
     migrations::migrator,
     modality_stats, open,
     pictures::{self, digest, hex},
@@ -125,6 +125,12 @@ async fn a_database_of_every_schema_opens_with_all_its_rows() {
             let row = underlays::get(db, (1, "office")).await.unwrap();
             assert_eq!(pictures::read(&store, &row.image_sha256).await.unwrap(), UNDERLAY, "schema {schema}");
         }
+        // The state that the upgrade found can be gone back to.
+        let found = history::newest(db, 1).await.unwrap();
+        store.write(|tx| Box::pin(landmarks::delete(tx, "office", "door"))).await.unwrap();
+        store.write(move |tx| Box::pin(history::roll_back(tx, "office", found))).await.unwrap();
+        assert_eq!(landmarks::get(db, "office", "door").await.unwrap().model, door.model, "schema {schema}");
+        assert_eq!(views::page(db, 1, 0, 9).await.unwrap()[0].id, 1, "schema {schema}");
         tasks.close().await;
     }
 }

@@ -1,6 +1,8 @@
 //! The only connection that writes, owned by one task. A write is a closure that runs inside BEGIN IMMEDIATE. The order is
 //! commit -> publish the snapshot -> acknowledge, so a crash undoes nothing that was matched or acknowledged.
 //!
+//! What a write changed of maps becomes commits of their history in the same transaction ([`history::close`]).
+//!
 //! A write whose caller drops it before its transaction begins is skipped. After that it runs to its end in this task, with
 //! what must follow the commit ([`Tx::after`]).
 //!
@@ -11,6 +13,7 @@ use super::{
     actor::Actor,
     audit,
     error::StoreError,
+    history::{self, Author, HistoryLimits},
     kept_answers::Keeping,
     note_head,
     on_commit::{CommittedChange, OnCommit},
@@ -35,6 +38,9 @@ type After = Box<dyn FnOnce() + Send>;
 pub(crate) struct Tx {
     /// The writer's connection, inside a transaction.
     pub(super) conn: SqliteConnection,
+    /// In whose name it writes.
+    pub(super) author: Author,
+    pub(super) history: HistoryLimits,
     changes: Vec<CommittedChange>,
     after: Vec<After>,
 }
@@ -110,8 +116,10 @@ where
         Box::pin(async move {
             // Unwind safety: the closure's changes are in the transaction, which is rolled back.
             let all = async {
+                tx.author = actor.as_deref().map(Author::from).unwrap_or_default();
                 let before = audit::total_changes(tx).await?;
                 let made = write(tx).await?;
+                history::close(tx).await?;
                 log(tx, actor.as_deref(), before, audit_entries).await?;
                 if let Some(keeping) = &keeping {
                     let answer = keeping.answer_to(&made);
@@ -164,11 +172,12 @@ impl Writer {
     pub(super) fn new(
         conn: SqliteConnection,
         commands: mpsc::Receiver<Command>,
+        history: HistoryLimits,
         on_commit: Arc<dyn OnCommit>,
         vitals: Arc<Vitals>,
         jobs: Arc<Notify>,
     ) -> Self {
-        let tx = Tx { conn, changes: Vec::new(), after: Vec::new() };
+        let tx = Tx { conn, author: Author::default(), history, changes: Vec::new(), after: Vec::new() };
         Self { tx, commands, on_commit, vitals, jobs }
     }
 

@@ -57,6 +57,11 @@ OPERATIONS: dict[str, tuple[str, str]] = {
     "discard_track": ("DELETE", "/maps/{map}/gatherings/{gathering}/tracks/{track}"),
     "track_icon": ("GET", "/maps/{map}/gatherings/{gathering}/tracks/{track}/views/{view}/icon"),
     "accept_tracks": ("POST", "/maps/{map}/gatherings/{gathering}/accept"),
+    "commits": ("GET", "/maps/{map}/commits"),
+    "commit": ("GET", "/maps/{map}/commits/{commit}"),
+    "difference": ("GET", "/maps/{map}/difference"),
+    "roll_back": ("POST", "/maps/{map}/rollback"),
+    "undo_commit": ("POST", "/maps/{map}/commits/{commit}/undo"),
     "health": ("GET", "/healthz"),
     "readiness": ("GET", "/readyz"),
     "version": ("GET", "/version"),
@@ -159,6 +164,8 @@ CHANGES = frozenset(
         "set_modalities",
         "update_landmark",
         "delete_landmark",
+        "roll_back",
+        "undo_commit",
     }
 )
 # Pause before a repeat, where the server says none, and the longest, in seconds.
@@ -192,14 +199,17 @@ def request_of(call: str, at: Sequence[str | int]) -> tuple[str, str]:
     return method, made
 
 
-def headers_of(call: str, key: str | None, revision: str | None) -> dict[str, str]:
+def headers_of(call: str, key: str | None, revision: str | None, why: str | None) -> dict[str, str]:
     """The headers of an operation: a key for a creation, a fresh one unless it is given; for a change of what has a
-    revision, the one it is meant for."""
+    revision, the one it is meant for; and the reason of a change."""
+    headers = {}
+    if why is not None and OPERATIONS[call][0] != "GET":
+        headers["waymark-why"] = quote(why, safe="")
     if call in CREATIONS:
-        return {"idempotency-key": key if key is not None else uuid.uuid4().hex}
+        headers["idempotency-key"] = key if key is not None else uuid.uuid4().hex
     if call in CHANGES:
-        return {"if-match": "*" if revision is None else f'"{revision}"'}
-    return {}
+        headers["if-match"] = "*" if revision is None else f'"{revision}"'
+    return headers
 
 
 @dataclass(frozen=True, slots=True)

@@ -230,3 +230,44 @@ async fn look_alikes_at_different_places_are_a_class_that_a_pose_tells_apart() {
     assert_eq!(in_class, doors);
     assert!(map.look_alikes.classes.values().all(|members| members.len() == 3));
 }
+
+/// Landmark, digest, thresholds and all else of every stored model of the map, and whether its bytes have that digest.
+async fn stored_models(school: &School) -> Vec<String> {
+    let sql = "SELECT quote(m.landmark_id) || quote(m.sha256) || quote(m.params_hash) || m.active || m.reasons || m.facts || \
+               m.views || m.generated_views || m.learnt_ms || quote(m.looks_like) || quote(c.bytes) FROM models m \
+               JOIN model_contents c ON c.sha256 = m.sha256 ORDER BY m.landmark_id";
+    sqlx::query_scalar(sql).fetch_all(school.store.reads()).await.unwrap()
+}
+
+#[tokio::test]
+async fn a_wrong_view_is_undone_with_the_thresholds_of_all_others() {
+    use crate::store::history::{newest, roll_back, undo};
+    let school = School::open().await;
+    for (name, seed) in [("a", 1), ("b", 2), ("c", 3)] {
+        school.add(name, &nowhere()).await;
+        school.teach(name, seed, false).await;
+    }
+    school.learn(&[]).await;
+    let good = newest(school.store.reads(), 1).await.unwrap();
+    let (models, matched) = (stored_models(&school).await, school.matched());
+    assert_eq!(matched.len(), 3);
+
+    // A view of another poster, which looks like that of b: a is learnt, and b and c get its icons as negatives.
+    school.teach("a", 2, true).await;
+    school.learn(&["a"]).await;
+    let spoilt = stored_models(&school).await;
+    assert!(spoilt.iter().zip(&models).all(|(now, was)| now != was), "every model of the map is another");
+    let lesson = newest(school.store.reads(), 1).await.unwrap();
+
+    let back = |to: i64| school.store.write(move |tx| Box::pin(roll_back(tx, "a", to)));
+    assert!(back(good).await.unwrap());
+    assert!(stored_models(&school).await == models, "byte for byte");
+    assert_eq!(school.matched(), matched, "and so is what robots are answered with");
+    // Forth, and back without the lesson alone: the view stays.
+    assert!(back(lesson).await.unwrap());
+    assert!(stored_models(&school).await == spoilt);
+    let again = newest(school.store.reads(), 1).await.unwrap();
+    school.store.write(move |tx| Box::pin(undo(tx, "a", again))).await.unwrap();
+    assert!(stored_models(&school).await == models);
+    assert_eq!(school.matched(), matched);
+}

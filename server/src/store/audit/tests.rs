@@ -20,6 +20,8 @@ fn kim(target: &str) -> Actor {
         action: "POST /maps".to_owned(),
         target: target.to_owned(),
         request: Some("r-1".to_owned()),
+        job: None,
+        why: None,
     }
 }
 

@@ -1,5 +1,6 @@
 use super::*;
 use crate::{
+    config::{Config, RawConfig},
     publication::{Catalogue, CatalogueTasks, tests::config},
     store::{
         landmark_placement::tests::seen_from,
@@ -14,9 +15,11 @@ use sqlx::{ConnectOptions, Connection, migrate::Migrator, sqlite::SqliteConnectO
 use std::path::Path;
 use vision::recognise::DistanceKind;
 
-/// Map `a` with landmarks `p1` and `p2`.
+/// Map `a` with landmarks `p1` and `p2`, and the history of one commit.
 async fn store(dir: &Path) -> (Catalogue, CatalogueTasks) {
-    let (store, task) = Catalogue::open(&config(dir)).await.unwrap();
+    let mut raw = RawConfig { data: dir.to_owned(), ..RawConfig::default() };
+    raw.limits.kept_commits = 1;
+    let (store, task) = Catalogue::open(&Config::try_from(raw).unwrap()).await.unwrap();
     store.write(|tx| Box::pin(maps::create(tx, "a", DistanceKind::Both, 2))).await.unwrap();
     for name in ["p1", "p2"] {
         let none = LandmarkGeometry::default();
@@ -48,6 +51,12 @@ async fn put_underlay(store: &Catalogue, image: &'static [u8]) {
     store.write(move |tx| Box::pin(underlays::put(tx, "a", row, image))).await.unwrap();
 }
 
+/// Another commit, so that those before it are forgotten.
+async fn forget(store: &Catalogue) {
+    store.write(|tx| Box::pin(landmarks::rename(tx, "a", "p1", "other"))).await.unwrap();
+    store.write(|tx| Box::pin(landmarks::rename(tx, "a", "other", "p1"))).await.unwrap();
+}
+
 async fn count(store: &Catalogue) -> i64 {
     sqlx::query_scalar("SELECT count(*) FROM pictures").fetch_one(store.reads()).await.unwrap()
 }
@@ -64,6 +73,8 @@ async fn a_picture_is_stored_once_and_goes_with_the_last_row_that_refers_to_it()
     store.write(|tx| Box::pin(landmarks::delete(tx, "a", "p2"))).await.unwrap();
     assert_eq!(read(&store, &digest(b"one")).await.unwrap(), b"one", "the underlay shows it");
     put_underlay(&store, b"two").await;
+    assert_eq!(count(&store).await, 2, "kept for the way back");
+    forget(&store).await;
     assert_eq!(count(&store).await, 1, "replaced");
     assert!(matches!(read(&store, &digest(b"one")).await, Err(StoreError::NotFound { .. })));
     teach(&store, "p1", b"three").await;
@@ -100,6 +111,7 @@ async fn a_damaged_picture_is_named_and_mended_by_the_same_one() {
     assert_eq!(read(&store, &digest(b"one")).await.unwrap(), b"one");
     assert!(damaged(store.reads()).await.unwrap().is_empty());
     store.write(move |tx| Box::pin(views::delete(tx, "a", "p2", other))).await.unwrap();
+    forget(&store).await;
     assert_eq!(count(&store).await, 1);
 }
 

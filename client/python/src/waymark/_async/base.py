@@ -55,6 +55,7 @@ class AsyncBase:
         self._local_port = _local_token.local_port(self._base) if token is None else None
         self._key: str | None = None
         self._revision: str | None = None
+        self._why: str | None = None
         # Ignores proxies of the environment: the server is in the robot's own network.
         self._http = httpx.AsyncClient(
             base_url=self._base, timeout=TIMEOUT_S, trust_env=False, verify=trusted(self._base, authority)
@@ -76,6 +77,12 @@ class AsyncBase:
         other._revision = revision
         return other
 
+    def with_reason(self: B, why: str) -> B:
+        """The same with this reason for its changes: the history of the map has it. One line, 1 to 200 characters."""
+        other = copy.copy(self)
+        other._why = why
+        return other
+
     async def aclose(self) -> None:
         """Closes its connections."""
         await self._http.aclose()
@@ -87,7 +94,7 @@ class AsyncBase:
         self, call: str, at: Sequence[str | int], is_stream: bool = False, **parts: Any
     ) -> httpx.Response:
         method, path = request_of(call, at)
-        headers = headers_of(call, self._key, self._revision)
+        headers = headers_of(call, self._key, self._revision, self._why)
         answer = await self._answer(method, path, headers, is_stream, parts)
         pause_s = pause_of(call, answer)
         if pause_s is not None:

@@ -47,6 +47,7 @@ class Base:
         self._local_port = _local_token.local_port(self._base) if token is None else None
         self._key: str | None = None
         self._revision: str | None = None
+        self._why: str | None = None
         # Ignores proxies of the environment: the server is in the robot's own network.
         self._http = httpx.Client(base_url=self._base, timeout=TIMEOUT_S, trust_env=False)
 
@@ -66,6 +67,12 @@ class Base:
         other._revision = revision
         return other
 
+    def with_reason(self: B, why: str) -> B:
+        """The same with this reason for its changes: the history of the map has it. One line, 1 to 200 characters."""
+        other = copy.copy(self)
+        other._why = why
+        return other
+
     def close(self) -> None:
         """Closes its connections."""
         self._http.close()
@@ -75,7 +82,7 @@ class Base:
 
     def _checked(self, call: str, at: Sequence[str | int], is_stream: bool = False, **parts: Any) -> httpx.Response:
         method, path = request_of(call, at)
-        headers = headers_of(call, self._key, self._revision)
+        headers = headers_of(call, self._key, self._revision, self._why)
         answer = self._answer(method, path, headers, is_stream, parts)
         pause_s = pause_of(call, answer)
         if pause_s is not None:

@@ -11,7 +11,9 @@ from waymark._sync.base import Base, Events, Stream
 from waymark._values import UNSET, Unset, given, present, to_json
 from waymark.api import (
     Backup,
+    Commit,
     CoverageResponse,
+    Difference,
     Distance,
     GazeRankingBody,
     Health,
@@ -21,6 +23,7 @@ from waymark.api import (
     Parent,
     PoseBody,
     Readiness,
+    RollbackOutcome,
     TransformResponse,
     Underlay,
     UnderlayPlace,
@@ -125,6 +128,28 @@ class Maps(Base):
     def delete_map(self, map: str) -> None:
         """Deletes a map and all that is in it."""
         self._done("delete_map", map)
+
+    def commits(self, map: str) -> tuple[Commit, ...]:
+        """All kept commits of a map, newest first: who changed what, when and why."""
+        return self._all(Commit, "commits", map)
+
+    def commit(self, map: str, commit: int) -> Commit:
+        """One kept commit; `Refused` with code `unknown_commit` if it is not kept any more."""
+        return self._send(Commit, "commit", map, commit)
+
+    def difference(self, map: str, since: int, to: int | None = None, *, cursor: str | None = None) -> Difference:
+        """What differs between a map at the commit `since` and at a later one, or now. `landmarks.next` is the cursor of
+        the next page of landmarks."""
+        query = {"from": since, **present(to=to, cursor=cursor)}
+        return self._send(Difference, "difference", map, params=query)
+
+    def roll_back(self, map: str, to: int) -> RollbackOutcome:
+        """Makes a map what it was at a kept commit, by a commit of its own."""
+        return self._send(RollbackOutcome, "roll_back", map, json={"to": to})
+
+    def undo_commit(self, map: str, commit: int) -> RollbackOutcome:
+        """Takes one commit back; `Refused` with code `changed_since` if a later one has changed the same."""
+        return self._send(RollbackOutcome, "undo_commit", map, commit)
 
     def transform(self, map: str, to: str, pose: Pose2 | None = None) -> TransformResponse:
         """How a map lies in another one, and a pose converted by it."""

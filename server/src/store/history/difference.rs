@@ -1,0 +1,309 @@
+//! What differs between a map at one commit and at a later one. A row that was changed and changed back does not differ.
+//! Distractors are left out: nobody edits them.
+
+use super::before;
+use crate::store::{StoreError, statements::statements, walls::Ends};
+use protos::api::{ChangeSummary, WallsDifference};
+use sqlx::{Row, SqliteConnection, sqlite::SqliteRow};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// How much of a row there is at ?3: as the oldest later commit has stored it, or as it is.
+macro_rules! is_present {
+    ($table:literal, $past:literal) => {
+        concat!(
+            "coalesce((SELECT l.present FROM ",
+            $past,
+            " l WHERE l.id = f.id AND l.commit_id > ?3 \
+             ORDER BY l.commit_id LIMIT 1), EXISTS (SELECT 1 FROM ",
+            $table,
+            " t WHERE t.id = f.id))"
+        )
+    };
+}
+
+/// The columns of a row before, and of the same row at ?3.
+macro_rules! with_later {
+    ($table:literal, $past:literal, $key:literal, $columns:literal) => {
+        concat!(
+            "WITH f AS ",
+            before!($past, $key),
+            ", later AS (SELECT *, min(commit_id) FROM ",
+            $past,
+            " WHERE commit_id > ?3 AND ",
+            $key,
+            " IN (SELECT ",
+            $key,
+            " FROM f) GROUP BY ",
+            $key,
+            "), n AS (SELECT ",
+            $key,
+            ", present, ",
+            $columns,
+            " FROM later UNION ALL SELECT ",
+            $key,
+            ", 1, ",
+            $columns,
+            " FROM ",
+            $table,
+            " WHERE ",
+            $key,
+            " IN (SELECT ",
+            $key,
+            " FROM f) AND ",
+            $key,
+            " NOT IN (SELECT ",
+            $key,
+            " FROM later)) "
+        )
+    };
+}
+
+statements! {
+    LANDMARKS = concat!(with_later!("landmarks", "past_landmarks", "id", "name, width_m, height_m, x_m, y_m, z_m, theta_rad, \
+                roll_rad, tilt_rad, place_covariance, size_from_views"),
+                "SELECT f.id, f.present AS was, coalesce(n.present, 0) AS is_now, f.name AS old_name, n.name AS new_name, \
+                f.name IS NOT n.name AS name, f.width_m IS NOT n.width_m OR f.height_m IS NOT n.height_m OR \
+                f.size_from_views IS NOT n.size_from_views AS size, f.x_m IS NOT n.x_m OR f.y_m IS NOT n.y_m OR \
+                f.z_m IS NOT n.z_m OR f.theta_rad IS NOT n.theta_rad OR f.roll_rad IS NOT n.roll_rad OR \
+                f.tilt_rad IS NOT n.tilt_rad OR f.place_covariance IS NOT n.place_covariance AS place \
+                FROM f LEFT JOIN n ON n.id = f.id");
+    VIEWS = concat!("SELECT landmark_id, sum(was = 0 AND is_now = 1) AS added, sum(was = 1 AND is_now = 0) AS removed FROM \
+            (SELECT f.landmark_id, f.present AS was, ", is_present!("views", "past_views"), " AS is_now FROM ",
+            before!("past_views", "id"), " f) GROUP BY landmark_id HAVING added + removed > 0");
+    MODELS = concat!(with_later!("models", "past_models", "landmark_id", "sha256, active"),
+             "SELECT f.landmark_id FROM f LEFT JOIN n ON n.landmark_id = f.landmark_id \
+             WHERE f.sha256 IS NOT n.sha256 OR f.active IS NOT n.active");
+    RUNS = concat!("SELECT coalesce(sum(was = 0 AND is_now = 1), 0) AS added, coalesce(sum(was = 1 AND is_now = 0), 0) AS removed \
+           FROM (SELECT f.present AS was, ", is_present!("runs", "past_runs"), " AS is_now FROM ",
+           before!("past_runs", "id"), " f)");
+    UNDERLAY = concat!(with_later!("underlays", "past_underlays", "map_id", "image_sha256, metres_per_pixel, x_m, y_m, \
+               theta_rad"),
+               "SELECT count(*) FROM f LEFT JOIN n ON n.map_id = f.map_id WHERE f.image_sha256 IS NOT n.image_sha256 \
+               OR f.metres_per_pixel IS NOT n.metres_per_pixel OR f.x_m IS NOT n.x_m OR f.y_m IS NOT n.y_m \
+               OR f.theta_rad IS NOT n.theta_rad");
+    SETTINGS = concat!(with_later!("maps", "past_maps", "id", "name, site, building, floor, parent_id, parent_from_map, \
+               fusion, areas, sight"),
+               "SELECT f.name IS NOT n.name AS name, f.site IS NOT n.site AS site, f.building IS NOT n.building AS building, \
+               f.floor IS NOT n.floor AS floor, f.parent_id IS NOT n.parent_id OR f.parent_from_map IS NOT \
+               n.parent_from_map AS parent, f.fusion IS NOT n.fusion AS fusion_mode, f.areas IS NOT n.areas AS areas, \
+               f.sight IS NOT n.sight AS visibility_settings FROM f JOIN n ON n.id = f.id");
+    WALLS_BEFORE = "SELECT min(id) FROM commits WHERE map_id = ?1 AND walls = 1 AND id > ?2 AND id <= ?3";
+    WALLS_AFTER = "SELECT min(id) FROM commits WHERE map_id = ?1 AND walls = 1 AND id > ?2";
+    PAST_WALLS = "SELECT ax_m, ay_m, bx_m, by_m FROM past_walls WHERE commit_id = ?1";
+    NOW_WALLS = "SELECT ax_m, ay_m, bx_m, by_m FROM laser_segments WHERE map_id = ?1";
+    NAME_AT = "SELECT coalesce((SELECT name FROM past_landmarks WHERE id = ?1 AND commit_id > ?2 AND present = 1 \
+               ORDER BY commit_id LIMIT 1), (SELECT name FROM landmarks WHERE id = ?1), '')";
+}
+
+/// Words for settings; also the columns of `SETTINGS`.
+const SETTINGS_OF_MAP: [&str; 8] =
+    ["name", "site", "building", "floor", "parent", "fusion_mode", "areas", "visibility_settings"];
+/// Words for what a person edits of a landmark; also columns of `LANDMARKS`.
+const FIELDS: [&str; 3] = ["name", "size", "place"];
+/// Landmarks that a summary names.
+const MAX_NAMED: usize = 8;
+
+/// What changed of a landmark.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct LandmarkChange {
+    /// It was there before, it is there after.
+    pub(crate) present: [bool; 2],
+    /// Name before and after, where they are known from its row.
+    pub(crate) names: [Option<String>; 2],
+    /// Of a landmark that stays: which of [`FIELDS`] differ.
+    pub(crate) fields: Vec<&'static str>,
+    /// Views added, views removed.
+    pub(crate) views: [u64; 2],
+    /// Its model or the thresholds in it differ.
+    pub(crate) model: bool,
+}
+
+impl Default for LandmarkChange {
+    /// A landmark whose row has not changed is there all the time.
+    fn default() -> Self {
+        Self { present: [true; 2], names: [None, None], fields: Vec::new(), views: [0; 2], model: false }
+    }
+}
+
+/// What differs between two states of a map.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct Difference {
+    /// By number.
+    pub(crate) landmarks: BTreeMap<i64, LandmarkChange>,
+    pub(crate) walls: Option<WallsDifference>,
+    /// Which of [`SETTINGS_OF_MAP`].
+    pub(crate) settings: Vec<&'static str>,
+    pub(crate) underlay: bool,
+    /// Reference runs added, removed.
+    pub(crate) runs: [u64; 2],
+}
+
+/// What differs between the states after the commits `from` and `to` of a map; `from` is less than `to`.
+pub(crate) async fn between(
+    conn: &mut SqliteConnection,
+    map: i64,
+    (from, to): (i64, i64),
+) -> Result<Difference, StoreError> {
+    let at = || StoreError::during("compare versions");
+    let mut made = Difference::default();
+    for row in rows(conn, LANDMARKS, map, (from, to)).await? {
+        let (id, change) = landmark_change(&row).map_err(at())?;
+        if change.present[0] != change.present[1] || !change.fields.is_empty() {
+            made.landmarks.insert(id, change);
+        }
+    }
+    for row in rows(conn, VIEWS, map, (from, to)).await? {
+        let count = |column: &str| row.try_get::<i64, _>(column).map(|n| n as u64).map_err(at());
+        let change = made.landmarks.entry(row.try_get("landmark_id").map_err(at())?).or_default();
+        change.views = [count("added")?, count("removed")?];
+    }
+    for row in rows(conn, MODELS, map, (from, to)).await? {
+        made.landmarks.entry(row.try_get(0).map_err(at())?).or_default().model = true;
+    }
+    for row in rows(conn, SETTINGS, map, (from, to)).await? {
+        for word in SETTINGS_OF_MAP {
+            if row.try_get(word).map_err(at())? {
+                made.settings.push(word);
+            }
+        }
+    }
+    for row in rows(conn, RUNS, map, (from, to)).await? {
+        let count = |column: &str| row.try_get::<i64, _>(column).map(|n| n as u64).map_err(at());
+        made.runs = [count("added")?, count("removed")?];
+    }
+    for row in rows(conn, UNDERLAY, map, (from, to)).await? {
+        made.underlay = row.try_get::<i64, _>(0).map_err(at())? > 0;
+    }
+    made.walls = walls(conn, map, (from, to)).await?;
+    Ok(made)
+}
+
+async fn rows(
+    conn: &mut SqliteConnection,
+    sql: &'static str,
+    map: i64,
+    (from, to): (i64, i64),
+) -> Result<Vec<SqliteRow>, StoreError> {
+    let rows = sqlx::query(sql).bind(map).bind(from).bind(to).fetch_all(conn).await;
+    rows.map_err(StoreError::during("compare versions"))
+}
+
+fn landmark_change(row: &SqliteRow) -> Result<(i64, LandmarkChange), sqlx::Error> {
+    let present = [row.try_get("was")?, row.try_get("is_now")?];
+    let mut fields = Vec::new();
+    for word in FIELDS {
+        if present == [true; 2] && row.try_get(word)? {
+            fields.push(word);
+        }
+    }
+    let names = [row.try_get("old_name")?, row.try_get("new_name")?];
+    Ok((row.try_get("id")?, LandmarkChange { present, names, fields, ..LandmarkChange::default() }))
+}
+
+async fn walls(
+    conn: &mut SqliteConnection,
+    map: i64,
+    (from, to): (i64, i64),
+) -> Result<Option<WallsDifference>, StoreError> {
+    let at = || StoreError::during("compare walls");
+    let first: Option<i64> = sqlx::query_scalar(WALLS_BEFORE)
+        .bind(map)
+        .bind(from)
+        .bind(to)
+        .fetch_one(&mut *conn)
+        .await
+        .map_err(at())?;
+    let Some(first) = first else { return Ok(None) };
+    let later: Option<i64> =
+        sqlx::query_scalar(WALLS_AFTER).bind(map).bind(to).fetch_one(&mut *conn).await.map_err(at())?;
+    let before = segments(&mut *conn, PAST_WALLS, first).await?;
+    let after = match later {
+        Some(later) => segments(&mut *conn, PAST_WALLS, later).await?,
+        None => segments(&mut *conn, NOW_WALLS, map).await?,
+    };
+    Ok(walls_difference(&before, &after))
+}
+
+async fn segments(conn: &mut SqliteConnection, sql: &'static str, of: i64) -> Result<Vec<Ends>, StoreError> {
+    let at = || StoreError::during("compare walls");
+    let rows = sqlx::query(sql).bind(of).fetch_all(conn).await.map_err(at())?;
+    let ends = |row: &SqliteRow| {
+        Ok::<_, sqlx::Error>([row.try_get(0)?, row.try_get(1)?, row.try_get(2)?, row.try_get(3)?])
+    };
+    rows.iter().map(ends).collect::<Result<_, _>>().map_err(at())
+}
+
+/// `None` where both have the same segments, in any order.
+fn walls_difference(before: &[Ends], after: &[Ends]) -> Option<WallsDifference> {
+    let bits = |segments: &[Ends]| -> BTreeSet<[u64; 4]> {
+        segments.iter().map(|ends| ends.map(f64::to_bits)).collect()
+    };
+    let (old, new) = (bits(before), bits(after));
+    let (added, removed) = (new.difference(&old).count(), old.difference(&new).count());
+    if added + removed == 0 && before.len() == after.len() {
+        return None;
+    }
+    let mut bounds_m = None::<[f64; 4]>;
+    for [ax, ay, bx, by] in old.symmetric_difference(&new).map(|ends| ends.map(f64::from_bits)) {
+        let one = [ax.min(bx), ay.min(by), ax.max(bx), ay.max(by)];
+        let all = bounds_m.unwrap_or(one);
+        let wider = [all[0].min(one[0]), all[1].min(one[1]), all[2].max(one[2]), all[3].max(one[3])];
+        bounds_m = Some(wider);
+    }
+    let count = |n: usize| n as u64;
+    Some(WallsDifference {
+        before: count(before.len()),
+        after: count(after.len()),
+        added: count(added),
+        removed: count(removed),
+        bounds_m,
+    })
+}
+
+/// Counts of a difference, with the names of its first landmarks, as they are at commit `to`.
+pub(crate) async fn summary(
+    conn: &mut SqliteConnection,
+    of: &Difference,
+    to: i64,
+) -> Result<ChangeSummary, StoreError> {
+    let count =
+        |test: &dyn Fn(&LandmarkChange) -> bool| of.landmarks.values().filter(|c| test(c)).count() as u64;
+    let named: Vec<i64> = of.landmarks.keys().copied().take(MAX_NAMED).collect();
+    Ok(ChangeSummary {
+        landmarks_added: count(&|c| c.present == [false, true]),
+        landmarks_removed: count(&|c| c.present == [true, false]),
+        landmarks_changed: count(&|c| c.present == [true, true]),
+        views_added: of.landmarks.values().map(|c| c.views[0]).sum(),
+        views_removed: of.landmarks.values().map(|c| c.views[1]).sum(),
+        models_changed: count(&|c| c.model),
+        walls_changed: of.walls.is_some(),
+        underlay_changed: of.underlay,
+        reference_runs_added: of.runs[0],
+        reference_runs_removed: of.runs[1],
+        settings: of.settings.iter().map(ToString::to_string).collect(),
+        landmarks: names_at(conn, of, &named, to).await?,
+    })
+}
+
+/// The names of these landmarks: after the change, or before it if they are gone.
+pub(crate) async fn names_at(
+    conn: &mut SqliteConnection,
+    of: &Difference,
+    ids: &[i64],
+    to: i64,
+) -> Result<Vec<String>, StoreError> {
+    let mut names = Vec::with_capacity(ids.len());
+    for id in ids {
+        let known = of.landmarks.get(id).and_then(|c| c.names[1].clone().or_else(|| c.names[0].clone()));
+        names.push(match known {
+            Some(name) => name,
+            None => sqlx::query_scalar(NAME_AT)
+                .bind(id)
+                .bind(to)
+                .fetch_one(&mut *conn)
+                .await
+                .map_err(StoreError::during("read the name of a landmark"))?,
+        });
+    }
+    Ok(names)
+}
