@@ -25,6 +25,7 @@ pub mod dominant;
 pub mod epochs;
 pub mod gaze;
 pub mod findings;
+pub mod answer_records;
 pub mod fixes;
 pub mod frame_analysis;
 pub mod frame_answer;

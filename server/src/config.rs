@@ -163,6 +163,8 @@ pub struct Limits {
     pub jobs: usize,
     /// Finished jobs that are retained.
     pub jobs_kept: usize,
+    /// Answers to frames that are stored; the oldest go.
+    pub stored_answers: usize,
     /// Answers to creations that are kept for repeats, for a day at most; the oldest go.
     pub kept_answers: usize,
 }
@@ -193,6 +195,7 @@ impl Default for Limits {
             write_queue: 256,
             jobs: 64,
             jobs_kept: 1_000,
+            stored_answers: 2_000,
             kept_answers: 10_000,
         }
     }
@@ -200,7 +203,7 @@ impl Default for Limits {
 
 impl Limits {
     /// Name and value of every bound that must not be 0.
-    fn counts(&self) -> [(&'static str, usize); 22] {
+    fn counts(&self) -> [(&'static str, usize); 23] {
         [
             ("limits.frame_bytes", self.frame_bytes),
             ("limits.frame_pixels", self.frame_pixels),
@@ -223,6 +226,7 @@ impl Limits {
             ("limits.page", self.page),
             ("limits.write_queue", self.write_queue),
             ("limits.jobs", self.jobs),
+            ("limits.stored_answers", self.stored_answers),
             ("limits.kept_answers", self.kept_answers),
         ]
     }

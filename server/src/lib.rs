@@ -11,6 +11,7 @@ pub mod ros2;
 mod store;
 mod publication;
 mod failed_gates;
+mod recording_answers;
 mod jobs;
 pub mod gather;
 pub mod calibrating;

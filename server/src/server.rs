@@ -9,10 +9,12 @@ use crate::{
     identity::{Sessions, TokenId, local_token::LocalToken},
     jobs::Jobs,
     publication::{Catalogue, CatalogueTasks},
+    recording_answers::store_answers,
     ros2::Ros2,
     store::{OpenError, StoreError, landmarks, pictures},
 };
 use engine::{
+    answer_records::{AnswerRecorder, answer_records},
     decode::ImageLimits,
     findings::{FindingSender, LandmarkFinding, findings},
     intake::{FrameJob, Intake},
@@ -107,6 +109,7 @@ struct Tasks {
     http: JoinHandle<()>,
     jobs: JoinHandle<()>,
     findings: JoinHandle<()>,
+    answers: JoinHandle<()>,
     gather: JoinHandle<()>,
     pictures: JoinHandle<()>,
     backups: JoinHandle<()>,
@@ -131,13 +134,17 @@ impl Server {
         let (tap, offered) = gather::gathering_tap();
         let teaching = Teaching::start(&config, &store, (&tap, offered), &stopping).await?;
         let (findings, found) = findings();
-        let engine = engine(&config, snapshots.clone(), vitals.clone(), (findings, tap));
+        let (records, recorded) = answer_records();
+        let engine = engine(&config, snapshots.clone(), vitals.clone(), (findings, records, tap));
         let is_on =
             |map: &Name, robot: &Name| snapshots.robot_map(robot.as_str()).as_deref() == Some(map.as_str());
         engine.motion.mappings().count_in(vitals.panics().clone());
         engine.motion.mappings().resume_in(config.data.join("mapping"), is_on);
         let pulse = vitals.begin("the task that stores findings");
         let findings = tokio::spawn(store_findings(store.clone(), found, pulse));
+        let pulse = (vitals.begin("the task that stores answers"), stopping.clone());
+        let max = config.limits.stored_answers;
+        let answers = tokio::spawn(store_answers(store.clone(), recorded, max, pulse));
         let pictures = tokio::spawn(pictures::check_all((*store).clone(), stopping.clone()));
         let (live, slots) = (engine.live.clone(), engine.slots.clone());
         let to = receivers(&config, &engine);
@@ -166,6 +173,7 @@ impl Server {
             http,
             jobs: teaching.jobs_task,
             findings,
+            answers,
             gather: teaching.gather_task,
             pictures,
             backups: backups_task,
@@ -234,7 +242,7 @@ fn engine(
     config: &Config,
     snapshots: Arc<Snapshots>,
     vitals: Arc<Vitals>,
-    (findings, frame_tap): (FindingSender, GatheringTap),
+    (findings, records, frame_tap): (FindingSender, AnswerRecorder, GatheringTap),
 ) -> Engine {
     let live = Arc::new(LiveHub::default());
     Engine {
@@ -245,6 +253,7 @@ fn engine(
         limits: ImageLimits { bytes: config.limits.frame_bytes, pixels: config.limits.frame_pixels },
         vitals,
         findings,
+        records,
         relocalisers: Arc::default(),
         frame_tap: Arc::new(frame_tap),
         search_every_frame: config.search_every_frame,
@@ -316,7 +325,7 @@ impl RunningServer {
         self.vitals.stop();
         self.local_token.remove();
         self.stop.send_replace(true);
-        let Tasks { workers, bus, http, jobs, findings, gather, pictures, backups, writer, watch } =
+        let Tasks { workers, bus, http, jobs, findings, answers, gather, pictures, backups, writer, watch } =
             self.tasks;
         watch.abort();
         // Workers first: what they have in work is still answered over the open bus.
@@ -330,6 +339,7 @@ impl RunningServer {
             ("HTTP", http),
             ("jobs", jobs),
             ("findings", findings),
+            ("stored answers", answers),
             ("gathering", gather),
             ("the check of the pictures", pictures),
             ("the timetable of backups", backups),

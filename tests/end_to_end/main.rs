@@ -26,6 +26,7 @@ mod repeated_creations;
 mod restart;
 mod ros2_robots;
 mod several_maps;
+mod stored_answers;
 mod style;
 mod teach_and_recognise;
 mod tidy;

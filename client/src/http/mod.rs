@@ -8,6 +8,7 @@ mod events;
 mod form;
 mod gathering;
 mod health;
+mod landmark_models;
 mod landmarks;
 mod learning;
 mod live;
@@ -20,6 +21,7 @@ mod operation;
 mod recognise;
 mod reference_runs;
 mod robots;
+mod stored_answers;
 mod tokens;
 mod underlay;
 mod views;
@@ -42,6 +44,7 @@ pub fn operations() -> impl Iterator<Item = &'static Operation> {
         cameras::OPERATIONS,
         gathering::OPERATIONS,
         health::OPERATIONS,
+        landmark_models::OPERATIONS,
         landmarks::OPERATIONS,
         learning::OPERATIONS,
         live::OPERATIONS,
@@ -51,6 +54,7 @@ pub fn operations() -> impl Iterator<Item = &'static Operation> {
         recognise::OPERATIONS,
         reference_runs::OPERATIONS,
         robots::OPERATIONS,
+        stored_answers::OPERATIONS,
         tokens::OPERATIONS,
         underlay::OPERATIONS,
         views::OPERATIONS,

@@ -11,7 +11,7 @@ use crate::{
         Denial, Principal,
         authorisation::{self, Access, Forbidden, Scope},
     },
-    store::{StoreError, kind::Kind, now_ms},
+    store::{StoreError, kind::Kind, now_ms, stored_answers},
 };
 use axum::{
     extract::{FromRequestParts, MatchedPath, RawPathParams, Request, State},
@@ -114,6 +114,13 @@ async fn check_scope(
                 if principal.may_see(&job.map) { Ok(()) } else { Err(foreign().into()) }
             }
             // The handler says what is wrong with it.
+            Err(_) => Ok(()),
+        },
+        Scope::Answer => match value("answer").parse() {
+            Ok(id) => {
+                let map = stored_answers::map_of(app.store.reads(), id).await?;
+                if principal.may_see(&map) { Ok(()) } else { Err(stored_answers::unknown(id).into()) }
+            }
             Err(_) => Ok(()),
         },
         Scope::Own | Scope::Server => Ok(()),

@@ -109,6 +109,7 @@ impl From<StoreError> for ApiError {
                     Kind::Underlay => ("unknown_underlay", "underlay"),
                     Kind::Token => ("unknown_token", "token"),
                     Kind::Backup => ("unknown_backup", "backup"),
+                    Kind::Answer => ("unknown_answer", "answer"),
                     Kind::Model | Kind::Picture => ("not_found", "path"),
                 };
                 Self::new(StatusCode::NOT_FOUND, code, detail).field(field)

@@ -150,11 +150,7 @@ async fn list(
     let limit = page_limit(query.limit, app.config.limits.page)?;
     // Every number is less than that of the first page.
     let before = number_cursor(query.cursor.as_deref())?.unwrap_or(i64::MAX);
-    let maps = match query.map {
-        Some(map) => Some(if principal.may_see(&map) { vec![map] } else { Vec::new() }),
-        None => principal.maps.map(|maps| maps.into_iter().collect()),
-    };
-    let maps = maps.map(|names| serde_json::json!(names).to_string());
+    let maps = principal.visible_maps(query.map).map(|names| serde_json::json!(names).to_string());
     let filter = JobFilter { state: query.state.map(JobState::as_str), maps };
     let (jobs, total) = app.jobs.page(&filter, before, limit + 1).await?;
     Ok(Json(page(jobs, limit, total, |(row, _)| row.id.to_string(), |(row, p)| job_shown(row, p.as_ref()))))

@@ -7,6 +7,7 @@ mod lists;
 mod openapi;
 mod page_sessions;
 mod revision;
+mod stored_answers;
 mod teaching;
 
 use super::*;

@@ -19,6 +19,7 @@ pub(crate) enum Kind {
     Underlay,
     Token,
     Backup,
+    Answer,
 }
 
 impl fmt::Display for Kind {
@@ -38,6 +39,7 @@ impl fmt::Display for Kind {
             Self::Underlay => "underlay of map",
             Self::Token => "token",
             Self::Backup => "backup",
+            Self::Answer => "stored answer",
         })
     }
 }

@@ -27,6 +27,7 @@ async fn every_statement_prepares_on_the_migrated_schema() {
         tokens::ALL,
         jobs::ALL,
         kept_answers::ALL,
+        stored_answers::ALL,
         revisions::ALL,
         map_rows::ALL,
     ];

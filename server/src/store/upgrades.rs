@@ -97,7 +97,8 @@ async fn a_database_of_every_schema_opens_with_all_its_rows() {
         assert_eq!(door.health == LandmarkHealth::Flagged, schema >= 5, "schema {schema}");
         assert_eq!(landmarks::get(db, "office", "poster").await.unwrap().views, 1);
         for landmark in 1..=2 {
-            let rows = views::page(db, landmark, 0, 9).await.unwrap();
+            let rows =
+                views::page(db, landmark, views::ViewFilter::default(), (None, false), 9).await.unwrap();
             assert_eq!(
                 (rows[0].id, rows[0].size_px, rows[0].corners_px[2]),
                 (landmark, [640, 480], [9.0, 9.0])
