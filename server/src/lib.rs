@@ -5,6 +5,7 @@
 
 pub mod config;
 mod identity;
+mod events;
 pub mod backup;
 pub mod bus;
 pub mod ros2;

@@ -4,6 +4,7 @@ use crate::{
     backup::Backups,
     bus::{Bus, BusError, Receivers},
     config::Config,
+    events::watch_changes::watch_changes,
     gather::{self, Gatherer, GatheringTap, OfferedFrame},
     http::{self, App, Services},
     identity::{Sessions, TokenId, local_token::LocalToken},
@@ -110,6 +111,7 @@ struct Tasks {
     jobs: JoinHandle<()>,
     findings: JoinHandle<()>,
     answers: JoinHandle<()>,
+    events: JoinHandle<()>,
     gather: JoinHandle<()>,
     pictures: JoinHandle<()>,
     backups: JoinHandle<()>,
@@ -155,7 +157,11 @@ impl Server {
         vitals.probe("the outbox", move || outbox.is_running());
         let workers = Workers::start(&engine, config.workers, &publisher).map_err(StartError::Threads)?;
         let zenoh_endpoint = bus.endpoint().to_owned();
-        let (backups, backups_task) = Backups::start(&config, vitals.panics().clone(), stopping.clone());
+        let of = (vitals.panics().clone(), store.events().clone());
+        let (backups, backups_task) = Backups::start(&config, of, stopping.clone());
+        let watched = (snapshots.clone(), store.tokens().clone(), live.clone());
+        let pulse = (vitals.begin("the task that tells events"), stopping.clone());
+        let events = tokio::spawn(watch_changes(store.events().clone(), watched, pulse));
         let services = Services {
             jobs: teaching.jobs,
             gatherer: teaching.gatherer,
@@ -174,6 +180,7 @@ impl Server {
             jobs: teaching.jobs_task,
             findings,
             answers,
+            events,
             gather: teaching.gather_task,
             pictures,
             backups: backups_task,
@@ -325,8 +332,20 @@ impl RunningServer {
         self.vitals.stop();
         self.local_token.remove();
         self.stop.send_replace(true);
-        let Tasks { workers, bus, http, jobs, findings, answers, gather, pictures, backups, writer, watch } =
-            self.tasks;
+        let Tasks {
+            workers,
+            bus,
+            http,
+            jobs,
+            findings,
+            answers,
+            events,
+            gather,
+            pictures,
+            backups,
+            writer,
+            watch,
+        } = self.tasks;
         watch.abort();
         // Workers first: what they have in work is still answered over the open bus.
         let workers = tokio::task::spawn_blocking(move || workers.stop());
@@ -340,6 +359,7 @@ impl RunningServer {
             ("jobs", jobs),
             ("findings", findings),
             ("stored answers", answers),
+            ("events", events),
             ("gathering", gather),
             ("the check of the pictures", pictures),
             ("the timetable of backups", backups),

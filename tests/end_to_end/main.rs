@@ -9,6 +9,7 @@ mod command_line;
 mod demo;
 mod detect_command;
 mod earlier_database;
+mod event_stream;
 mod gathered_drive;
 mod guided;
 mod guides;

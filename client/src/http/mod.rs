@@ -21,6 +21,7 @@ mod operation;
 mod recognise;
 mod reference_runs;
 mod robots;
+mod server_events;
 mod stored_answers;
 mod tokens;
 mod underlay;
@@ -35,6 +36,7 @@ pub use learning::JobEvents;
 pub use live::LiveEvents;
 pub use map_client::{MapClient, Revised};
 pub use operation::Operation;
+pub use server_events::ServerEvents;
 pub use views::{LandmarkRegion, NewView};
 
 /// Every operation that [`MapClient`] has a method for.
@@ -54,6 +56,7 @@ pub fn operations() -> impl Iterator<Item = &'static Operation> {
         recognise::OPERATIONS,
         reference_runs::OPERATIONS,
         robots::OPERATIONS,
+        server_events::OPERATIONS,
         stored_answers::OPERATIONS,
         tokens::OPERATIONS,
         underlay::OPERATIONS,

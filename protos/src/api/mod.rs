@@ -9,6 +9,7 @@
 
 pub mod backups;
 pub mod cameras;
+pub mod events;
 pub mod failed_gates;
 pub mod gathering;
 pub mod health;
@@ -38,6 +39,7 @@ pub mod walls;
 
 pub use backups::*;
 pub use cameras::*;
+pub use events::*;
 pub use failed_gates::*;
 pub use gathering::*;
 pub use health::*;

@@ -13,11 +13,12 @@ pub use restore::{DirectoryError, RestoreError, StoppedServer, Verified, verify}
 
 use crate::{
     config::{BackupSettings, Config, MAX_KEPT},
+    events::EventLog,
     store::{StoreError, copies, kind::Kind, now_ms, pictures, restored},
 };
 use archive::{ArchiveError, Manifest};
 use engine::panics::{Edge, Panics};
-use protos::api::{Backup, BackupHealth, BackupMap, BackupState};
+use protos::api::{Backup, BackupHealth, BackupMap, BackupState, ServerEventBody};
 use sha2::{Digest as _, Sha256};
 use std::{
     fs, io,
@@ -68,6 +69,7 @@ pub(crate) struct Backups {
     folder: PathBuf,
     settings: BackupSettings,
     panics: Arc<Panics>,
+    events: Arc<EventLog>,
     state: Mutex<State>,
 }
 
@@ -75,7 +77,7 @@ impl Backups {
     /// Begins to keep the timetable. Removes what an earlier server has left half written.
     pub(crate) fn start(
         config: &Config,
-        panics: Arc<Panics>,
+        (panics, events): (Arc<Panics>, Arc<EventLog>),
         stopping: watch::Receiver<bool>,
     ) -> (Arc<Self>, JoinHandle<()>) {
         let folder = config.data.join("backups");
@@ -86,6 +88,7 @@ impl Backups {
             folder,
             settings: config.backup,
             panics,
+            events,
             state: Mutex::new(State { newest, ..State::default() }),
         });
         let task = tokio::spawn(backups.clone().keep_timetable(stopping));
@@ -128,6 +131,7 @@ impl Backups {
             state.running = Some((name.clone(), created_ms));
             name
         };
+        self.tell(&name, BackupState::Running);
         let (backups, runtime, work_name) = (self.clone(), Handle::current(), name.clone());
         let work =
             tokio::task::spawn_blocking(move || runtime.block_on(backups.make(&work_name, created_ms)));
@@ -182,15 +186,23 @@ impl Backups {
                 self.prune();
                 let mut state = self.state();
                 (state.running, state.failed) = (None, None);
-                state.newest = Some((name, created_ms));
+                state.newest = Some((name.clone(), created_ms));
+                drop(state);
+                self.tell(&name, BackupState::Complete);
             }
             Err(reason) => {
                 tracing::error!(name, reason, "backup_failed");
                 let mut state = self.state();
                 state.running = None;
-                state.failed = Some((name, created_ms, reason));
+                state.failed = Some((name.clone(), created_ms, reason));
+                drop(state);
+                self.tell(&name, BackupState::Failed);
             }
         }
+    }
+
+    fn tell(&self, name: &str, state: BackupState) {
+        self.events.tell(ServerEventBody::Backup { backup: name.to_owned(), state });
     }
 
     /// Removes all but the newest.

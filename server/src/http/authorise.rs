@@ -32,6 +32,14 @@ const FORWARDED: [&str; 2] = ["forwarded", "x-forwarded-for"];
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Peer(pub(crate) SocketAddr);
 
+/// Who asks, and by which session of the page.
+#[derive(Debug, Clone)]
+pub(super) struct Asker {
+    pub(super) principal: Principal,
+    /// Value of the session's cookie; `None` for a token.
+    pub(super) session: Option<String>,
+}
+
 /// The middleware.
 pub(super) async fn authorise(State(app): State<AppState>, request: Request, next: Next) -> Response {
     let (mut parts, body) = request.into_parts();
@@ -55,6 +63,9 @@ async fn admitted(app: &AppState, parts: &mut Parts) -> Result<(), ApiError> {
     let principal = principal(app, parts, role)?;
     authorisation::check(&principal, role, scope).map_err(|reason| forbidden(&principal, reason))?;
     check_scope(app, parts, &principal, scope).await?;
+    let is_session = !parts.headers.contains_key(header::AUTHORIZATION);
+    let session = session_cookie(&parts.headers).filter(|_| is_session).map(str::to_owned);
+    parts.extensions.insert(Asker { principal: principal.clone(), session });
     parts.extensions.insert(principal);
     Ok(())
 }

@@ -3,6 +3,7 @@
 use super::{
     AppState,
     answers::{created, page},
+    authorise::Asker,
     error::ApiError,
     extract::{Body, PathParams, QueryParams, number_cursor, page_limit},
 };
@@ -41,13 +42,7 @@ pub(super) fn router() -> OpenApiRouter<AppState> {
 
 /// A job as it stands.
 pub(super) fn job_shown(row: JobRow, progress: Option<&JobProgress>) -> Job {
-    let state = match row.state.as_str() {
-        "done" => JobState::Done,
-        "failed" => JobState::Failed,
-        "cancelled" => JobState::Cancelled,
-        "running" => JobState::Running,
-        _ => JobState::Queued,
-    };
+    let state = JobState::of_word(&row.state);
     Job {
         id: row.id,
         kind: row.kind,
@@ -178,7 +173,7 @@ async fn cancel(State(app): State<AppState>, PathParams(id): PathParams<i64>) ->
 async fn events(
     State(app): State<AppState>,
     PathParams(id): PathParams<i64>,
-    Extension(principal): Extension<Principal>,
+    Extension(asker): Extension<Asker>,
 ) -> Result<Sse<impl Stream<Item = Result<Event, Infallible>>>, ApiError> {
     let place = app.stream_place()?;
     let progress = app.jobs.watch(id).await?;
@@ -186,7 +181,7 @@ async fn events(
         Some(progress) => WatchStream::new(progress).map(|_| ()).left_stream(),
         None => stream::iter([()]).right_stream(),
     };
-    let stopping = app.ended_for(principal);
+    let stopping = app.ended_for(asker);
     // The sender of the changes goes when the job has ended; one more look then shows how.
     let states = changes.chain(stream::iter([()])).then(move |()| {
         let (app, _place) = (app.clone(), &place);

@@ -2,10 +2,10 @@
 
 use super::{
     AppState,
+    authorise::Asker,
     error::ApiError,
     extract::{PathParams, name},
 };
-use crate::identity::Principal;
 use crate::store::kind::Kind;
 use crate::store::{StoreError, maps, robots};
 use axum::{
@@ -101,7 +101,7 @@ async fn trajectories(
 async fn events(
     State(app): State<AppState>,
     PathParams(map): PathParams<String>,
-    Extension(principal): Extension<Principal>,
+    Extension(asker): Extension<Asker>,
 ) -> Result<Sse<impl Stream<Item = Result<Event, Infallible>>>, ApiError> {
     let place = app.stream_place()?;
     let events = BroadcastStream::new(app.live.events());
@@ -115,7 +115,7 @@ async fn events(
         };
         std::future::ready(shown.map(Ok))
     });
-    Ok(Sse::new(events.take_until(app.ended_for(principal))).keep_alive(KeepAlive::default()))
+    Ok(Sse::new(events.take_until(app.ended_for(asker))).keep_alive(KeepAlive::default()))
 }
 
 fn shown(event: &LiveEvent) -> Option<Event> {

@@ -3,6 +3,7 @@
 use super::{
     API, App, AppState, authorise, backups, bulk, cameras, creation, documented,
     error::{ApiError, method_not_allowed, not_found},
+    events,
     examples::with_examples,
     gathering, guard, health, landmark_models, landmarks, learning, live, mapping, maps, modalities,
     page_session, pages, recognise, reference_runs, relocalisation, revision, robots, ros2,
@@ -59,6 +60,7 @@ fn api(limits: &Limits) -> OpenApiRouter<AppState> {
         .merge(cameras::router())
         .merge(backups::router())
         .merge(live::router())
+        .merge(events::router())
         .merge(tokens::router())
         .merge(page_session::api())
         .merge(health::router())

@@ -3,6 +3,7 @@
 mod authorisation;
 mod creation;
 mod earlier_build;
+mod events;
 mod lists;
 mod openapi;
 mod page_sessions;
@@ -58,8 +59,10 @@ impl Service {
         let (jobs, _) = Jobs::start(store.clone(), config.clone(), stopping.clone()).await.unwrap();
         let (tap, frames) = crate::gather::gathering_tap();
         let (gatherer, _) = Gatherer::start(store.clone(), &config, &tap, frames).await.unwrap();
-        let (backups, _) =
-            crate::backup::Backups::start(&config, store.vitals().panics().clone(), stopping.clone());
+        let (backups, _) = {
+            let of = (store.vitals().panics().clone(), store.events().clone());
+            crate::backup::Backups::start(&config, of, stopping.clone())
+        };
         let hall = Arc::new(MapSnapshot::empty("hall", 1));
         let engine =
             Engine { vitals: store.vitals().clone(), frame_tap: Arc::new(tap), ..scene::engine(&[hall]) };

@@ -29,8 +29,8 @@ use engine::{
     picture,
 };
 use protos::api::{
-    CaptureMetadata, NewViewForm, NumberOrder, Page, PlacementReportBody, Problem, Size, TrainingView,
-    UploadOutcomeBody, ViewQuery,
+    CaptureMetadata, LandmarkChange, NewViewForm, NumberOrder, Page, PlacementReportBody, Problem,
+    ServerEventBody, Size, TrainingView, UploadOutcomeBody, ViewQuery,
 };
 use serde_json::json;
 use utoipa_axum::{router::OpenApiRouter, routes};
@@ -135,8 +135,19 @@ async fn add(
         capture.map(|c| serde_json::to_string(&c)).transpose().map_err(|e| ApiError::internal(&e))?;
     let create = creates.then_some(app.config.limits.landmarks);
     let view = NewView { capture, ..new };
+    let changed = (map.clone(), landmark.clone());
     let teaching = Teaching { map, landmark, view, max, novelty, size, create };
-    created(added_shown, teaching::add(&app.store, teaching)).await
+    let answer = created(added_shown, teaching::add(&app.store, teaching)).await?;
+    if answer.0 == StatusCode::CREATED {
+        tell_changed(&app, changed);
+    }
+    Ok(answer)
+}
+
+/// Tells readers of events that the views of a landmark are others: that makes no new version of the map.
+fn tell_changed(app: &App, (map, landmark): (String, String)) {
+    let change = LandmarkChange::Changed;
+    app.store.events().tell(ServerEventBody::LandmarkChanged { map, landmark, change });
 }
 
 /// What came of a view.
@@ -289,9 +300,11 @@ async fn delete(
     State(app): State<AppState>,
     PathParams((map, landmark, view)): PathParams<(String, String, i64)>,
 ) -> Result<StatusCode, ApiError> {
+    let changed = (map.clone(), landmark.clone());
     app.store
         .write(move |tx| Box::pin(async move { views::delete(tx, &map, &landmark, view).await }))
         .await?;
+    tell_changed(&app, changed);
     Ok(StatusCode::NO_CONTENT)
 }
 

@@ -157,6 +157,7 @@ pub(crate) const TABLE: &[Rule] = &[
     own("GET", "/answers", Viewer),
     answer("GET", "/answers/{answer}", Viewer),
     answer("GET", "/answers/{answer}/quads/{quad}/icon", Viewer),
+    own("GET", "/events", Viewer),
     own("GET", "/jobs", Viewer),
     job("GET", "/jobs/{job}", Viewer),
     job("DELETE", "/jobs/{job}", Teacher),

@@ -10,6 +10,7 @@ use std::{
     sync::{Mutex, PoisonError},
     time::{Duration, Instant},
 };
+use tokio::sync::watch;
 
 /// Time for which the code of a link is valid.
 pub(crate) const CODE_VALID: Duration = Duration::from_mins(10);
@@ -34,6 +35,7 @@ type Grants = BTreeMap<[u8; 32], Grant>;
 pub(crate) struct Sessions {
     codes: Mutex<Grants>,
     sessions: Mutex<Grants>,
+    changes: watch::Sender<()>,
 }
 
 /// Adds a grant; what has ended goes, and the oldest beyond the bound.
@@ -70,6 +72,7 @@ impl Sessions {
         let cookie = Secret::<32>::random()?;
         let grant = Grant { token, ends: now + SESSION_VALID };
         insert(&self.sessions, cookie.digest(), grant, MAX_SESSIONS, now);
+        self.changes.send_replace(());
         Ok(cookie.expose())
     }
 
@@ -85,7 +88,14 @@ impl Sessions {
         if let Some(secret) = Secret::<32>::of(cookie) {
             let mut sessions = self.sessions.lock().unwrap_or_else(PoisonError::into_inner);
             sessions.remove(&secret.digest());
+            drop(sessions);
+            self.changes.send_replace(());
         }
+    }
+
+    /// Each beginning and end of a session by its user from now on.
+    pub(crate) fn changes(&self) -> watch::Receiver<()> {
+        self.changes.subscribe()
     }
 }
 

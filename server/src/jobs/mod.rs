@@ -22,6 +22,7 @@ use crate::{
         jobs::{self, Ended, JobFilter, JobRow},
     },
 };
+use protos::api::{JobState, ServerEventBody};
 use std::{
     collections::{BTreeMap, BTreeSet},
     sync::{
@@ -152,7 +153,14 @@ impl Jobs {
         let write = self
             .store
             .write(move |tx| Box::pin(async move { jobs::create(tx, "learn", &map, &text, limits).await }));
-        write.await
+        let row = write.await?;
+        self.tell(&row, JobState::Queued);
+        Ok(row)
+    }
+
+    /// Tells readers of events where a job stands.
+    pub(crate) fn tell(&self, row: &JobRow, state: JobState) {
+        self.store.events().tell(ServerEventBody::Job { map: row.map.clone(), job: row.id, state });
     }
 
     /// A job with its progress while it is open. Its row ends in the transaction of its models; here it has ended once those
@@ -206,11 +214,13 @@ impl Jobs {
         let jobs = self.clone();
         let write = self.store.write(move |tx| {
             Box::pin(async move {
+                let row = jobs::get(tx.conn(), id).await?;
                 if jobs::end(tx, id, &cancelled()).await? {
                     // It may have started meanwhile: then it finds its row ended and stores nothing.
                     tx.after(move || {
                         if !jobs.stop_running(id) {
                             jobs.leave(id);
+                            jobs.tell(&row, JobState::Cancelled);
                         }
                     });
                 }
@@ -272,6 +282,9 @@ impl Jobs {
                 Ok(Next::Job(row)) => {
                     let done = self.one(&row).await.map(|()| Duration::ZERO);
                     self.leave(row.id);
+                    if let Ok(row) = jobs::get(self.store.reads(), row.id).await {
+                        self.tell(&row, JobState::of_word(&row.state));
+                    }
                     done
                 }
                 Ok(Next::NoneFor(pause)) => Ok(pause),
@@ -327,6 +340,7 @@ impl Jobs {
         if !self.store.write(move |tx| Box::pin(async move { jobs::begin(tx, id).await })).await? {
             return Ok(());
         }
+        self.tell(row, JobState::Running);
         let ended = match learn::run(&self.store, &self.config, row, &reporter).await {
             // The row has ended together with the models.
             Ok(()) => {

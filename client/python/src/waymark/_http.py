@@ -6,7 +6,7 @@ import json
 import uuid
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, Generic, Literal, TypeAlias, TypeVar
+from typing import Any, Generic, Literal, TypeAlias, TypeVar, get_args
 from urllib.parse import quote
 
 import httpx
@@ -14,6 +14,7 @@ import httpx
 from waymark._values import MismatchError, from_json, to_json
 from waymark.api import (
     CaptureMetadata,
+    EventKind,
     Job,
     LiveAnswer,
     LiveEvent,
@@ -22,9 +23,10 @@ from waymark.api import (
     LivePose,
     LivePosition,
     LivePresence,
+    ServerEvent,
     Size,
 )
-from waymark.errors import InvalidInput, JobFailed, Refused, Unexpected, Unreachable
+from waymark.errors import InvalidInput, JobFailed, Refused, Unexpected, Unreachable, WaymarkError
 from waymark.image import Picture, as_image
 
 T = TypeVar("T")
@@ -79,6 +81,7 @@ OPERATIONS: dict[str, tuple[str, str]] = {
     "job": ("GET", "/jobs/{job}"),
     "cancel_job": ("DELETE", "/jobs/{job}"),
     "job_events": ("GET", "/jobs/{job}/events"),
+    "events": ("GET", "/events"),
     "live_events": ("GET", "/maps/{map}/live"),
     "start_mapping": ("POST", "/maps/{map}/mapping"),
     "mapping": ("GET", "/maps/{map}/mapping"),
@@ -167,6 +170,8 @@ CHANGES = frozenset(
 # Pause before a repeat, where the server says none, and the longest, in seconds.
 PAUSE_S = 0.25
 MAX_PAUSE_S = 5.0
+# First pause before a stream is connected again; it doubles with each that fails, in seconds.
+FIRST_PAUSE_S = 0.25
 
 _EVENTS: dict[str, Any] = {
     "answer": LiveAnswer,
@@ -321,6 +326,16 @@ def live_event(name: str, data: str) -> LiveEvent | None:
         value["source"] = name
     event: LiveEvent = from_json(kind, value)
     return event
+
+
+def server_event(name: str, value: Any) -> ServerEvent | None:
+    """An event of the server; `None` for the first of a connection, and for one that only a newer server sends."""
+    return from_json(ServerEvent, value) if name == "reset" or name in get_args(EventKind) else None
+
+
+def is_passing(error: WaymarkError) -> bool:
+    """Whether another connection is worth a try."""
+    return isinstance(error, Unreachable) or (isinstance(error, Refused) and error.status in (408, 503))
 
 
 def job_ended(job: Job) -> bool:

@@ -7,6 +7,7 @@ quads and poses of the wire are in `waymark.wire`.
 """
 
 from waymark.api.backups import Backup, BackupHealth, BackupManifest, BackupMap, BackupState
+from waymark.api.events import EventKind, ServerEvent
 from waymark.api.gathering import (
     AcceptanceBody,
     AcceptedTrackBody,
@@ -172,6 +173,7 @@ __all__ = [
     "EpochConflictBody",
     "ErrorModelBody",
     "EstimatedPlace",
+    "EventKind",
     "ExtendedLandmark",
     "FailedGate",
     "FindingBody",
@@ -232,6 +234,7 @@ __all__ = [
     "RobotPose",
     "Role",
     "Ros2Status",
+    "ServerEvent",
     "Size",
     "StoredAnswer",
     "StoredAnswerSummary",
