@@ -211,10 +211,9 @@ impl Jobs {
         if self.stop_running(id) {
             return Ok(());
         }
-        let jobs = self.clone();
+        let (jobs, row) = (self.clone(), jobs::get(self.store.reads(), id).await?);
         let write = self.store.write(move |tx| {
             Box::pin(async move {
-                let row = jobs::get(tx.conn(), id).await?;
                 if jobs::end(tx, id, &cancelled()).await? {
                     // It may have started meanwhile: then it finds its row ended and stores nothing.
                     tx.after(move || {
