@@ -21,6 +21,7 @@ use engine::live::{LiveEvent, LiveFrame};
 use futures::{Stream, StreamExt};
 use map::pose2::Pose2;
 use protos::{
+    Name,
     api::{Problem, TrajectoriesBody},
     convert::geometry::pose2_wire,
     v1,
@@ -40,9 +41,10 @@ pub(super) fn router() -> OpenApiRouter<AppState> {
 /// The last frame of a camera.
 async fn last(app: &AppState, robot: String, camera: String) -> Result<LiveFrame, ApiError> {
     robots::get(app.store.reads(), &robot).await?;
-    let (robot, camera) = (name("robot", robot)?, name("camera", camera)?);
-    let frame = app.live.frame(&robot, &camera);
-    Ok(frame.ok_or_else(|| StoreError::NotFound { what: Kind::Camera, name: camera.into() })?)
+    let robot = name("robot", robot)?;
+    // What is no name is no camera.
+    let frame = Name::new(camera.as_str()).ok().and_then(|camera| app.live.frame(&robot, &camera));
+    Ok(frame.ok_or_else(|| StoreError::NotFound { what: Kind::Camera, name: camera })?)
 }
 
 /// The last answered frame of a camera, as a picture.
