@@ -34,6 +34,24 @@ async fn relay(server: SocketAddr) -> (SocketAddr, Arc<Notify>) {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn a_robot_that_joins_late_has_the_present_version_of_a_map_at_once() {
+    let inside = Inside::start(Limits::default()).await;
+    let maps = inside.maps();
+    maps.create_map(&NewMap::new("hall")).await.expect("map");
+    maps.add_landmark("hall", "door", None, None).await.expect("landmark");
+    let present = maps.map("hall").await.expect("map").version;
+    maps.put_robot("r1", "hall").await.expect("robot");
+    let robot = connect(&inside.server.zenoh_endpoint, "r1").await;
+    let mut versions = robot.map_versions("hall", SOON).await.expect("versions");
+    let mut next = async || tokio::time::timeout(SOON, versions.next()).await.expect("in time");
+    assert_eq!(next().await, Some(present));
+    maps.add_landmark("hall", "sign", None, None).await.expect("landmark");
+    assert_eq!(next().await, Some(present + 1));
+    robot.close().await.expect("closed");
+    inside.server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn events_go_on_after_a_lost_connection_and_end_with_the_token() {
     let inside = Inside::start(Limits::default()).await;
     let maps = inside.maps();

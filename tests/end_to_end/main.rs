@@ -17,6 +17,7 @@ mod hang_ups;
 mod http_contract;
 mod imports;
 mod laser;
+mod lists;
 mod live_mapping;
 mod look_alikes;
 mod lost_updates;
