@@ -27,6 +27,7 @@ pub mod gaze;
 pub mod findings;
 pub mod answer_records;
 pub mod fixes;
+pub mod localise;
 pub mod frame_analysis;
 pub mod frame_answer;
 pub mod frame_context;

@@ -4,7 +4,7 @@ use crate::{
     backup::Backups,
     bus::{Bus, BusError, Receivers},
     config::Config,
-    events::watch_changes::watch_changes,
+    events::{EventLog, watch_changes::watch_changes},
     gather::{self, Gatherer, GatheringTap, OfferedFrame},
     http::{self, App, Services},
     identity::{Sessions, TokenId, local_token::LocalToken},
@@ -15,12 +15,13 @@ use crate::{
     store::{OpenError, StoreError, landmarks, pictures},
 };
 use engine::{
-    answer_records::{AnswerRecorder, answer_records},
+    answer_records::{AnswerRecord, answer_records},
     decode::ImageLimits,
     findings::{FindingSender, LandmarkFinding, findings},
     intake::{FrameJob, Intake},
     live::LiveHub,
     motion::MotionTracker,
+    panics::Panics,
     slots::Slots,
     snapshot::Snapshots,
     vitals::{Failure, Pulse, Vitals},
@@ -110,8 +111,8 @@ struct Tasks {
     http: JoinHandle<()>,
     jobs: JoinHandle<()>,
     findings: JoinHandle<()>,
-    answers: JoinHandle<()>,
-    events: JoinHandle<()>,
+    /// Of stored answers and of events.
+    recorders: [JoinHandle<()>; 2],
     gather: JoinHandle<()>,
     pictures: JoinHandle<()>,
     backups: JoinHandle<()>,
@@ -136,17 +137,14 @@ impl Server {
         let (tap, offered) = gather::gathering_tap();
         let teaching = Teaching::start(&config, &store, (&tap, offered), &stopping).await?;
         let (findings, found) = findings();
-        let (records, recorded) = answer_records();
-        let engine = engine(&config, snapshots.clone(), vitals.clone(), (findings, records, tap));
+        let (engine, recorded) = engine(&config, snapshots.clone(), vitals.clone(), (findings, tap));
         let is_on =
             |map: &Name, robot: &Name| snapshots.robot_map(robot.as_str()).as_deref() == Some(map.as_str());
         engine.motion.mappings().count_in(vitals.panics().clone());
         engine.motion.mappings().resume_in(config.data.join("mapping"), is_on);
         let pulse = vitals.begin("the task that stores findings");
         let findings = tokio::spawn(store_findings(store.clone(), found, pulse));
-        let pulse = (vitals.begin("the task that stores answers"), stopping.clone());
-        let max = config.limits.stored_answers;
-        let answers = tokio::spawn(store_answers(store.clone(), recorded, max, pulse));
+        let recorders = recorders(&config, &store, (recorded, &engine.live), &stopping);
         let pictures = tokio::spawn(pictures::check_all((*store).clone(), stopping.clone()));
         let (live, slots) = (engine.live.clone(), engine.slots.clone());
         let to = receivers(&config, &engine);
@@ -157,11 +155,7 @@ impl Server {
         vitals.probe("the outbox", move || outbox.is_running());
         let workers = Workers::start(&engine, config.workers, &publisher).map_err(StartError::Threads)?;
         let zenoh_endpoint = bus.endpoint().to_owned();
-        let of = (vitals.panics().clone(), store.events().clone());
-        let (backups, backups_task) = Backups::start(&config, of, stopping.clone());
-        let watched = (snapshots.clone(), store.tokens().clone(), live.clone());
-        let pulse = (vitals.begin("the task that tells events"), stopping.clone());
-        let events = tokio::spawn(watch_changes(store.events().clone(), watched, pulse));
+        let (backups, backups_task) = Backups::start(&config, told(&store), stopping.clone());
         let services = Services {
             jobs: teaching.jobs,
             gatherer: teaching.gatherer,
@@ -179,8 +173,7 @@ impl Server {
             http,
             jobs: teaching.jobs_task,
             findings,
-            answers,
-            events,
+            recorders,
             gather: teaching.gather_task,
             pictures,
             backups: backups_task,
@@ -230,6 +223,21 @@ impl Teaching {
     }
 }
 
+/// Stores answers, and tells readers of events what changes.
+fn recorders(
+    config: &Config,
+    store: &Catalogue,
+    (recorded, live): (Receiver<AnswerRecord>, &Arc<LiveHub>),
+    stopping: &watch::Receiver<bool>,
+) -> [JoinHandle<()>; 2] {
+    let part = |name| (store.vitals().begin(name), stopping.clone());
+    let max = config.limits.stored_answers;
+    let answers = store_answers(store.clone(), recorded, max, part("the task that stores answers"));
+    let watched = (store.snapshots().clone(), store.tokens().clone(), live.clone());
+    let events = watch_changes(store.events().clone(), watched, part("the task that tells events"));
+    [tokio::spawn(answers), tokio::spawn(events)]
+}
+
 fn serve(
     listener: TcpListener,
     app: App,
@@ -244,15 +252,21 @@ fn serve(
     })
 }
 
-/// Everything between frames and answers, for one set of settings.
+/// Whom a backup tells of its panics and of its end.
+fn told(store: &Catalogue) -> (Arc<Panics>, Arc<EventLog>) {
+    (store.vitals().panics().clone(), store.events().clone())
+}
+
+/// Everything between frames and answers, for one set of settings; and the answers that are to be stored.
 fn engine(
     config: &Config,
     snapshots: Arc<Snapshots>,
     vitals: Arc<Vitals>,
-    (findings, records, frame_tap): (FindingSender, AnswerRecorder, GatheringTap),
-) -> Engine {
+    (findings, frame_tap): (FindingSender, GatheringTap),
+) -> (Engine, Receiver<AnswerRecord>) {
+    let (records, recorded) = answer_records();
     let live = Arc::new(LiveHub::default());
-    Engine {
+    let engine = Engine {
         slots: Arc::new(Slots::new(config.limits.cameras)),
         motion: Arc::new(MotionTracker::new(snapshots.clone(), live.clone())),
         snapshots,
@@ -264,7 +278,8 @@ fn engine(
         relocalisers: Arc::default(),
         frame_tap: Arc::new(frame_tap),
         search_every_frame: config.search_every_frame,
-    }
+    };
+    (engine, recorded)
 }
 
 /// Stores findings about landmarks, until the last worker has stopped.
@@ -332,20 +347,8 @@ impl RunningServer {
         self.vitals.stop();
         self.local_token.remove();
         self.stop.send_replace(true);
-        let Tasks {
-            workers,
-            bus,
-            http,
-            jobs,
-            findings,
-            answers,
-            events,
-            gather,
-            pictures,
-            backups,
-            writer,
-            watch,
-        } = self.tasks;
+        let Tasks { workers, bus, http, jobs, findings, recorders, gather, pictures, backups, writer, watch } =
+            self.tasks;
         watch.abort();
         // Workers first: what they have in work is still answered over the open bus.
         let workers = tokio::task::spawn_blocking(move || workers.stop());
@@ -354,6 +357,7 @@ impl RunningServer {
         }
         self.ros2.close().await;
         bus.close().await;
+        let [answers, events] = recorders;
         let others = [
             ("HTTP", http),
             ("jobs", jobs),

@@ -1,4 +1,5 @@
-"""Claim: events are followed through a lost connection, stored answers are listed, and what was learnt is shown."""
+"""Claim: events are followed through a lost connection, stored answers are listed, what was learnt is shown, and a
+robot is found without its history."""
 
 from __future__ import annotations
 
@@ -13,7 +14,8 @@ import pictures
 import pytest
 from conftest import Server
 
-from waymark import AsyncMapClient, MapClient, Refused
+from waymark import AsyncMapClient, Image, MapClient, Pose2, Pose3, Refused
+from waymark.wire import Scan
 
 
 @contextlib.contextmanager
@@ -94,6 +96,15 @@ def test_what_was_learnt_is_shown(server: Server, taught: str) -> None:
         assert isinstance(maps.duplicates(taught), tuple)
         views = maps.views(taught, landmark)
         assert maps.find_views(taught, landmark, sort="-number") == tuple(reversed(views))
+        mounting = Pose3.mounting(0.0, 0.0, pictures.CAMERA_HEIGHT_M)
+        found = maps.localise(taught, Image.rgb(pictures.seen_from(pictures.front())), pictures.CAMERA, mounting)
+        assert found.status == "located" and found.map_from_robot is not None, found
+        pose, truth = found.map_from_robot.pose, pictures.front()
+        assert abs(pose.x_m - truth.x_m) < 0.2 and abs(pose.y_m - truth.y_m) < 0.2
+        assert found.hypotheses[0].landmarks == ("poster-0",) and found.answer is not None
+        # A map without walls tells nothing by a scan.
+        scan = Scan((2.0,) * 90, 0.0, 0.05, 9.0, Pose2())
+        assert maps.localise(taught, scan=scan).reason == "few_points"
         maps.create_map("untaught")
         maps.upload_view("untaught", "sign", pictures.teaching_photo(7), "whole_image", make_landmark=True)
         with pytest.raises(Refused, match="not_learnt"):

@@ -13,6 +13,7 @@ mod landmarks;
 mod learning;
 mod live;
 mod local_token;
+mod localise;
 mod map_client;
 mod mapping;
 mod maps;
@@ -34,6 +35,7 @@ pub use backups::BackupFile;
 pub use cameras::CameraFrame;
 pub use learning::JobEvents;
 pub use live::LiveEvents;
+pub use localise::Sensed;
 pub use map_client::{MapClient, Revised};
 pub use operation::Operation;
 pub use server_events::ServerEvents;
@@ -50,6 +52,7 @@ pub fn operations() -> impl Iterator<Item = &'static Operation> {
         landmarks::OPERATIONS,
         learning::OPERATIONS,
         live::OPERATIONS,
+        localise::OPERATIONS,
         mapping::OPERATIONS,
         maps::OPERATIONS,
         modalities::OPERATIONS,

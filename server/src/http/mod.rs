@@ -22,6 +22,7 @@ mod landmark_models;
 mod landmarks;
 mod learning;
 mod live;
+mod localise;
 mod mapping;
 mod maps;
 mod modalities;

@@ -5,8 +5,8 @@ use super::{
     error::{ApiError, method_not_allowed, not_found},
     events,
     examples::with_examples,
-    gathering, guard, health, landmark_models, landmarks, learning, live, mapping, maps, modalities,
-    page_session, pages, recognise, reference_runs, relocalisation, revision, robots, ros2,
+    gathering, guard, health, landmark_models, landmarks, learning, live, localise, mapping, maps,
+    modalities, page_session, pages, recognise, reference_runs, relocalisation, revision, robots, ros2,
     security::with_security,
     stored_answers, tokens, underlay, views, visibility, visibility_settings, walls,
 };
@@ -53,6 +53,7 @@ fn api(limits: &Limits) -> OpenApiRouter<AppState> {
         .merge(reference_runs::router())
         .merge(visibility_settings::router())
         .merge(recognise::router(limits.upload_bytes))
+        .merge(localise::router(limits.upload_bytes))
         .merge(stored_answers::router())
         .merge(robots::router())
         .merge(relocalisation::router())

@@ -123,6 +123,7 @@ pub(crate) const TABLE: &[Rule] = &[
     map("POST", "/maps/{map}/coverage", Viewer),
     map("POST", "/maps/{map}/gaze", Viewer),
     map("POST", "/maps/{map}/recognise", Robot),
+    map("POST", "/maps/{map}/localise", Robot),
     map("GET", "/maps/{map}/modalities", Viewer),
     map("PUT", "/maps/{map}/modalities", Operator),
     map("GET", "/maps/{map}/modalities/at", Viewer),

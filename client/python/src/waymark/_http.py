@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import uuid
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -28,6 +29,7 @@ from waymark.api import (
 )
 from waymark.errors import InvalidInput, JobFailed, Refused, Unexpected, Unreachable, WaymarkError
 from waymark.image import Picture, as_image
+from waymark.wire import Intrinsics, Pose3, Scan
 
 T = TypeVar("T")
 
@@ -76,6 +78,7 @@ OPERATIONS: dict[str, tuple[str, str]] = {
     "landmark_distances": ("GET", "/maps/{map}/landmarks/{landmark}/distances"),
     "landmark_icon": ("GET", "/maps/{map}/landmarks/{landmark}/icon"),
     "duplicates": ("GET", "/maps/{map}/duplicates"),
+    "localise": ("POST", "/maps/{map}/localise"),
     "learn": ("POST", "/maps/{map}/learn"),
     "learn_landmark": ("POST", "/maps/{map}/landmarks/{landmark}/learn"),
     "job": ("GET", "/jobs/{job}"),
@@ -312,6 +315,29 @@ def view_form(
 def picture_part(picture: Picture) -> dict[str, tuple[str, bytes]]:
     """A picture as a part of a form: raw pixels go as PNG."""
     return {"image": ("image", bytes(as_image(picture).png().data))}
+
+
+def localise_parts(
+    image: Picture | None, intrinsics: Intrinsics | None, mounting: Pose3 | None, scan: Scan | None
+) -> dict[str, Any]:
+    """The parts of a localisation."""
+    texts: dict[str, Any] = {}
+    if intrinsics is not None:
+        texts["intrinsics"] = to_json(intrinsics)
+    if mounting is not None:
+        texts["mounting"] = to_json(mounting)
+    if scan is not None:
+        ranges = [float(each) if math.isfinite(each) else None for each in scan.ranges_m]
+        texts["scan"] = {
+            "robot_from_laser": to_json(scan.robot_from_laser),
+            "first_bearing_rad": scan.first_bearing_rad,
+            "bearing_step_rad": scan.bearing_step_rad,
+            "max_range_m": scan.max_range_m,
+            "ranges_m": ranges,
+        }
+    # A part without a name of a file, so that a form without a picture is one, too.
+    files: dict[str, Any] = {name: (None, json.dumps(value)) for name, value in texts.items()}
+    return {"files": files | (picture_part(image) if image is not None else {})}
 
 
 def live_event(name: str, data: str) -> LiveEvent | None:

@@ -3,15 +3,19 @@
 
 from __future__ import annotations
 
+from waymark._http import localise_parts
 from waymark._sync.base import Base
 from waymark.api import (
     AnswerStatus,
     DuplicatePair,
     LandmarkDistances,
     LandmarkModelDetail,
+    LocaliseResult,
     StoredAnswer,
     StoredAnswerSummary,
 )
+from waymark.image import Picture
+from waymark.wire import Intrinsics, Pose3, Scan
 
 
 class Answers(Base):
@@ -42,6 +46,19 @@ class Answers(Base):
     def stored_quad_icon(self, answer: int, quad: int) -> bytes:
         """The icon of a quad of a stored answer, by its index: PNG."""
         return self._bytes("stored_quad_icon", answer, quad)
+
+    def localise(
+        self,
+        map: str,
+        image: Picture | None = None,
+        intrinsics: Intrinsics | None = None,
+        mounting: Pose3 | None = None,
+        scan: Scan | None = None,
+    ) -> LocaliseResult:
+        """Finds where a robot is, without knowing anything of it before: by one picture, with the camera's intrinsics
+        and its pose on the robot, one laser scan from the same place, or both."""
+        parts = localise_parts(image, intrinsics, mounting, scan)
+        return self._send(LocaliseResult, "localise", map, **parts)
 
     def landmark_model(self, map: str, landmark: str) -> LandmarkModelDetail:
         """Thresholds, keypoints, points and sizes of a landmark's model. Refused with `not_learnt` if there is none."""

@@ -59,6 +59,7 @@ from waymark.api.live import (
     LivePosition,
     LivePresence,
 )
+from waymark.api.localise import LocaliseHypothesisBody, LocaliseResult, LocaliseStatus
 from waymark.api.maps import (
     Distance,
     Health,
@@ -205,6 +206,9 @@ __all__ = [
     "LivePose",
     "LivePosition",
     "LivePresence",
+    "LocaliseHypothesisBody",
+    "LocaliseResult",
+    "LocaliseStatus",
     "LookAlikeBody",
     "Map",
     "MappingProgressBody",
