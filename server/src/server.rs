@@ -110,9 +110,8 @@ struct Tasks {
     bus: Bus,
     http: JoinHandle<()>,
     jobs: JoinHandle<()>,
-    findings: JoinHandle<()>,
-    /// Of stored answers and of events.
-    recorders: [JoinHandle<()>; 2],
+    /// Of findings, stored answers and events.
+    recorders: [JoinHandle<()>; 3],
     gather: JoinHandle<()>,
     pictures: JoinHandle<()>,
     backups: JoinHandle<()>,
@@ -142,9 +141,7 @@ impl Server {
             |map: &Name, robot: &Name| snapshots.robot_map(robot.as_str()).as_deref() == Some(map.as_str());
         engine.motion.mappings().count_in(vitals.panics().clone());
         engine.motion.mappings().resume_in(config.data.join("mapping"), is_on);
-        let pulse = vitals.begin("the task that stores findings");
-        let findings = tokio::spawn(store_findings(store.clone(), found, pulse));
-        let recorders = recorders(&config, &store, (recorded, &engine.live), &stopping);
+        let recorders = recorders(&config, &store, (found, recorded, &engine.live), &stopping);
         let pictures = tokio::spawn(pictures::check_all((*store).clone(), stopping.clone()));
         let (live, slots) = (engine.live.clone(), engine.slots.clone());
         let to = receivers(&config, &engine);
@@ -172,7 +169,6 @@ impl Server {
             bus,
             http,
             jobs: teaching.jobs_task,
-            findings,
             recorders,
             gather: teaching.gather_task,
             pictures,
@@ -223,19 +219,21 @@ impl Teaching {
     }
 }
 
-/// Stores answers, and tells readers of events what changes.
+/// Stores findings and answers, and tells readers of events what changes.
 fn recorders(
     config: &Config,
     store: &Catalogue,
-    (recorded, live): (Receiver<AnswerRecord>, &Arc<LiveHub>),
+    (found, recorded, live): (Receiver<LandmarkFinding>, Receiver<AnswerRecord>, &Arc<LiveHub>),
     stopping: &watch::Receiver<bool>,
-) -> [JoinHandle<()>; 2] {
+) -> [JoinHandle<()>; 3] {
+    let pulse = store.vitals().begin("the task that stores findings");
+    let findings = store_findings(store.clone(), found, pulse);
     let part = |name| (store.vitals().begin(name), stopping.clone());
     let max = config.limits.stored_answers;
     let answers = store_answers(store.clone(), recorded, max, part("the task that stores answers"));
     let watched = (store.snapshots().clone(), store.tokens().clone(), live.clone());
     let events = watch_changes(store.events().clone(), watched, part("the task that tells events"));
-    [tokio::spawn(answers), tokio::spawn(events)]
+    [tokio::spawn(findings), tokio::spawn(answers), tokio::spawn(events)]
 }
 
 fn serve(
@@ -347,7 +345,7 @@ impl RunningServer {
         self.vitals.stop();
         self.local_token.remove();
         self.stop.send_replace(true);
-        let Tasks { workers, bus, http, jobs, findings, recorders, gather, pictures, backups, writer, watch } =
+        let Tasks { workers, bus, http, jobs, recorders, gather, pictures, backups, writer, watch } =
             self.tasks;
         watch.abort();
         // Workers first: what they have in work is still answered over the open bus.
@@ -357,7 +355,7 @@ impl RunningServer {
         }
         self.ros2.close().await;
         bus.close().await;
-        let [answers, events] = recorders;
+        let [findings, answers, events] = recorders;
         let others = [
             ("HTTP", http),
             ("jobs", jobs),

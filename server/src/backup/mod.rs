@@ -138,7 +138,7 @@ impl Backups {
         let (backups, ended_name) = (self.clone(), name.clone());
         let task = tokio::spawn(async move {
             let made = backups.panics.joined(Edge::Job, "a backup", "it is not made", work.await);
-            backups.ended(ended_name, created_ms, made.map_err(|e| e.to_string()).flatten());
+            backups.ended(&ended_name, created_ms, made.map_err(|e| e.to_string()).flatten());
         });
         Ok((running(name, created_ms), task))
     }
@@ -179,24 +179,24 @@ impl Backups {
         Ok(archive::finish(part, &manifest)?)
     }
 
-    fn ended(&self, name: String, created_ms: i64, made: Result<(), String>) {
+    fn ended(&self, name: &str, created_ms: i64, made: Result<(), String>) {
         match made {
             Ok(()) => {
                 tracing::info!(name, "backup_made");
                 self.prune();
                 let mut state = self.state();
                 (state.running, state.failed) = (None, None);
-                state.newest = Some((name.clone(), created_ms));
+                state.newest = Some((name.to_owned(), created_ms));
                 drop(state);
-                self.tell(&name, BackupState::Complete);
+                self.tell(name, BackupState::Complete);
             }
             Err(reason) => {
                 tracing::error!(name, reason, "backup_failed");
                 let mut state = self.state();
                 state.running = None;
-                state.failed = Some((name.clone(), created_ms, reason));
+                state.failed = Some((name.to_owned(), created_ms, reason));
                 drop(state);
-                self.tell(&name, BackupState::Failed);
+                self.tell(name, BackupState::Failed);
             }
         }
     }

@@ -39,10 +39,9 @@ pub(crate) async fn watch_changes(
                     robot: robot.to_string(),
                     present: *alive,
                 }),
-                Ok(_) => {}
-                // Who came or went meanwhile is in the list of robots.
-                Err(RecvError::Lagged(_)) => {}
                 Err(RecvError::Closed) => break,
+                // Of those that were missed, the list of robots has who is there.
+                Ok(_) | Err(RecvError::Lagged(_)) => {}
             },
             changed = token_changes.changed() => match changed {
                 Ok(()) => log.tell(ServerEventBody::TokensChanged),

@@ -91,27 +91,32 @@ impl IntoResponse for ApiError {
     }
 }
 
+/// The code of what does not exist, and the field that names it.
+fn unknown(kind: Kind) -> (&'static str, &'static str) {
+    match kind {
+        Kind::Map => ("unknown_map", "map"),
+        Kind::Landmark => ("unknown_landmark", "landmark"),
+        Kind::View => ("unknown_view", "view"),
+        Kind::Robot => ("unknown_robot", "robot"),
+        Kind::Camera => ("unknown_camera", "camera"),
+        Kind::Job => ("unknown_job", "job"),
+        Kind::Gathering => ("unknown_gathering", "gathering"),
+        Kind::Track => ("unknown_track", "track"),
+        Kind::ReferenceRun => ("unknown_reference_run", "run"),
+        Kind::Underlay => ("unknown_underlay", "underlay"),
+        Kind::Token => ("unknown_token", "token"),
+        Kind::Backup => ("unknown_backup", "backup"),
+        Kind::Answer => ("unknown_answer", "answer"),
+        Kind::Model | Kind::Picture => ("not_found", "path"),
+    }
+}
+
 impl From<StoreError> for ApiError {
     fn from(error: StoreError) -> Self {
         let detail = error.to_string();
         match error {
             StoreError::NotFound { what, .. } => {
-                let (code, field) = match what {
-                    Kind::Map => ("unknown_map", "map"),
-                    Kind::Landmark => ("unknown_landmark", "landmark"),
-                    Kind::View => ("unknown_view", "view"),
-                    Kind::Robot => ("unknown_robot", "robot"),
-                    Kind::Camera => ("unknown_camera", "camera"),
-                    Kind::Job => ("unknown_job", "job"),
-                    Kind::Gathering => ("unknown_gathering", "gathering"),
-                    Kind::Track => ("unknown_track", "track"),
-                    Kind::ReferenceRun => ("unknown_reference_run", "run"),
-                    Kind::Underlay => ("unknown_underlay", "underlay"),
-                    Kind::Token => ("unknown_token", "token"),
-                    Kind::Backup => ("unknown_backup", "backup"),
-                    Kind::Answer => ("unknown_answer", "answer"),
-                    Kind::Model | Kind::Picture => ("not_found", "path"),
-                };
+                let (code, field) = unknown(what);
                 Self::new(StatusCode::NOT_FOUND, code, detail).field(field)
             }
             StoreError::Exists { .. } => Self::new(StatusCode::CONFLICT, "exists", detail).field("name"),

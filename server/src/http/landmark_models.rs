@@ -24,7 +24,7 @@ use utoipa_axum::{router::OpenApiRouter, routes};
 use vision::{
     model::{DistanceSamples, LandmarkId, LandmarkModel, LimitedBy, Threshold},
     params::Params,
-    points::descriptor::VALUES,
+    points::{descriptor::VALUES, taught::TaughtPoint},
 };
 
 pub(super) fn router() -> OpenApiRouter<AppState> {
@@ -94,7 +94,7 @@ fn model_shown(landmark: String, learnt: &Learnt) -> LandmarkModelDetail {
         points: model
             .points
             .iter()
-            .map(|taught| taught.point())
+            .map(TaughtPoint::point)
             .map(|point| LandmarkPoint { x: point.at[0], y: point.at[1], sigma: point.sigma })
             .collect(),
         bits_per_point: 2 * VALUES as u32,

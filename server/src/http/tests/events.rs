@@ -84,7 +84,7 @@ async fn a_reader_resumes_after_its_last_event_and_is_told_when_too_much_is_miss
     let query = format!("?last_event_id={}", ready["id"].as_str().unwrap());
     let mut resumed = service.read_events(&query, None, None).await;
     assert_eq!(resumed.next().await.unwrap()["version"], 2);
-    for version in 0..MAX_EVENTS as u64 + 1 {
+    for version in 0..=MAX_EVENTS as u64 {
         service.tell("hall", version);
     }
     let mut late = service.read_events("", None, second["id"].as_str()).await;
