@@ -21,4 +21,4 @@ pub use protos::{
     named::{NamedLandmark, named, named_landmarks, quad_corners},
     v1,
 };
-pub use robot::{Delivery, RobotClient, RobotOptions};
+pub use robot::{Delivery, MapVersions, RobotClient, RobotOptions};

@@ -9,7 +9,7 @@ use std::{
     sync::atomic::{AtomicU64, Ordering},
     time::{Duration, Instant},
 };
-use tokio::sync::broadcast;
+use tokio::sync::{broadcast, watch};
 use zenoh::{
     Wait,
     liveliness::LivelinessToken,
@@ -87,6 +87,21 @@ pub struct RobotClient {
     // Held: dropping them ends subscription and token.
     _subscribers: [Subscriber<()>; 2],
     _alive: LivelinessToken,
+}
+
+/// The versions of a map. A reader that is slow gets the newest only.
+#[derive(Debug)]
+pub struct MapVersions {
+    newest: watch::Receiver<Option<u64>>,
+    _subscriber: Subscriber<()>,
+}
+
+impl MapVersions {
+    /// The next version; waits for it. `None` once the session is closed.
+    pub async fn next(&mut self) -> Option<u64> {
+        self.newest.changed().await.ok()?;
+        *self.newest.borrow_and_update()
+    }
 }
 
 impl RobotClient {
@@ -271,6 +286,32 @@ impl RobotClient {
         v1::MapChanged::decode(&*sample.payload().to_bytes())
             .map(|message| Some(message.version))
             .map_err(|e| ClientError::Transport { action: hear, detail: e.to_string() })
+    }
+
+    /// The versions of a map: the present one at once, then each new one. For programs that store data derived from a map, also
+    /// those that start after its last change.
+    pub async fn map_versions(&self, map: &str, wait: Duration) -> Result<MapVersions, ClientError> {
+        let (sender, newest) = watch::channel(None);
+        let changed = {
+            let sender = sender.clone();
+            move |sample: Sample| {
+                if let Ok(message) = v1::MapChanged::decode(&*sample.payload().to_bytes()) {
+                    sender.send_replace(Some(message.version));
+                }
+            }
+        };
+        let key = self.keys.build(&Key::MapChanged(name("map", map)?));
+        // Before the question, so that no change is lost between.
+        let subscriber = self.session.declare_subscriber(key).callback(changed).await;
+        let subscriber = subscriber.map_err(fault("subscribe"))?;
+        let present = self.map_version(map, wait).await?;
+        // A change that has come meanwhile is newer.
+        sender.send_if_modified(|newest| {
+            let is_first = newest.is_none() && present.is_some();
+            *newest = newest.or(present);
+            is_first
+        });
+        Ok(MapVersions { newest, _subscriber: subscriber })
     }
 
     /// Ends the session in order.

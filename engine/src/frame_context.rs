@@ -2,6 +2,7 @@
 
 use super::snapshot::MapSnapshot;
 use map::{extrinsics::CameraExtrinsics, pose2::Pose2Covariance};
+use protos::CheckedFrame;
 use vision::{frame::Intrinsics, pipeline::FrameAnalysis};
 
 /// An analysed frame with its map, its camera and its robot's own prior pose.
@@ -19,4 +20,18 @@ pub struct FrameContext<'a> {
     pub image_px: [f64; 2],
     /// `map_from_robot` as the robot states it.
     pub prior: Option<&'a Pose2Covariance>,
+}
+
+impl<'a> FrameContext<'a> {
+    /// A checked frame with what was found in it.
+    pub fn new(frame: &'a CheckedFrame, analysis: &'a FrameAnalysis, map: &'a MapSnapshot) -> Self {
+        Self {
+            analysis,
+            map,
+            extrinsics: frame.mounting.as_ref(),
+            camera: frame.intrinsics.as_ref(),
+            image_px: [f64::from(frame.width_px), f64::from(frame.height_px)],
+            prior: frame.prior.as_ref(),
+        }
+    }
 }

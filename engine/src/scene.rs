@@ -1,6 +1,7 @@
 //! For tests: a rendered corridor, two of its posters taught, and a robot in front of them.
 
 use super::{
+    answer_records::answer_records,
     findings::findings,
     live::LiveHub,
     motion::MotionTracker,
@@ -108,6 +109,7 @@ pub fn engine(maps: &[Arc<MapSnapshot>]) -> Engine {
         limits: ImageLimits::FRAME,
         vitals: Arc::default(),
         findings: findings().0,
+        records: answer_records().0,
         relocalisers: Arc::default(),
         frame_tap: Arc::new(crate::frame_tap::NoTap),
         search_every_frame: true,

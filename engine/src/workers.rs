@@ -4,6 +4,7 @@
 
 use super::{
     ambiguous_observations::ambiguous_observations,
+    answer_records::{AnswerRecord, AnswerRecorder, QuadIcon},
     cameras::CameraSample,
     decode::{ImageLimits, decode_frame},
     findings::{FindingSender, LandmarkFinding},
@@ -51,6 +52,8 @@ pub struct Engine {
     pub vitals: Arc<Vitals>,
     /// Where findings about landmarks go.
     pub findings: FindingSender,
+    /// Where answers that are worth storing go.
+    pub records: AnswerRecorder,
     /// Relocalisations of robots without a pose.
     pub relocalisers: Arc<Relocalisers>,
     /// Takes frames of robots that gather views.
@@ -116,6 +119,8 @@ impl Workers {
 /// A frame after its analysis.
 struct AnsweredFrame {
     answer: v1::Answer,
+    /// The icons of its quads, if it is to be stored.
+    icons: Option<Vec<QuadIcon>>,
     map: Arc<MapSnapshot>,
     /// Its fixes and landmark checks; absent if the frame must not change the robot's pose or the map.
     evaluation: Option<FrameEvaluation>,
@@ -138,7 +143,9 @@ impl Engine {
             return outcome;
         }
         let (answer, outcome) = refused(job, &failed());
-        panics.catch(Edge::Frame, what, "it is not answered", || self.reply(key, job, answer, publish));
+        panics.catch(Edge::Frame, what, "it is not answered", || {
+            self.reply_refused(key, job, answer, publish);
+        });
         outcome
     }
 
@@ -156,18 +163,18 @@ impl Engine {
         } else {
             self.analyse(key, job)
         };
-        let AnsweredFrame { answer, map, evaluation, relocalised } = match done {
+        let AnsweredFrame { answer, icons, map, evaluation, relocalised } = match done {
             Ok(done) => done,
             Err(refusal) => {
                 let (answer, outcome) = refused(job, &refusal);
                 answered.set(Some(outcome));
-                self.reply(key, job, answer, publish);
+                self.reply_refused(key, job, answer, publish);
                 return outcome;
             }
         };
         let (frame, outcome) = (&job.frame, FrameOutcome::Processed);
         answered.set(Some(outcome));
-        self.reply(key, job, answer, publish);
+        self.reply(key, job, (answer, icons), publish);
         let Some(evaluation) = evaluation else { return outcome };
         let at = frame_stamp(frame, &map);
         if let Some(pose) = self.motion.apply_frame(&key.robot, &key.camera, at, &evaluation.fixes()) {
@@ -210,11 +217,12 @@ impl Engine {
         if let Some((answer, evaluation)) =
             self.expected_only(key, frame, (&image, &map), prior.as_ref(), &mut times)
         {
-            return Ok(AnsweredFrame { answer, map, evaluation: Some(evaluation), relocalised: None });
+            let icons = self.records.take(key, &answer, (&image, &map));
+            return Ok(AnsweredFrame { answer, icons, map, evaluation: Some(evaluation), relocalised: None });
         }
         let analysis = analyse_frame(&image, frame.intrinsics.as_ref(), &map, &mut times);
         let mut answer = crate::frame_answer::answer(&analysis, &map);
-        let context = frame_context(frame, &analysis, &map);
+        let context = FrameContext::new(frame, &analysis, &map);
         // The guide is the fused pose while nothing contradicts it; without one, the robot's own prior.
         let guide = match &prior {
             Some(prior) => prior.plan.guided.then_some(&prior.pose),
@@ -227,6 +235,7 @@ impl Engine {
         if !counts {
             times.ended("localise");
             answer.timings = times.finish();
+            let icons = self.records.take(key, &answer, (&image, &map));
             if let Some(captured_ns) = job.stamp_instead_ns.filter(|_| on_own_map && is_live) {
                 let frame = CheckedFrame { captured_ns, ..frame.clone() };
                 let (quads, map_from_robot) = (analysis.quads, frame.prior);
@@ -238,7 +247,7 @@ impl Engine {
                     );
                 }
             }
-            return Ok(AnsweredFrame { answer, map, evaluation: None, relocalised: None });
+            return Ok(AnsweredFrame { answer, icons, map, evaluation: None, relocalised: None });
         }
         if let Some(intrinsics) = &frame.intrinsics {
             let (landmarks, extrinsics) =
@@ -257,12 +266,13 @@ impl Engine {
         });
         times.ended("localise");
         answer.timings = times.finish();
+        let icons = self.records.take(key, &answer, (&image, &map));
         if self.frame_tap.is_wanted(key) {
             let map_from_robot = frame.prior.or(evaluation.prior);
             let analysed = AnalysedFrame { image, quads: analysis.quads, map: map.clone(), map_from_robot };
             self.frame_tap.offer(key, frame, analysed);
         }
-        Ok(AnsweredFrame { answer, map, evaluation: Some(evaluation), relocalised })
+        Ok(AnsweredFrame { answer, icons, map, evaluation: Some(evaluation), relocalised })
     }
 
     /// Answers a frame by the expected landmarks alone, where the schedule asks for no search of the map. `None` where it asks
@@ -282,7 +292,7 @@ impl Engine {
             return None;
         }
         let nothing = FrameAnalysis { quads: Vec::new() };
-        let context = frame_context(frame, &nothing, map);
+        let context = FrameContext::new(frame, &nothing, map);
         let guided = recognise_guided(image, &context, &prior.pose);
         let evaluation = evaluate_expected_only(&context, prior.clone(), &guided);
         times.ended("expected");
@@ -317,14 +327,29 @@ impl Engine {
         self.relocalisers.update(&key.robot, &input)
     }
 
-    /// Publishes an answer and shows it on pages.
-    fn reply(&self, key: &SlotKey, job: &FrameJob, mut answer: v1::Answer, publish: &dyn Publish) {
+    /// Publishes the answer to a frame that was not analysed.
+    fn reply_refused(&self, key: &SlotKey, job: &FrameJob, answer: v1::Answer, publish: &dyn Publish) {
+        let icons = self.records.take_refused(key, &answer);
+        self.reply(key, job, (answer, icons), publish);
+    }
+
+    /// Publishes an answer, shows it on pages, and has it stored if there are `icons`.
+    fn reply(
+        &self,
+        key: &SlotKey,
+        job: &FrameJob,
+        (mut answer, icons): (v1::Answer, Option<Vec<QuadIcon>>),
+        publish: &dyn Publish,
+    ) {
         let frame = &job.frame;
         (answer.epoch, answer.seq, answer.captured_ns) = (frame.epoch, frame.seq, frame.captured_ns);
         answer.clock_suspect = job.clock_suspect;
         answer.latency_ms = job.received.elapsed().as_secs_f64() * 1e3;
         publish.answer(key, &answer);
         let answer = Arc::new(answer);
+        if let Some(icons) = icons {
+            self.records.send(AnswerRecord { key: key.clone(), answer: answer.clone(), icons });
+        }
         if answer.rejection.is_none() {
             let (encoding, width_px, height_px) = (frame.encoding, frame.width_px, frame.height_px);
             self.live.publish_answer(
@@ -334,21 +359,6 @@ impl Engine {
         } else {
             self.live.publish_refusal(key, answer);
         }
-    }
-}
-
-fn frame_context<'a>(
-    frame: &'a CheckedFrame,
-    analysis: &'a FrameAnalysis,
-    map: &'a MapSnapshot,
-) -> FrameContext<'a> {
-    FrameContext {
-        analysis,
-        map,
-        extrinsics: frame.mounting.as_ref(),
-        camera: frame.intrinsics.as_ref(),
-        image_px: [f64::from(frame.width_px), f64::from(frame.height_px)],
-        prior: frame.prior.as_ref(),
     }
 }
 

@@ -7,8 +7,10 @@ mod index;
 mod fix;
 mod fit;
 mod search;
+mod global;
 
 pub use fix::{LaserFix, LaserRefusal, WallPart};
+pub use global::{GlobalRefusal, MAX_POSES, MAX_POSITIONS, global_laser_fixes};
 pub use index::{MAX_WALLS, WallIndex};
 pub use params::LaserFixParams;
 pub use search::laser_fix;

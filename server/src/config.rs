@@ -168,6 +168,8 @@ pub struct Limits {
     pub jobs: usize,
     /// Finished jobs that are retained.
     pub jobs_kept: usize,
+    /// Answers to frames that are stored; the oldest go.
+    pub stored_answers: usize,
     /// Answers to creations that are kept for repeats, for a day at most; the oldest go.
     pub kept_answers: usize,
     /// Commits of each map that are kept; the oldest go.
@@ -204,6 +206,7 @@ impl Default for Limits {
             write_queue: 256,
             jobs: 64,
             jobs_kept: 1_000,
+            stored_answers: 2_000,
             kept_answers: 10_000,
             kept_commits: 1_000,
             history_bytes: 4 << 30,
@@ -214,7 +217,7 @@ impl Default for Limits {
 
 impl Limits {
     /// Name and value of every bound that must not be 0.
-    fn counts(&self) -> [(&'static str, usize); 25] {
+    fn counts(&self) -> [(&'static str, usize); 26] {
         [
             ("limits.frame_bytes", self.frame_bytes),
             ("limits.frame_pixels", self.frame_pixels),
@@ -237,6 +240,7 @@ impl Limits {
             ("limits.page", self.page),
             ("limits.write_queue", self.write_queue),
             ("limits.jobs", self.jobs),
+            ("limits.stored_answers", self.stored_answers),
             ("limits.kept_answers", self.kept_answers),
             ("limits.kept_commits", self.kept_commits),
             ("limits.history_bytes", self.history_bytes),

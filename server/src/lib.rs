@@ -6,12 +6,14 @@
 pub mod config;
 mod identity;
 pub mod audit_files;
+mod events;
 pub mod backup;
 pub mod bus;
 pub mod ros2;
 mod store;
 mod publication;
 mod failed_gates;
+mod recording_answers;
 mod jobs;
 pub mod gather;
 pub mod calibrating;

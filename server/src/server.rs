@@ -4,20 +4,24 @@ use crate::{
     backup::Backups,
     bus::{Bus, BusError, Receivers},
     config::Config,
+    events::{EventLog, watch_changes::watch_changes},
     gather::{self, Gatherer, GatheringTap, OfferedFrame},
     http::{self, App, Services},
     identity::{Sessions, TokenId, certificates::Certificates, local_token::LocalToken},
     jobs::Jobs,
     publication::{Catalogue, CatalogueTasks},
+    recording_answers::store_answers,
     ros2::Ros2,
     store::{OpenError, StoreError, actor::Actor, landmarks, now_ms, pictures},
 };
 use engine::{
+    answer_records::{AnswerRecord, answer_records},
     decode::ImageLimits,
     findings::{FindingSender, LandmarkFinding, findings},
     intake::{FrameJob, Intake},
     live::LiveHub,
     motion::MotionTracker,
+    panics::Panics,
     slots::Slots,
     snapshot::Snapshots,
     vitals::{Failure, Pulse, Vitals},
@@ -112,7 +116,8 @@ struct Tasks {
     bus: Bus,
     http: JoinHandle<()>,
     jobs: JoinHandle<()>,
-    findings: JoinHandle<()>,
+    /// Of findings, stored answers and events.
+    recorders: [JoinHandle<()>; 3],
     gather: JoinHandle<()>,
     pictures: JoinHandle<()>,
     backups: JoinHandle<()>,
@@ -138,13 +143,12 @@ impl Server {
         let (tap, offered) = gather::gathering_tap();
         let teaching = Teaching::start(&config, &store, (&tap, offered), &stopping).await?;
         let (findings, found) = findings();
-        let engine = engine(&config, snapshots.clone(), vitals.clone(), (findings, tap));
+        let (engine, recorded) = engine(&config, snapshots.clone(), vitals.clone(), (findings, tap));
         let is_on =
             |map: &Name, robot: &Name| snapshots.robot_map(robot.as_str()).as_deref() == Some(map.as_str());
         engine.motion.mappings().count_in(vitals.panics().clone());
         engine.motion.mappings().resume_in(config.data.join("mapping"), is_on);
-        let pulse = vitals.begin("the task that stores findings");
-        let findings = tokio::spawn(store_findings(store.clone(), found, pulse));
+        let recorders = recorders(&config, &store, (found, recorded, &engine.live), &stopping);
         let pictures = tokio::spawn(pictures::check_all((*store).clone(), stopping.clone()));
         let (live, slots) = (engine.live.clone(), engine.slots.clone());
         let to = receivers(&config, &engine);
@@ -154,7 +158,7 @@ impl Server {
         let publisher = Arc::new(ros2.publisher(outbox.clone()));
         vitals.probe("the outbox", move || outbox.is_running());
         let workers = Workers::start(&engine, config.workers, &publisher).map_err(StartError::Threads)?;
-        let (backups, backups_task) = Backups::start(&config, vitals.panics().clone(), stopping.clone());
+        let (backups, backups_task) = Backups::start(&config, told(&store), stopping.clone());
         let services = Services {
             jobs: teaching.jobs,
             gatherer: teaching.gatherer,
@@ -175,7 +179,7 @@ impl Server {
             bus,
             http,
             jobs: teaching.jobs_task,
-            findings,
+            recorders,
             gather: teaching.gather_task,
             pictures,
             backups: backups_task,
@@ -246,6 +250,23 @@ impl Teaching {
     }
 }
 
+/// Stores findings and answers, and tells readers of events what changes.
+fn recorders(
+    config: &Config,
+    store: &Catalogue,
+    (found, recorded, live): (Receiver<LandmarkFinding>, Receiver<AnswerRecord>, &Arc<LiveHub>),
+    stopping: &watch::Receiver<bool>,
+) -> [JoinHandle<()>; 3] {
+    let pulse = store.vitals().begin("the task that stores findings");
+    let findings = store_findings(store.clone(), found, pulse);
+    let part = |name| (store.vitals().begin(name), stopping.clone());
+    let max = config.limits.stored_answers;
+    let answers = store_answers(store.clone(), recorded, max, part("the task that stores answers"));
+    let watched = (store.snapshots().clone(), store.tokens().clone(), live.clone());
+    let events = watch_changes(store.events().clone(), watched, part("the task that tells events"));
+    [tokio::spawn(findings), tokio::spawn(answers), tokio::spawn(events)]
+}
+
 fn serve(
     (listener, tls): (TcpListener, Option<TlsAcceptor>),
     app: App,
@@ -260,15 +281,21 @@ fn serve(
     })
 }
 
-/// Everything between frames and answers, for one set of settings.
+/// Whom a backup tells of its panics and of its end.
+fn told(store: &Catalogue) -> (Arc<Panics>, Arc<EventLog>) {
+    (store.vitals().panics().clone(), store.events().clone())
+}
+
+/// Everything between frames and answers, for one set of settings; and the answers that are to be stored.
 fn engine(
     config: &Config,
     snapshots: Arc<Snapshots>,
     vitals: Arc<Vitals>,
     (findings, frame_tap): (FindingSender, GatheringTap),
-) -> Engine {
+) -> (Engine, Receiver<AnswerRecord>) {
+    let (records, recorded) = answer_records();
     let live = Arc::new(LiveHub::default());
-    Engine {
+    let engine = Engine {
         slots: Arc::new(Slots::new(config.limits.cameras)),
         motion: Arc::new(MotionTracker::new(snapshots.clone(), live.clone())),
         snapshots,
@@ -276,10 +303,12 @@ fn engine(
         limits: ImageLimits { bytes: config.limits.frame_bytes, pixels: config.limits.frame_pixels },
         vitals,
         findings,
+        records,
         relocalisers: Arc::default(),
         frame_tap: Arc::new(frame_tap),
         search_every_frame: config.search_every_frame,
-    }
+    };
+    (engine, recorded)
 }
 
 /// Stores findings about landmarks, until the last worker has stopped.
@@ -361,7 +390,7 @@ impl RunningServer {
         self.vitals.stop();
         self.local_token.remove();
         self.stop.send_replace(true);
-        let Tasks { workers, bus, http, jobs, findings, gather, pictures, backups, writer, watch } =
+        let Tasks { workers, bus, http, jobs, recorders, gather, pictures, backups, writer, watch } =
             self.tasks;
         watch.abort();
         // Workers first: what they have in work is still answered over the open bus.
@@ -371,10 +400,13 @@ impl RunningServer {
         }
         self.ros2.close().await;
         bus.close().await;
+        let [findings, answers, events] = recorders;
         let others = [
             ("HTTP", http),
             ("jobs", jobs),
             ("findings", findings),
+            ("stored answers", answers),
+            ("events", events),
             ("gathering", gather),
             ("the check of the pictures", pictures),
             ("the timetable of backups", backups),

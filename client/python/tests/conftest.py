@@ -5,6 +5,7 @@ WAYMARK_BIN names the program; without it, the one that `cargo build` made in `t
 
 from __future__ import annotations
 
+import contextlib
 import os
 import subprocess
 from collections.abc import Iterator
@@ -32,13 +33,12 @@ class Server:
         return MapClient(self.http)
 
 
-@pytest.fixture(scope="session")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    """One server for all tests; each test has maps and robots of its own names."""
+@contextlib.contextmanager
+def serving(data: Path) -> Iterator[Server]:
+    """A server with its data in this directory, until the end."""
     program = Path(os.environ.get("WAYMARK_BIN", ROOT / "target" / "debug" / "waymark"))
     if not program.is_file():
         pytest.fail(f"no {program}: cargo build --bin waymark, or set WAYMARK_BIN")
-    data = tmp_path_factory.mktemp("waymark")
     listen = ["--http", "127.0.0.1:0", "--zenoh", "tcp/127.0.0.1:0"]
     command = [str(program), "serve", *listen, "--log", "warn", "--data", str(data)]
     # Variables of this name are settings of the server.
@@ -51,6 +51,13 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
         finally:
             process.terminate()
             process.wait(20)
+
+
+@pytest.fixture(scope="session")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    """One server for all tests; each test has maps and robots of its own names."""
+    with serving(tmp_path_factory.mktemp("waymark")) as running:
+        yield running
 
 
 @pytest.fixture(scope="session")

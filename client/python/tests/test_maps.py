@@ -63,6 +63,8 @@ OTHER_NAMES = {
     # Keyword arguments stand for the second method.
     "upload_view_with": "upload_view",
     "publish_odometry_at": "publish_odometry",
+    # An inbox that one iterates over.
+    "map_versions": "map_changes",
 }
 # Methods of Rust that are not here, with the reason.
 NOT_HERE = {
@@ -70,6 +72,8 @@ NOT_HERE = {
     "publish_raw_frame",
     # The constructors.
     "new",
+    # Iteration.
+    "next",
 }
 QUARTER = math.pi / 2
 

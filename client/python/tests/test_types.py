@@ -49,6 +49,7 @@ NOT_DESCRIBED = {
     # A part of a form; one of several forms.
     "CaptureMetadata",
     "FindingBody",
+    "ServerEvent",
 }
 
 

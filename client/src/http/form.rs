@@ -11,9 +11,15 @@ pub(super) struct Form {
 }
 
 impl Form {
+    /// A form without parts.
+    pub(super) fn new() -> Self {
+        Self { boundary: fresh_key(), body: Vec::new() }
+    }
+
     /// A form with a photograph.
     pub(super) fn with_image(image: &[u8]) -> Self {
-        let form = Self { boundary: fresh_key(), body: Vec::with_capacity(image.len() + 1024) };
+        let mut form = Self::new();
+        form.body.reserve(image.len() + 1024);
         form.part("name=\"image\"; filename=\"image\"", image)
     }
 

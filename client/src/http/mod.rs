@@ -10,10 +10,12 @@ mod form;
 mod gathering;
 mod health;
 mod history;
+mod landmark_models;
 mod landmarks;
 mod learning;
 mod live;
 mod local_token;
+mod localise;
 mod map_client;
 mod mapping;
 mod maps;
@@ -23,6 +25,8 @@ mod recognise;
 mod reference_runs;
 mod robots;
 mod tls;
+mod server_events;
+mod stored_answers;
 mod tokens;
 mod underlay;
 mod views;
@@ -34,8 +38,10 @@ pub use backups::BackupFile;
 pub use cameras::CameraFrame;
 pub use learning::JobEvents;
 pub use live::LiveEvents;
+pub use localise::Sensed;
 pub use map_client::{MapClient, Revised};
 pub use operation::Operation;
+pub use server_events::ServerEvents;
 pub use views::{LandmarkRegion, NewView};
 
 /// Every operation that [`MapClient`] has a method for.
@@ -47,15 +53,19 @@ pub fn operations() -> impl Iterator<Item = &'static Operation> {
         gathering::OPERATIONS,
         health::OPERATIONS,
         history::OPERATIONS,
+        landmark_models::OPERATIONS,
         landmarks::OPERATIONS,
         learning::OPERATIONS,
         live::OPERATIONS,
+        localise::OPERATIONS,
         mapping::OPERATIONS,
         maps::OPERATIONS,
         modalities::OPERATIONS,
         recognise::OPERATIONS,
         reference_runs::OPERATIONS,
         robots::OPERATIONS,
+        server_events::OPERATIONS,
+        stored_answers::OPERATIONS,
         tokens::OPERATIONS,
         underlay::OPERATIONS,
         views::OPERATIONS,

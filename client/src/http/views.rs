@@ -2,7 +2,7 @@
 
 use super::{form::Form, map_client::MapClient, operation::operations};
 use crate::ClientError;
-use protos::api::{CaptureMetadata, Size, TrainingView};
+use protos::api::{CaptureMetadata, Page, Size, TrainingView, ViewQuery};
 use serde_json::json;
 
 operations! {
@@ -92,6 +92,16 @@ impl MapClient {
             form = form.text("width_m", &width_m.to_string()).text("height_m", &height_m.to_string());
         }
         self.send(form.of(self.ask(&UPLOAD, &[&map, &landmark])?)).await
+    }
+
+    /// A page of the views that a query selects, with their number on all pages.
+    pub async fn find_views(
+        &self,
+        map: &str,
+        landmark: &str,
+        query: &ViewQuery,
+    ) -> Result<Page<TrainingView>, ClientError> {
+        self.send(self.ask_query(&LIST, &[&map, &landmark], query)?).await
     }
 
     /// All views of a landmark, by number.

@@ -107,6 +107,12 @@ impl WallIndex {
         (f(p.x - self.low.x), f(p.y - self.low.y))
     }
 
+    /// The rectangle around the walls: lower and upper corner, metres.
+    pub(super) fn extent(&self) -> [Point2<f64>; 2] {
+        let ends = self.walls.iter().flat_map(|w| [w.a, w.a + w.along * w.length_m]);
+        [self.low, ends.fold(self.low, |high, end| high.sup(&end))]
+    }
+
     /// Whether there are no walls.
     pub fn is_empty(&self) -> bool {
         self.walls.is_empty()

@@ -1,6 +1,9 @@
 //! Parameters of localisation in walls.
 
-use crate::slam::cloud::CloudParams;
+use crate::{
+    check::{self, OutOfRange},
+    slam::cloud::CloudParams,
+};
 use serde::{Deserialize, Serialize};
 
 /// Parameters of localisation in walls.
@@ -61,5 +64,12 @@ impl Default for LaserFixParams {
             rival_share: 0.9,
             apart_chi2: 25.0,
         }
+    }
+}
+
+impl LaserFixParams {
+    pub(super) fn check(&self) -> Result<(), OutOfRange> {
+        check::within("params.end_radius_m", self.end_radius_m, 1e-3, 1.0)?;
+        check::within("params.start_radius_m", self.start_radius_m, self.end_radius_m, 1.0)
     }
 }

@@ -1,7 +1,7 @@
 //! The pose by one scan: several starts, gates and ambiguity.
 
 use crate::{
-    check::{self, OutOfRange},
+    check::OutOfRange,
     laser::Scan,
     laser_fix::{
         fit::descend,
@@ -10,7 +10,7 @@ use crate::{
         params::LaserFixParams,
     },
     pose2::{Pose2, Pose2Covariance},
-    slam::cloud::cloud,
+    slam::cloud::{Cloud, cloud},
 };
 use nalgebra::{SymmetricEigen, Vector3};
 
@@ -25,12 +25,8 @@ pub fn laser_fix(
     p: &LaserFixParams,
 ) -> Result<Result<LaserFix, LaserRefusal>, OutOfRange> {
     prior.check()?;
-    check::within("params.end_radius_m", p.end_radius_m, 1e-3, 1.0)?;
-    check::within("params.start_radius_m", p.start_radius_m, p.end_radius_m, 1.0)?;
-    let mut points_of_scan = cloud(scan, &p.cloud);
-    points_of_scan.points.retain(|q| q.normal.is_some());
-    let stride = points_of_scan.points.len().div_ceil(MAX_POINTS).max(1);
-    points_of_scan.points = points_of_scan.points.into_iter().step_by(stride).collect();
+    p.check()?;
+    let points_of_scan = flat_points(scan, p);
     if points_of_scan.points.len() < p.min_points || walls.is_empty() {
         return Ok(Err(LaserRefusal::FewPoints { points: points_of_scan.points.len() }));
     }
@@ -57,6 +53,15 @@ pub fn laser_fix(
             && other.pose.distance2(prior).is_some_and(|d2| d2 <= p.prior_gate)
     });
     Ok(if rival { Err(LaserRefusal::Ambiguous) } else { Ok(best.clone()) })
+}
+
+/// The points of flat surfaces, thinned evenly.
+pub(super) fn flat_points(scan: &Scan, p: &LaserFixParams) -> Cloud {
+    let mut flat = cloud(scan, &p.cloud);
+    flat.points.retain(|q| q.normal.is_some());
+    let stride = flat.points.len().div_ceil(MAX_POINTS).max(1);
+    flat.points = flat.points.into_iter().step_by(stride).collect();
+    flat
 }
 
 /// The prior's mean and, if the prior is wide, points along its axes.

@@ -67,6 +67,12 @@ impl JobState {
             Self::Cancelled => "cancelled",
         }
     }
+
+    /// The state of a word; an unknown one counts as `queued`.
+    pub fn of_word(word: &str) -> Self {
+        let all = [Self::Queued, Self::Running, Self::Done, Self::Failed, Self::Cancelled];
+        all.into_iter().find(|state| state.as_str() == word).unwrap_or(Self::Queued)
+    }
 }
 
 /// Long work.

@@ -206,6 +206,7 @@ pub struct ModalityMapBody {
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::IntoParams))]
 #[serde(deny_unknown_fields)]
+#[cfg_attr(feature = "openapi", into_params(parameter_in = Query))]
 pub struct ModalityQuery {
     /// Metres, in the map.
     pub x_m: f64,

@@ -27,6 +27,39 @@ pub struct TrainingView {
     pub placing: Option<PlacementReportBody>,
 }
 
+/// The order of a list by number; `-` reverses it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub enum NumberOrder {
+    /// The oldest first.
+    #[default]
+    #[serde(rename = "number")]
+    Number,
+    /// The newest first.
+    #[serde(rename = "-number")]
+    NumberReversed,
+}
+
+/// Which views of a landmark are listed, in which order, and which page of them.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::IntoParams))]
+#[serde(deny_unknown_fields)]
+#[cfg_attr(feature = "openapi", into_params(parameter_in = Query))]
+pub struct ViewQuery {
+    /// Most items; 100 by default, bounded by `limits.page`.
+    pub limit: Option<usize>,
+    /// The `next` of the page before; absent for the first page.
+    pub cursor: Option<String>,
+    /// `number` by default.
+    pub sort: Option<NumberOrder>,
+    /// Only those with the pose of the robot that took them, or those without.
+    pub has_capture: Option<bool>,
+    /// Only those stored at this time or later, ms since the Unix epoch.
+    pub since_ms: Option<i64>,
+    /// Only those stored before this time, ms since the Unix epoch.
+    pub until_ms: Option<i64>,
+}
+
 /// What became of an upload.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]

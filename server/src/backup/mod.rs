@@ -13,11 +13,12 @@ pub use restore::{DirectoryError, RestoreError, StoppedServer, Verified, verify}
 
 use crate::{
     config::{BackupSettings, Config, MAX_KEPT},
+    events::EventLog,
     store::{StoreError, copies, kind::Kind, now_ms, pictures, restored},
 };
 use archive::{ArchiveError, Manifest};
 use engine::panics::{Edge, Panics};
-use protos::api::{Backup, BackupHealth, BackupMap, BackupState};
+use protos::api::{Backup, BackupHealth, BackupMap, BackupState, ServerEventBody};
 use sha2::{Digest as _, Sha256};
 use std::{
     fs, io,
@@ -68,6 +69,7 @@ pub(crate) struct Backups {
     folder: PathBuf,
     settings: BackupSettings,
     panics: Arc<Panics>,
+    events: Arc<EventLog>,
     state: Mutex<State>,
 }
 
@@ -75,7 +77,7 @@ impl Backups {
     /// Begins to keep the timetable. Removes what an earlier server has left half written.
     pub(crate) fn start(
         config: &Config,
-        panics: Arc<Panics>,
+        (panics, events): (Arc<Panics>, Arc<EventLog>),
         stopping: watch::Receiver<bool>,
     ) -> (Arc<Self>, JoinHandle<()>) {
         let folder = config.data.join("backups");
@@ -86,6 +88,7 @@ impl Backups {
             folder,
             settings: config.backup,
             panics,
+            events,
             state: Mutex::new(State { newest, ..State::default() }),
         });
         let task = tokio::spawn(backups.clone().keep_timetable(stopping));
@@ -128,13 +131,14 @@ impl Backups {
             state.running = Some((name.clone(), created_ms));
             name
         };
+        self.tell(&name, BackupState::Running);
         let (backups, runtime, work_name) = (self.clone(), Handle::current(), name.clone());
         let work =
             tokio::task::spawn_blocking(move || runtime.block_on(backups.make(&work_name, created_ms)));
         let (backups, ended_name) = (self.clone(), name.clone());
         let task = tokio::spawn(async move {
             let made = backups.panics.joined(Edge::Job, "a backup", "it is not made", work.await);
-            backups.ended(ended_name, created_ms, made.map_err(|e| e.to_string()).flatten());
+            backups.ended(&ended_name, created_ms, made.map_err(|e| e.to_string()).flatten());
         });
         Ok((running(name, created_ms), task))
     }
@@ -175,22 +179,30 @@ impl Backups {
         Ok(archive::finish(part, &manifest)?)
     }
 
-    fn ended(&self, name: String, created_ms: i64, made: Result<(), String>) {
+    fn ended(&self, name: &str, created_ms: i64, made: Result<(), String>) {
         match made {
             Ok(()) => {
                 tracing::info!(name, "backup_made");
                 self.prune();
                 let mut state = self.state();
                 (state.running, state.failed) = (None, None);
-                state.newest = Some((name, created_ms));
+                state.newest = Some((name.to_owned(), created_ms));
+                drop(state);
+                self.tell(name, BackupState::Complete);
             }
             Err(reason) => {
                 tracing::error!(name, reason, "backup_failed");
                 let mut state = self.state();
                 state.running = None;
-                state.failed = Some((name, created_ms, reason));
+                state.failed = Some((name.to_owned(), created_ms, reason));
+                drop(state);
+                self.tell(name, BackupState::Failed);
             }
         }
+    }
+
+    fn tell(&self, name: &str, state: BackupState) {
+        self.events.tell(ServerEventBody::Backup { backup: name.to_owned(), state });
     }
 
     /// Removes all but the newest.

@@ -48,7 +48,7 @@ async fn committed(store: &Catalogue) -> copies::Contents {
 fn backups(dir: &Path, settings: BackupSettings) -> Arc<Backups> {
     let config = Config { backup: settings, ..config(dir) };
     let (stop, stopping) = watch::channel(false);
-    let (backups, _task) = Backups::start(&config, Arc::default(), stopping);
+    let (backups, _task) = Backups::start(&config, Default::default(), stopping);
     drop(stop);
     backups
 }

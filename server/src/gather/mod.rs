@@ -26,7 +26,10 @@ use crate::{
 use engine::{panics::Edge, picture};
 use frame_tap::{ActiveGatherings, lock};
 use map::tracks::{GatherParams, StoredTrack, TrackOutcome, ViewTracker};
-use protos::convert::Encoding;
+use protos::{
+    api::{GatheringChange, ServerEventBody},
+    convert::Encoding,
+};
 use std::{collections::BTreeMap, sync::Arc};
 use tokio::sync::mpsc::Receiver;
 use vision::{
@@ -112,6 +115,11 @@ impl Gatherer {
         self.active.load().values().find(|s| s.id == id).cloned()
     }
 
+    fn tell(&self, map: &str, gathering: i64, change: GatheringChange) {
+        let map = map.to_owned();
+        self.store.events().tell(ServerEventBody::Gathering { map, gathering, change });
+    }
+
     /// Starts a gathering. Durable when this returns.
     pub(crate) async fn begin(
         self: &Arc<Self>,
@@ -123,7 +131,10 @@ impl Gatherer {
             Box::pin(async move {
                 let row = gatherings::create(tx, &map, &new, GatheringLimits::SERVER).await?;
                 let begun = row.clone();
-                tx.after(move || gatherer.enter(&begun, ViewTracker::new(GatherParams::default())));
+                tx.after(move || {
+                    gatherer.tell(&begun.map, begun.id, GatheringChange::Begun);
+                    gatherer.enter(&begun, ViewTracker::new(GatherParams::default()));
+                });
                 Ok(row)
             })
         });
@@ -137,7 +148,11 @@ impl Gatherer {
         let (gatherer, map) = (self.clone(), map.to_owned());
         let write = self.store.write(move |tx| {
             Box::pin(async move {
-                tx.after(move || gatherer.leave(id));
+                let ended = map.clone();
+                tx.after(move || {
+                    gatherer.leave(id);
+                    gatherer.tell(&ended, id, GatheringChange::Ended);
+                });
                 gatherings::end(tx, &map, id, &counts).await
             })
         });
@@ -149,7 +164,11 @@ impl Gatherer {
         let (gatherer, map) = (self.clone(), map.to_owned());
         let write = self.store.write(move |tx| {
             Box::pin(async move {
-                tx.after(move || gatherer.leave(id));
+                let deleted = map.clone();
+                tx.after(move || {
+                    gatherer.leave(id);
+                    gatherer.tell(&deleted, id, GatheringChange::Deleted);
+                });
                 gatherings::delete(tx, &map, id).await
             })
         });
@@ -167,7 +186,11 @@ impl Gatherer {
         let (map, numbers) = (map.to_owned(), tracks.iter().map(|t| t.number).collect::<Vec<_>>());
         let lesson = lesson.then_some(request::Request::of as fn(&[String]) -> String);
         let gatherer = self.clone();
-        let after = Arc::new(move || gatherer.decided(id, numbers.iter().copied()));
+        let decided = map.clone();
+        let after = Arc::new(move || {
+            gatherer.decided(id, numbers.iter().copied());
+            gatherer.tell(&decided, id, GatheringChange::Decided);
+        });
         let decision = Decision { map, gathering: id, tracks, lesson, limits, after };
         track_acceptance::accept(&self.store, decision).await
     }
@@ -177,7 +200,11 @@ impl Gatherer {
         let (gatherer, map) = (self.clone(), map.to_owned());
         let write = self.store.write(move |tx| {
             Box::pin(async move {
-                tx.after(move || gatherer.decided(id, [number]));
+                let decided = map.clone();
+                tx.after(move || {
+                    gatherer.decided(id, [number]);
+                    gatherer.tell(&decided, id, GatheringChange::Decided);
+                });
                 gatherings::discard(tx, &map, id, number).await
             })
         });

@@ -1,15 +1,8 @@
-//! Parts of answers: pages of lists, covariances, stored pictures, what is kept of creations.
+//! Parts of answers: pages of lists, covariances, what is kept of creations.
 
 use super::{error::ApiError, extract::page_limit};
-use crate::store::{
-    kept_answers::{Answer, answered},
-    pictures::{self, Digest},
-};
-use axum::{
-    Json,
-    http::{StatusCode, header},
-    response::{IntoResponse, Response},
-};
+use crate::store::kept_answers::{Answer, answered};
+use axum::{Json, http::StatusCode};
 use nalgebra::Matrix3;
 use protos::api::{ListOrder, ListQuery, Page};
 use serde::Serialize;
@@ -101,21 +94,6 @@ pub(super) async fn created<T: 'static, B: Serialize, E: Into<ApiError>>(
     let made = answered(kept, work).await.map_err(Into::into)?;
     let (status, body) = shown(&made);
     Ok((status, Json(body)))
-}
-
-/// A stored picture as it was uploaded; its digest is its `ETag`.
-pub(super) fn picture_answer(
-    kind: &str,
-    sha256: &Digest,
-    cache_control: &'static str,
-    image: Vec<u8>,
-) -> Response {
-    let headers = [
-        (header::CONTENT_TYPE, format!("image/{kind}")),
-        (header::ETAG, format!("\"{}\"", pictures::hex(sha256))),
-        (header::CACHE_CONTROL, cache_control.to_owned()),
-    ];
-    (headers, image).into_response()
 }
 
 #[cfg(test)]

@@ -14,7 +14,7 @@ use crate::{
         Denial, Principal, TokenId,
         authorisation::{self, Access, Forbidden, Scope},
     },
-    store::{StoreError, actor::Actor, kind::Kind, now_ms},
+    store::{StoreError, actor::Actor, kind::Kind, now_ms, stored_answers},
 };
 use axum::{
     extract::{FromRequestParts, MatchedPath, RawPathParams, Request, State},
@@ -30,6 +30,14 @@ use std::{path::Path, time::Instant};
 pub(super) const PAGE_HEADER: HeaderName = HeaderName::from_static("x-waymark-page");
 /// Set by proxies: then the peer is not who asks.
 const FORWARDED: [&str; 2] = ["forwarded", "x-forwarded-for"];
+
+/// Who asks, and by which session of the page.
+#[derive(Debug, Clone)]
+pub(super) struct Asker {
+    pub(super) principal: Principal,
+    /// Value of the session's cookie; `None` for a token.
+    pub(super) session: Option<String>,
+}
 
 /// The middleware.
 pub(super) async fn authorise(State(app): State<AppState>, request: Request, next: Next) -> Response {
@@ -80,6 +88,9 @@ async fn admitted(app: &AppState, parts: &mut Parts) -> Result<(), ApiError> {
     let principal = principal(app, parts, role)?;
     authorisation::check(&principal, role, scope).map_err(|reason| forbidden(&principal, reason))?;
     check_scope(app, parts, &principal, scope).await?;
+    let is_session = !parts.headers.contains_key(header::AUTHORIZATION);
+    let session = session_cookie(&parts.headers).filter(|_| is_session).map(str::to_owned);
+    parts.extensions.insert(Asker { principal: principal.clone(), session });
     parts.extensions.insert(principal);
     Ok(())
 }
@@ -139,6 +150,13 @@ async fn check_scope(
                 if principal.may_see(&job.map) { Ok(()) } else { Err(foreign().into()) }
             }
             // The handler says what is wrong with it.
+            Err(_) => Ok(()),
+        },
+        Scope::Answer => match value("answer").parse() {
+            Ok(id) => {
+                let map = stored_answers::map_of(app.store.reads(), id).await?;
+                if principal.may_see(&map) { Ok(()) } else { Err(stored_answers::unknown(id).into()) }
+            }
             Err(_) => Ok(()),
         },
         Scope::Own | Scope::Server => Ok(()),

@@ -60,6 +60,8 @@ fn add_errors(operation: &mut Operation, is_changing: bool) {
     for p in operation.parameters.clone().iter().flatten() {
         let RefOr::T(p) = p else { continue };
         match p.name.as_str() {
+            "limit" => errors.push(("422", "out_of_range")),
+            "cursor" => errors.push(("422", "invalid_value")),
             "Idempotency-Key" => {
                 errors.extend([("409", "in_progress"), ("422", "idempotency_key_reused, invalid_value")]);
             }

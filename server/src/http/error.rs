@@ -107,6 +107,7 @@ fn unknown(what: Kind) -> (&'static str, &'static str) {
         Kind::Token => ("unknown_token", "token"),
         Kind::Backup => ("unknown_backup", "backup"),
         Kind::Commit => ("unknown_commit", "commit"),
+        Kind::Answer => ("unknown_answer", "answer"),
         Kind::Model | Kind::Picture => ("not_found", "path"),
     }
 }

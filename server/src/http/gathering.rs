@@ -7,6 +7,7 @@ use super::{
     error::ApiError,
     extract::{Body, PathParams, QueryParams, after_number, name, page_limit},
     learning::job_shown,
+    pictures::{FOREVER, IfNoneMatch, grey_answer},
     views::placement_shown,
 };
 use crate::{
@@ -19,13 +20,7 @@ use crate::{
         track_acceptance::{self, AcceptanceResult, TrackAcceptance},
     },
 };
-use axum::{
-    Extension, Json,
-    extract::State,
-    http::{StatusCode, header},
-    response::{IntoResponse, Response},
-};
-use engine::picture;
+use axum::{Extension, Json, extract::State, http::StatusCode, response::Response};
 use protos::api::{
     AcceptRequest, AcceptanceBody, AcceptedTrackBody, ExtendedLandmark, Gathering, GatheringCountsBody,
     NewGatheringBody, Page, PageQuery, Problem, TrackList,
@@ -206,10 +201,12 @@ async fn discard(
 /// The rectified picture of a view of a track, as PNG.
 #[utoipa::path(get, path = "/maps/{map}/gatherings/{gathering}/tracks/{track}/views/{view}/icon",
     tag = "gathering", params(("map" = String, Path), ("gathering" = i64, Path), ("track" = u32, Path),
-    ("view" = i64, Path)), responses((status = 200, content_type = "image/png"), (status = 404, body = Problem)))]
+    ("view" = i64, Path)), responses((status = 200, content_type = "image/png"),
+    (status = 304, description = "`If-None-Match` has it"), (status = 404, body = Problem)))]
 async fn show_icon(
     State(app): State<AppState>,
     PathParams((map, id, number, view)): PathParams<(String, i64, u32, i64)>,
+    known: IfNoneMatch,
 ) -> Result<Response, ApiError> {
     gatherings::get(app.store.reads(), &map, id).await?;
     let views = gatherings::track_views(app.store.reads(), id, number).await?;
@@ -219,10 +216,7 @@ async fn show_icon(
     };
     let icon = views.into_iter().find(|v| v.id == view).ok_or_else(unknown)?.crop.icon;
     let grey: Vec<u8> = icon.pixels.iter().map(|g| *g as u8).collect();
-    let png = picture::png(icon.size, icon.size, &grey).map_err(|e| ApiError::internal(&e))?;
-    let headers =
-        [(header::CONTENT_TYPE, "image/png"), (header::CACHE_CONTROL, "private, max-age=86400, immutable")];
-    Ok((headers, png).into_response())
+    grey_answer(&known, FOREVER, (icon.size, &grey)).await
 }
 
 /// Most tracks of one decision.

@@ -188,7 +188,7 @@ fn landmark_shown(row: LandmarkRow, context: &Context<'_>) -> Landmark {
 }
 
 /// The landmark with what only the running server knows: a model out of use, a job at work.
-fn shown(app: &App, learning: &Learning, map: &str, row: LandmarkRow) -> Landmark {
+pub(super) fn shown(app: &App, learning: &Learning, map: &str, row: LandmarkRow) -> Landmark {
     let snapshot = app.store.snapshots().get(map);
     let snapshot = snapshot.as_deref();
     let unusable = snapshot.and_then(|s| s.unusable_models.get(&LandmarkId(row.id as u64)).cloned());

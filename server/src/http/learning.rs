@@ -3,6 +3,7 @@
 use super::{
     AppState,
     answers::{created, page},
+    authorise::Asker,
     error::ApiError,
     extract::{Body, PathParams, QueryParams, number_cursor, page_limit},
 };
@@ -41,13 +42,7 @@ pub(super) fn router() -> OpenApiRouter<AppState> {
 
 /// A job as it stands.
 pub(super) fn job_shown(row: JobRow, progress: Option<&JobProgress>) -> Job {
-    let state = match row.state.as_str() {
-        "done" => JobState::Done,
-        "failed" => JobState::Failed,
-        "cancelled" => JobState::Cancelled,
-        "running" => JobState::Running,
-        _ => JobState::Queued,
-    };
+    let state = JobState::of_word(&row.state);
     Job {
         id: row.id,
         kind: row.kind,
@@ -150,11 +145,7 @@ async fn list(
     let limit = page_limit(query.limit, app.config.limits.page)?;
     // Every number is less than that of the first page.
     let before = number_cursor(query.cursor.as_deref())?.unwrap_or(i64::MAX);
-    let maps = match query.map {
-        Some(map) => Some(if principal.may_see(&map) { vec![map] } else { Vec::new() }),
-        None => principal.maps.map(|maps| maps.into_iter().collect()),
-    };
-    let maps = maps.map(|names| serde_json::json!(names).to_string());
+    let maps = principal.visible_maps(query.map).map(|names| serde_json::json!(names).to_string());
     let filter = JobFilter { state: query.state.map(JobState::as_str), maps };
     let (jobs, total) = app.jobs.page(&filter, before, limit + 1).await?;
     Ok(Json(page(jobs, limit, total, |(row, _)| row.id.to_string(), |(row, p)| job_shown(row, p.as_ref()))))
@@ -182,7 +173,7 @@ async fn cancel(State(app): State<AppState>, PathParams(id): PathParams<i64>) ->
 async fn events(
     State(app): State<AppState>,
     PathParams(id): PathParams<i64>,
-    Extension(principal): Extension<Principal>,
+    Extension(asker): Extension<Asker>,
 ) -> Result<Sse<impl Stream<Item = Result<Event, Infallible>>>, ApiError> {
     let place = app.stream_place()?;
     let progress = app.jobs.watch(id).await?;
@@ -190,7 +181,7 @@ async fn events(
         Some(progress) => WatchStream::new(progress).map(|_| ()).left_stream(),
         None => stream::iter([()]).right_stream(),
     };
-    let stopping = app.ended_for(principal);
+    let stopping = app.ended_for(asker);
     // The sender of the changes goes when the job has ended; one more look then shows how.
     let states = changes.chain(stream::iter([()])).then(move |()| {
         let (app, _place) = (app.clone(), &place);

@@ -2,10 +2,10 @@
 
 use super::{
     AppState,
+    authorise::Asker,
     error::ApiError,
     extract::{PathParams, name},
 };
-use crate::identity::Principal;
 use crate::store::kind::Kind;
 use crate::store::{StoreError, maps, robots};
 use axum::{
@@ -21,6 +21,7 @@ use engine::live::{LiveEvent, LiveFrame};
 use futures::{Stream, StreamExt};
 use map::pose2::Pose2;
 use protos::{
+    Name,
     api::{Problem, TrajectoriesBody},
     convert::geometry::pose2_wire,
     v1,
@@ -40,9 +41,10 @@ pub(super) fn router() -> OpenApiRouter<AppState> {
 /// The last frame of a camera.
 async fn last(app: &AppState, robot: String, camera: String) -> Result<LiveFrame, ApiError> {
     robots::get(app.store.reads(), &robot).await?;
-    let (robot, camera) = (name("robot", robot)?, name("camera", camera)?);
-    let frame = app.live.frame(&robot, &camera);
-    Ok(frame.ok_or_else(|| StoreError::NotFound { what: Kind::Camera, name: camera.into() })?)
+    let robot = name("robot", robot)?;
+    // What is no name is no camera.
+    let frame = Name::new(camera.as_str()).ok().and_then(|camera| app.live.frame(&robot, &camera));
+    Ok(frame.ok_or_else(|| StoreError::NotFound { what: Kind::Camera, name: camera })?)
 }
 
 /// The last answered frame of a camera, as a picture.
@@ -101,7 +103,7 @@ async fn trajectories(
 async fn events(
     State(app): State<AppState>,
     PathParams(map): PathParams<String>,
-    Extension(principal): Extension<Principal>,
+    Extension(asker): Extension<Asker>,
 ) -> Result<Sse<impl Stream<Item = Result<Event, Infallible>>>, ApiError> {
     let place = app.stream_place()?;
     let events = BroadcastStream::new(app.live.events());
@@ -115,7 +117,7 @@ async fn events(
         };
         std::future::ready(shown.map(Ok))
     });
-    Ok(Sse::new(events.take_until(app.ended_for(principal))).keep_alive(KeepAlive::default()))
+    Ok(Sse::new(events.take_until(app.ended_for(asker))).keep_alive(KeepAlive::default()))
 }
 
 fn shown(event: &LiveEvent) -> Option<Event> {

@@ -14,21 +14,25 @@ mod creation;
 mod documented;
 pub(crate) mod encryption;
 mod error;
+mod events;
 mod examples;
 mod extract;
 mod gathering;
 mod guard;
 mod health;
 mod history;
+mod landmark_models;
 mod landmarks;
 mod learning;
 mod live;
+mod localise;
 mod mapping;
 mod maps;
 mod modalities;
 mod page_session;
 mod pages;
 mod peer;
+mod pictures;
 mod recognise;
 mod reference_runs;
 mod relocalisation;
@@ -37,6 +41,7 @@ mod robots;
 mod ros2;
 mod router;
 mod security;
+mod stored_answers;
 mod tokens;
 mod underlay;
 mod upload;
@@ -51,19 +56,18 @@ mod tests;
 pub(crate) use router::router;
 
 use crate::{
-    backup::Backups,
-    config::Config,
-    gather::Gatherer,
-    identity::{Principal, Sessions},
-    jobs::Jobs,
-    publication::Catalogue,
-    ros2::Ros2,
-    store::now_ms,
+    backup::Backups, config::Config, gather::Gatherer, identity::Sessions, jobs::Jobs,
+    publication::Catalogue, ros2::Ros2, store::now_ms,
 };
+use authorise::Asker;
 use axum::http::StatusCode;
 use engine::{live::LiveHub, motion::MotionTracker, panics::Edge, relocalise::Relocalisers, workers::Engine};
 use error::ApiError;
-use std::{path::PathBuf, sync::Arc, time::Duration};
+use std::{
+    path::PathBuf,
+    sync::Arc,
+    time::{Duration, Instant},
+};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, SemaphorePermit, watch};
 
 /// Where the API lives.
@@ -188,17 +192,26 @@ impl App {
         })
     }
 
-    /// Ends when the server stops, or the principal's token is revoked, expires or is for other maps.
-    fn ended_for(&self, principal: Principal) -> impl Future<Output = ()> + Send + use<> {
-        let (tokens, stopped) = (self.store.tokens().clone(), self.stopped());
+    /// Ends when the server stops, the session is logged out, or the token is revoked, expires or is for other maps.
+    fn ended_for(&self, Asker { principal, session }: Asker) -> impl Future<Output = ()> + Send + use<> {
+        let (tokens, sessions, stopped) =
+            (self.store.tokens().clone(), self.sessions.clone(), self.stopped());
         let denied = async move {
-            let mut changes = tokens.changes();
-            while tokens.principal(principal.token, now_ms()).as_ref() == Ok(&principal) {
+            let (mut token_changes, mut session_changes) = (tokens.changes(), sessions.changes());
+            let is_open = || {
+                session.as_ref().is_none_or(|cookie| sessions.token(cookie, Instant::now()).is_some())
+                    && tokens.principal(principal.token, now_ms()).as_ref() == Ok(&principal)
+            };
+            while is_open() {
                 let left = principal.expires_ms.map_or(STREAM_CHECK, |end| {
                     Duration::from_millis(end.saturating_sub(now_ms()).max(1) as u64).min(STREAM_CHECK)
                 });
                 // Either way, one more look.
-                drop(tokio::time::timeout(left, changes.changed()).await);
+                tokio::select! {
+                    _ = token_changes.changed() => {}
+                    _ = session_changes.changed() => {}
+                    () = tokio::time::sleep(left) => {}
+                }
             }
         };
         async move {

@@ -132,6 +132,7 @@ async fn delete(
     State(app): State<AppState>,
     PathParams(robot): PathParams<String>,
 ) -> Result<StatusCode, ApiError> {
+    robots::get(app.store.reads(), &robot).await?;
     let (gone, motion) = (name("robot", robot)?, app.motion.clone());
     let write = app.store.write(move |tx| {
         Box::pin(async move {

@@ -3,11 +3,12 @@
 use super::{
     API, App, AppState, audit, authorise, backups, bulk, cameras, creation, documented,
     error::{ApiError, method_not_allowed, not_found},
+    events,
     examples::with_examples,
-    gathering, guard, health, history, landmarks, learning, live, mapping, maps, modalities, page_session,
-    pages, recognise, reference_runs, relocalisation, revision, robots, ros2,
+    gathering, guard, health, history, landmark_models, landmarks, learning, live, localise, mapping, maps,
+    modalities, page_session, pages, recognise, reference_runs, relocalisation, revision, robots, ros2,
     security::with_security,
-    tokens, underlay, views, visibility, visibility_settings, walls,
+    stored_answers, tokens, underlay, views, visibility, visibility_settings, walls,
 };
 use crate::config::Limits;
 use axum::{
@@ -44,6 +45,7 @@ fn api(limits: &Limits) -> OpenApiRouter<AppState> {
         .merge(mapping::router())
         .merge(landmarks::router())
         .merge(bulk::router())
+        .merge(landmark_models::router())
         .merge(views::router(limits.upload_bytes))
         .merge(learning::router())
         .merge(gathering::router())
@@ -52,12 +54,15 @@ fn api(limits: &Limits) -> OpenApiRouter<AppState> {
         .merge(reference_runs::router())
         .merge(visibility_settings::router())
         .merge(recognise::router(limits.upload_bytes))
+        .merge(localise::router(limits.upload_bytes))
+        .merge(stored_answers::router())
         .merge(robots::router())
         .merge(relocalisation::router())
         .merge(ros2::router())
         .merge(cameras::router())
         .merge(backups::router())
         .merge(live::router())
+        .merge(events::router())
         .merge(tokens::router())
         .merge(audit::router())
         .merge(page_session::api())

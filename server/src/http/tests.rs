@@ -3,10 +3,13 @@
 mod authorisation;
 mod creation;
 mod earlier_build;
+mod events;
 mod lists;
+mod localise;
 mod openapi;
 mod page_sessions;
 mod revision;
+mod stored_answers;
 mod teaching;
 
 use super::*;
@@ -57,8 +60,8 @@ impl Service {
         let (jobs, _) = Jobs::start(store.clone(), config.clone(), stopping.clone()).await.unwrap();
         let (tap, frames) = crate::gather::gathering_tap();
         let (gatherer, _) = Gatherer::start(store.clone(), &config, &tap, frames).await.unwrap();
-        let (backups, _) =
-            crate::backup::Backups::start(&config, store.vitals().panics().clone(), stopping.clone());
+        let told = (store.vitals().panics().clone(), store.events().clone());
+        let (backups, _) = crate::backup::Backups::start(&config, told, stopping.clone());
         let hall = Arc::new(MapSnapshot::empty("hall", 1));
         let engine =
             Engine { vitals: store.vitals().clone(), frame_tap: Arc::new(tap), ..scene::engine(&[hall]) };

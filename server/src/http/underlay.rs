@@ -2,9 +2,9 @@
 
 use super::{
     App, AppState,
-    answers::picture_answer,
     error::{ApiError, out_of_range},
     extract::{self, PathParams},
+    pictures::{ASK_AGAIN, IfNoneMatch, PictureHead},
     revision::{IfMatch, Revised},
     upload::{FORM_OVERHEAD, Form},
 };
@@ -135,13 +135,15 @@ async fn delete(
 
 /// The picture under the map, as it was uploaded.
 #[utoipa::path(get, path = "/maps/{map}/underlay/image", tag = "maps", params(("map" = String, Path)), responses(
-    (status = 200, content_type = "image/png"), (status = 404, body = Problem)))]
+    (status = 200, content_type = "image/png"), (status = 304, description = "`If-None-Match` has it"),
+    (status = 404, body = Problem)))]
 async fn image(
     State(app): State<AppState>,
     PathParams(map): PathParams<String>,
+    known: IfNoneMatch,
 ) -> Result<Response, ApiError> {
     let map = maps::get(app.store.reads(), &map).await?;
     let row = underlays::get(app.store.reads(), (map.id, &map.name)).await?;
-    let image = pictures::read(&app.store, &row.image_sha256).await?;
-    Ok(picture_answer(&row.image_kind, &row.image_sha256, "no-cache", image))
+    let image = async { Ok(pictures::read(&app.store, &row.image_sha256).await?) };
+    PictureHead::new(&row.image_kind, &row.image_sha256, ASK_AGAIN).answer(&known, image).await
 }

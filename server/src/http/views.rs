@@ -2,10 +2,11 @@
 
 use super::{
     App, AppState,
-    answers::{created, page, picture_answer},
+    answers::{created, page},
     error::ApiError,
-    extract::{self, PathParams, QueryParams, after_number, page_limit},
+    extract::{self, PathParams, QueryParams, number_cursor, page_limit},
     landmarks::checked_size,
+    pictures::{FOREVER, IfNoneMatch, PictureHead, grey_answer},
     upload::{FORM_OVERHEAD, Form},
 };
 use crate::store::{
@@ -14,22 +15,22 @@ use crate::store::{
     landmark_placement::{PlacementReport, StoredCapture},
     landmarks, maps, pictures,
     teaching::{self, Teaching},
-    views::{self, NewView, QuadCrop, UploadOutcome, ViewRow},
+    views::{self, NewView, QuadCrop, UploadOutcome, ViewFilter, ViewRow},
 };
 use axum::{
     Json,
     body::Bytes,
     extract::{DefaultBodyLimit, Request, State},
-    http::{StatusCode, header},
-    response::{IntoResponse, Response},
+    http::StatusCode,
+    response::Response,
 };
 use engine::{
     dominant::{WholeQuad, dominant, others, whole_quads},
     picture,
 };
 use protos::api::{
-    CaptureMetadata, NewViewForm, Page, PageQuery, PlacementReportBody, Problem, Size, TrainingView,
-    UploadOutcomeBody,
+    CaptureMetadata, LandmarkChange, NewViewForm, NumberOrder, Page, PlacementReportBody, Problem,
+    ServerEventBody, Size, TrainingView, UploadOutcomeBody, ViewQuery,
 };
 use serde_json::json;
 use utoipa_axum::{router::OpenApiRouter, routes};
@@ -134,8 +135,19 @@ async fn add(
         capture.map(|c| serde_json::to_string(&c)).transpose().map_err(|e| ApiError::internal(&e))?;
     let create = creates.then_some(app.config.limits.landmarks);
     let view = NewView { capture, ..new };
+    let changed = (map.clone(), landmark.clone());
     let teaching = Teaching { map, landmark, view, max, novelty, size, create };
-    created(added_shown, teaching::add(&app.store, teaching)).await
+    let answer = created(added_shown, teaching::add(&app.store, teaching)).await?;
+    if answer.0 == StatusCode::CREATED {
+        tell_changed(&app, changed);
+    }
+    Ok(answer)
+}
+
+/// Tells readers of events that the views of a landmark are others: that makes no new version of the map.
+fn tell_changed(app: &App, (map, landmark): (String, String)) {
+    let change = LandmarkChange::Changed;
+    app.store.events().tell(ServerEventBody::LandmarkChanged { map, landmark, change });
 }
 
 /// What came of a view.
@@ -258,21 +270,26 @@ fn cut(image: &GrayImage, corners: &Corners, p: &Algorithm) -> Result<Icon, ApiE
     })
 }
 
-/// Lists the views of a landmark by number.
+/// Lists the views of a landmark, the oldest or the newest first.
 #[utoipa::path(get, path = "/maps/{map}/landmarks/{landmark}/views", tag = "landmarks",
-    params(("map" = String, Path), ("landmark" = String, Path), PageQuery),
-    responses((status = 200, body = Page<TrainingView>), (status = 404, body = Problem)))]
+    params(("map" = String, Path), ("landmark" = String, Path), ViewQuery),
+    responses((status = 200, body = Page<TrainingView>), (status = 404, body = Problem),
+    (status = 422, body = Problem, description = "out_of_range, invalid_value")))]
 async fn list(
     State(app): State<AppState>,
     PathParams((map, landmark)): PathParams<(String, String)>,
-    QueryParams(query): QueryParams<PageQuery>,
+    QueryParams(query): QueryParams<ViewQuery>,
 ) -> Result<Json<Page<TrainingView>>, ApiError> {
     let limit = page_limit(query.limit, app.config.limits.page)?;
-    let after = after_number(&query)?;
+    let last = number_cursor(query.cursor.as_deref())?;
     maps::get(app.store.reads(), &map).await?;
     let landmark = landmarks::get(app.store.reads(), &map, &landmark).await?;
-    let rows = views::page(app.store.reads(), landmark.id, after, limit + 1).await?;
-    Ok(Json(page(rows, limit, landmark.views, |r| r.id.to_string(), view_shown)))
+    let ViewQuery { sort, has_capture, since_ms, until_ms, .. } = query;
+    let filter = ViewFilter { has_capture, since_ms, until_ms };
+    let newest_first = sort == Some(NumberOrder::NumberReversed);
+    let rows = views::page(app.store.reads(), landmark.id, filter, (last, newest_first), limit + 1).await?;
+    let total = views::count(app.store.reads(), landmark.id, filter).await?;
+    Ok(Json(page(rows, limit, total, |r| r.id.to_string(), view_shown)))
 }
 
 /// Deletes a view. The model stays until the landmark is learnt again.
@@ -283,40 +300,42 @@ async fn delete(
     State(app): State<AppState>,
     PathParams((map, landmark, view)): PathParams<(String, String, i64)>,
 ) -> Result<StatusCode, ApiError> {
+    let changed = (map.clone(), landmark.clone());
     app.store
         .write(move |tx| Box::pin(async move { views::delete(tx, &map, &landmark, view).await }))
         .await?;
+    tell_changed(&app, changed);
     Ok(StatusCode::NO_CONTENT)
 }
 
-/// The rectified picture that is learnt from, as PNG.
+/// The rectified picture that is learnt from, as PNG. `ETag` is the digest of its grey levels.
 #[utoipa::path(get, path = "/maps/{map}/landmarks/{landmark}/views/{view}/icon", tag = "landmarks",
     params(("map" = String, Path), ("landmark" = String, Path), ("view" = i64, Path)),
-    responses((status = 200, content_type = "image/png"), (status = 404, body = Problem)))]
+    responses((status = 200, content_type = "image/png"), (status = 304, description = "`If-None-Match` has it"),
+    (status = 404, body = Problem)))]
 async fn show_icon(
     State(app): State<AppState>,
     PathParams((map, landmark, view)): PathParams<(String, String, i64)>,
+    known: IfNoneMatch,
 ) -> Result<Response, ApiError> {
     let icon = views::icon(app.store.reads(), &map, &landmark, view).await?;
     let grey: Vec<u8> = icon.pixels.iter().map(|g| *g as u8).collect();
-    let png = picture::png(icon.size, icon.size, &grey).map_err(|e| ApiError::internal(&e))?;
     // A view never changes; its number never comes to mean another.
-    let headers =
-        [(header::CONTENT_TYPE, "image/png"), (header::CACHE_CONTROL, "private, max-age=86400, immutable")];
-    Ok((headers, png).into_response())
+    grey_answer(&known, FOREVER, (icon.size, &grey)).await
 }
 
 /// The photograph as it was uploaded, PNG or JPEG. `ETag` is its SHA-256.
 #[utoipa::path(get, path = "/maps/{map}/landmarks/{landmark}/views/{view}/image", tag = "landmarks",
     params(("map" = String, Path), ("landmark" = String, Path), ("view" = i64, Path)),
-    responses((status = 200, content_type = "image/jpeg"), (status = 404, body = Problem),
-    (status = 500, body = Problem, description = "picture_damaged")))]
+    responses((status = 200, content_type = "image/jpeg"), (status = 304, description = "`If-None-Match` has it"),
+    (status = 404, body = Problem), (status = 500, body = Problem, description = "picture_damaged")))]
 async fn show_image(
     State(app): State<AppState>,
     PathParams((map, landmark, view)): PathParams<(String, String, i64)>,
+    known: IfNoneMatch,
 ) -> Result<Response, ApiError> {
     let (sha256, kind) = views::picture(app.store.reads(), &map, &landmark, view).await?;
-    let image = pictures::read(&app.store, &sha256).await?;
+    let image = async { Ok(pictures::read(&app.store, &sha256).await?) };
     // A view never changes; its number never comes to mean another.
-    Ok(picture_answer(&kind, &sha256, "private, max-age=86400, immutable", image))
+    PictureHead::new(&kind, &sha256, FOREVER).answer(&known, image).await
 }

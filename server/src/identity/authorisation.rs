@@ -15,6 +15,8 @@ pub(crate) enum Scope {
     Robot,
     /// The map of the job of the path.
     Job,
+    /// The map of the stored answer of the path.
+    Answer,
     /// What is above maps: a token for all maps is needed.
     Server,
 }
@@ -55,6 +57,10 @@ const fn robot(method: &'static str, path: &'static str, role: Role) -> Rule {
 
 const fn job(method: &'static str, path: &'static str, role: Role) -> Rule {
     Rule { method, path, access: Access::Needs(role, Scope::Job) }
+}
+
+const fn answer(method: &'static str, path: &'static str, role: Role) -> Rule {
+    Rule { method, path, access: Access::Needs(role, Scope::Answer) }
 }
 
 const fn server(method: &'static str, path: &'static str, role: Role) -> Rule {
@@ -108,6 +114,10 @@ pub(crate) const TABLE: &[Rule] = &[
     map("GET", "/maps/{map}/landmarks/{landmark}", Viewer),
     map("PATCH", "/maps/{map}/landmarks/{landmark}", Teacher),
     map("DELETE", "/maps/{map}/landmarks/{landmark}", Teacher),
+    map("GET", "/maps/{map}/landmarks/{landmark}/model", Viewer),
+    map("GET", "/maps/{map}/landmarks/{landmark}/distances", Viewer),
+    map("GET", "/maps/{map}/landmarks/{landmark}/icon", Viewer),
+    map("GET", "/maps/{map}/duplicates", Viewer),
     map("GET", "/maps/{map}/landmarks/{landmark}/views", Viewer),
     map("POST", "/maps/{map}/landmarks/{landmark}/views", Teacher),
     map("DELETE", "/maps/{map}/landmarks/{landmark}/views/{view}", Teacher),
@@ -120,6 +130,7 @@ pub(crate) const TABLE: &[Rule] = &[
     map("POST", "/maps/{map}/coverage", Viewer),
     map("POST", "/maps/{map}/gaze", Viewer),
     map("POST", "/maps/{map}/recognise", Robot),
+    map("POST", "/maps/{map}/localise", Robot),
     map("GET", "/maps/{map}/modalities", Viewer),
     map("PUT", "/maps/{map}/modalities", Operator),
     map("GET", "/maps/{map}/modalities/at", Viewer),
@@ -151,6 +162,10 @@ pub(crate) const TABLE: &[Rule] = &[
     robot("POST", "/robots/{robot}/cameras/{camera}/calibrate", Robot),
     robot("GET", "/robots/{robot}/cameras/{camera}/frame", Viewer),
     robot("GET", "/robots/{robot}/cameras/{camera}/answer", Viewer),
+    own("GET", "/answers", Viewer),
+    answer("GET", "/answers/{answer}", Viewer),
+    answer("GET", "/answers/{answer}/quads/{quad}/icon", Viewer),
+    own("GET", "/events", Viewer),
     own("GET", "/jobs", Viewer),
     job("GET", "/jobs/{job}", Viewer),
     job("DELETE", "/jobs/{job}", Teacher),
@@ -201,6 +216,7 @@ mod tests {
         | map | the map of the path |\n\
         | robot | the map on which the robot of the path stands |\n\
         | job | the map of the job |\n\
+        | answer | the map of the stored answer |\n\
         | server | a token for all maps |\n\n\
         Paths are below `/api/v1`. The files of the page and the OpenAPI document are open, too; they hold no data.\n\n\
         | operation | least role | scope |\n|---|---|---|\n";
@@ -232,7 +248,12 @@ mod tests {
         assert_eq!(rows.len(), TABLE.len());
         for Rule { method, path, access } in TABLE {
             let Access::Needs(role, scope) = *access else { continue };
-            let named = [("{map}", Scope::Map), ("{robot}", Scope::Robot), ("{job}", Scope::Job)];
+            let named = [
+                ("{map}", Scope::Map),
+                ("{robot}", Scope::Robot),
+                ("{job}", Scope::Job),
+                ("{answer}", Scope::Answer),
+            ];
             let wanted = named.into_iter().find(|(name, _)| path.contains(name)).map(|(_, scope)| scope);
             assert!(wanted.is_none_or(|wanted| wanted == scope), "{method} {path}: {scope:?}");
             assert!(wanted.is_some() || matches!(scope, Scope::Own | Scope::Server), "{method} {path}");

@@ -54,4 +54,12 @@ impl Principal {
     pub(crate) fn may_see(&self, map: &str) -> bool {
         self.maps.as_ref().is_none_or(|maps| maps.contains(map))
     }
+
+    /// The maps of a list: the one asked for, or all that are shown to it. `None` for all maps.
+    pub(crate) fn visible_maps(&self, asked: Option<String>) -> Option<Vec<String>> {
+        match asked {
+            Some(map) => Some(if self.may_see(&map) { vec![map] } else { Vec::new() }),
+            None => self.maps.as_ref().map(|maps| maps.iter().cloned().collect()),
+        }
+    }
 }

@@ -10,6 +10,7 @@ use std::{
     sync::{Mutex, PoisonError},
     time::{Duration, Instant},
 };
+use tokio::sync::watch;
 
 /// Time for which the code of a link is valid.
 pub(crate) const CODE_VALID: Duration = Duration::from_mins(10);
@@ -33,7 +34,8 @@ type Grants = BTreeMap<[u8; 32], Grant>;
 #[derive(Debug, Default)]
 pub(crate) struct Sessions {
     codes: Mutex<Grants>,
-    sessions: Mutex<Grants>,
+    open: Mutex<Grants>,
+    changes: watch::Sender<()>,
 }
 
 /// Adds a grant; what has ended goes, and the oldest beyond the bound.
@@ -69,23 +71,31 @@ impl Sessions {
     pub(crate) fn open(&self, token: TokenId, now: Instant) -> Result<String, NoRandomness> {
         let cookie = Secret::<32>::random()?;
         let grant = Grant { token, ends: now + SESSION_VALID };
-        insert(&self.sessions, cookie.digest(), grant, MAX_SESSIONS, now);
+        insert(&self.open, cookie.digest(), grant, MAX_SESSIONS, now);
+        self.changes.send_replace(());
         Ok(cookie.expose())
     }
 
     /// The token that a session stands for.
     pub(crate) fn token(&self, cookie: &str, now: Instant) -> Option<TokenId> {
         let digest = Secret::<32>::of(cookie)?.digest();
-        let sessions = self.sessions.lock().unwrap_or_else(PoisonError::into_inner);
+        let sessions = self.open.lock().unwrap_or_else(PoisonError::into_inner);
         sessions.get(&digest).filter(|grant| grant.ends > now).map(|grant| grant.token)
     }
 
     /// Ends a session.
     pub(crate) fn close(&self, cookie: &str) {
         if let Some(secret) = Secret::<32>::of(cookie) {
-            let mut sessions = self.sessions.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut sessions = self.open.lock().unwrap_or_else(PoisonError::into_inner);
             sessions.remove(&secret.digest());
+            drop(sessions);
+            self.changes.send_replace(());
         }
+    }
+
+    /// Each beginning and end of a session by its user from now on.
+    pub(crate) fn changes(&self) -> watch::Receiver<()> {
+        self.changes.subscribe()
     }
 }
 

@@ -23,6 +23,7 @@ use crate::{
         jobs::{self, Ended, JobFilter, JobRow},
     },
 };
+use protos::api::{JobState, ServerEventBody};
 use std::{
     collections::{BTreeMap, BTreeSet},
     sync::{
@@ -153,7 +154,14 @@ impl Jobs {
         let write = self
             .store
             .write(move |tx| Box::pin(async move { jobs::create(tx, "learn", &map, &text, limits).await }));
-        write.await
+        let row = write.await?;
+        self.tell(&row, JobState::Queued);
+        Ok(row)
+    }
+
+    /// Tells readers of events where a job stands.
+    pub(crate) fn tell(&self, row: &JobRow, state: JobState) {
+        self.store.events().tell(ServerEventBody::Job { map: row.map.clone(), job: row.id, state });
     }
 
     /// A job with its progress while it is open. Its row ends in the transaction of its models; here it has ended once those
@@ -204,7 +212,7 @@ impl Jobs {
         if self.stop_running(id) {
             return Ok(());
         }
-        let jobs = self.clone();
+        let (jobs, row) = (self.clone(), jobs::get(self.store.reads(), id).await?);
         let write = self.store.write(move |tx| {
             Box::pin(async move {
                 if jobs::end(tx, id, &cancelled()).await? {
@@ -212,6 +220,7 @@ impl Jobs {
                     tx.after(move || {
                         if !jobs.stop_running(id) {
                             jobs.leave(id);
+                            jobs.tell(&row, JobState::Cancelled);
                         }
                     });
                 }
@@ -273,6 +282,9 @@ impl Jobs {
                 Ok(Next::Job(row)) => {
                     let done = self.one(&row).await.map(|()| Duration::ZERO);
                     self.leave(row.id);
+                    if let Ok(row) = jobs::get(self.store.reads(), row.id).await {
+                        self.tell(&row, JobState::of_word(&row.state));
+                    }
                     done
                 }
                 Ok(Next::NoneFor(pause)) => Ok(pause),
@@ -328,6 +340,7 @@ impl Jobs {
         if !self.store.write(move |tx| Box::pin(async move { jobs::begin(tx, id).await })).await? {
             return Ok(());
         }
+        self.tell(row, JobState::Running);
         let actor = Actor {
             job: Some((id, row.author.clone())),
             why: row.why.clone(),

@@ -12,6 +12,7 @@ mod visibility_areas;
 
 use crate::{
     config::Config,
+    events::EventLog,
     identity::TokenRegistry,
     store::{OpenError, Store, WriterTask},
 };
@@ -26,6 +27,7 @@ pub(crate) struct Catalogue {
     store: Store,
     snapshots: Arc<Snapshots>,
     tokens: Arc<TokenRegistry>,
+    events: Arc<EventLog>,
 }
 
 impl Deref for Catalogue {
@@ -72,7 +74,10 @@ impl Catalogue {
         let (store, writer) = Store::open(config, Arc::new(publisher), vitals.clone()).await?;
         let (stop, stopping) = watch::channel(false);
         let deriver = tokio::spawn(derive::run(snapshots.clone(), vitals, wake, stopping));
-        Ok((Self { store, snapshots, tokens }, CatalogueTasks { writer, deriver, stop }))
+        Ok((
+            Self { store, snapshots, tokens, events: Arc::default() },
+            CatalogueTasks { writer, deriver, stop },
+        ))
     }
 
     /// What the workers read.
@@ -83,6 +88,11 @@ impl Catalogue {
     /// The tokens that requests are checked with.
     pub(crate) fn tokens(&self) -> &Arc<TokenRegistry> {
         &self.tokens
+    }
+
+    /// What readers of events are told.
+    pub(crate) fn events(&self) -> &Arc<EventLog> {
+        &self.events
     }
 }
 

@@ -20,6 +20,7 @@ pub(crate) enum Kind {
     Token,
     Backup,
     Commit,
+    Answer,
 }
 
 impl fmt::Display for Kind {
@@ -40,6 +41,7 @@ impl fmt::Display for Kind {
             Self::Token => "token",
             Self::Backup => "backup",
             Self::Commit => "commit",
+            Self::Answer => "stored answer",
         })
     }
 }

@@ -35,6 +35,7 @@ const FILES: &[(&str, &str)] = files![
     "0022_history",
     "0023_commits",
     "0030_audit",
+    "0025_stored_answers",
 ];
 
 /// The steps in order.

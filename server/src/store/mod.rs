@@ -29,6 +29,7 @@ pub(crate) mod track_acceptance;
 pub(crate) mod modality_stats;
 pub(crate) mod visibility_settings;
 pub(crate) mod robots;
+pub(crate) mod stored_answers;
 pub(crate) mod tokens;
 pub(crate) mod jobs;
 pub(crate) mod kept_answers;

@@ -323,7 +323,12 @@ mod tests {
         assert!(refused(&store, 2, another).await, "another view, and another place");
         let deleted = async || {
             let landmark = landmarks::get(store.reads(), "a", "p1").await.unwrap().id;
-            let last = views::page(store.reads(), landmark, 0, 9).await.unwrap().last().unwrap().id;
+            let last = views::page(store.reads(), landmark, views::ViewFilter::default(), (None, false), 9)
+                .await
+                .unwrap()
+                .last()
+                .unwrap()
+                .id;
             store.write(move |tx| Box::pin(views::delete(tx, "a", "p1", last))).await.unwrap();
         };
         assert!(refused(&store, 2, deleted).await, "a view less");

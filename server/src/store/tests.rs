@@ -28,6 +28,7 @@ async fn every_statement_prepares_on_the_migrated_schema() {
         jobs::ALL,
         kept_answers::ALL,
         audit::ALL,
+        stored_answers::ALL,
         revisions::ALL,
         map_rows::ALL,
     ];

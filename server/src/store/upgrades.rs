@@ -97,7 +97,8 @@ async fn a_database_of_every_schema_opens_with_all_its_rows() {
         assert_eq!(door.health == LandmarkHealth::Flagged, schema >= 5, "schema {schema}");
         assert_eq!(landmarks::get(db, "office", "poster").await.unwrap().views, 1);
         for landmark in 1..=2 {
-            let rows = views::page(db, landmark, 0, 9).await.unwrap();
+            let rows =
+                views::page(db, landmark, views::ViewFilter::default(), (None, false), 9).await.unwrap();
             assert_eq!(
                 (rows[0].id, rows[0].size_px, rows[0].corners_px[2]),
                 (landmark, [640, 480], [9.0, 9.0])
@@ -130,7 +131,11 @@ async fn a_database_of_every_schema_opens_with_all_its_rows() {
         store.write(|tx| Box::pin(landmarks::delete(tx, "office", "door"))).await.unwrap();
         store.write(move |tx| Box::pin(history::roll_back(tx, "office", found))).await.unwrap();
         assert_eq!(landmarks::get(db, "office", "door").await.unwrap().model, door.model, "schema {schema}");
-        assert_eq!(views::page(db, 1, 0, 9).await.unwrap()[0].id, 1, "schema {schema}");
+        assert_eq!(
+            views::page(db, 1, views::ViewFilter::default(), (None, false), 9).await.unwrap()[0].id,
+            1,
+            "schema {schema}"
+        );
         tasks.close().await;
     }
 }

@@ -20,7 +20,11 @@ statements! {
               VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11) \
               RETURNING id";
     PAGE = "SELECT id, image_kind, width_px, height_px, corners_px, created_ms FROM views \
-            WHERE landmark_id = ?1 AND id > ?2 ORDER BY id LIMIT ?3";
+            WHERE landmark_id = ?1 AND id > ?2 AND id < ?3 AND (?4 IS NULL OR (capture IS NOT NULL) = ?4) \
+            AND (?5 IS NULL OR created_ms >= ?5) AND (?6 IS NULL OR created_ms < ?6) \
+            ORDER BY CASE WHEN ?7 THEN -id ELSE id END LIMIT ?8";
+    COUNT_FILTERED = "SELECT count(*) FROM views WHERE landmark_id = ?1 AND (?2 IS NULL OR (capture IS NOT NULL) = ?2) \
+                      AND (?3 IS NULL OR created_ms >= ?3) AND (?4 IS NULL OR created_ms < ?4)";
     ICON = "SELECT v.icon_side, v.icon, v.icon_scale FROM views v JOIN landmarks l ON l.id = v.landmark_id \
             JOIN maps m ON m.id = l.map_id WHERE m.name = ?1 AND l.name = ?2 AND v.id = ?3";
     DELETE = "DELETE FROM views WHERE id = ?1 AND landmark_id = ?2";
@@ -234,15 +238,51 @@ async fn add_distractors(tx: &mut Tx, map_id: i64, new: &NewView) -> Result<(), 
     Ok(())
 }
 
-/// Views of a landmark with numbers above `after`, in order.
+/// Which views are listed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct ViewFilter {
+    /// With a capture, or without one.
+    pub(crate) has_capture: Option<bool>,
+    /// ms since the Unix epoch, included.
+    pub(crate) since_ms: Option<i64>,
+    /// Not included.
+    pub(crate) until_ms: Option<i64>,
+}
+
+/// Views of a landmark after the one with the number `last`, in order or the newest first.
 pub(crate) async fn page(
     db: impl SqliteExecutor<'_>,
     landmark_id: i64,
-    after: i64,
+    filter: ViewFilter,
+    (last, newest_first): (Option<i64>, bool),
     limit: usize,
 ) -> Result<Vec<ViewRow>, StoreError> {
-    let rows = sqlx::query(PAGE).bind(landmark_id).bind(after).bind(limit as i64).fetch_all(db).await;
-    rows.map_err(StoreError::during("list views"))?.iter().map(view_row).collect()
+    let (above, below) = if newest_first { (None, last) } else { (last, None) };
+    let rows = sqlx::query(PAGE)
+        .bind(landmark_id)
+        .bind(above.unwrap_or(0))
+        .bind(below.unwrap_or(i64::MAX))
+        .bind(filter.has_capture)
+        .bind(filter.since_ms)
+        .bind(filter.until_ms)
+        .bind(newest_first)
+        .bind(limit as i64);
+    let rows = rows.fetch_all(db).await.map_err(StoreError::during("list views"))?;
+    rows.iter().map(view_row).collect()
+}
+
+/// How many views a list has.
+pub(crate) async fn count(
+    db: impl SqliteExecutor<'_>,
+    landmark_id: i64,
+    filter: ViewFilter,
+) -> Result<u64, StoreError> {
+    let count = sqlx::query_scalar::<_, i64>(COUNT_FILTERED)
+        .bind(landmark_id)
+        .bind(filter.has_capture)
+        .bind(filter.since_ms)
+        .bind(filter.until_ms);
+    count.fetch_one(db).await.map(|n| n as u64).map_err(StoreError::during("count views"))
 }
 
 /// The icon of a view.

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 import ssl
+import math
 import uuid
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from os import PathLike
-from typing import Any, Generic, Literal, TypeAlias, TypeVar
+from typing import Any, Generic, Literal, TypeAlias, TypeVar, get_args
 from urllib.parse import quote
 
 import httpx
@@ -16,6 +17,7 @@ import httpx
 from waymark._values import MismatchError, from_json, to_json
 from waymark.api import (
     CaptureMetadata,
+    EventKind,
     Job,
     LiveAnswer,
     LiveEvent,
@@ -24,10 +26,12 @@ from waymark.api import (
     LivePose,
     LivePosition,
     LivePresence,
+    ServerEvent,
     Size,
 )
-from waymark.errors import InvalidInput, JobFailed, Refused, Unexpected, Unreachable, Untrusted
+from waymark.errors import InvalidInput, JobFailed, Refused, Unexpected, Unreachable, Untrusted, WaymarkError
 from waymark.image import Picture, as_image
+from waymark.wire import Intrinsics, Pose3, Scan
 
 T = TypeVar("T")
 
@@ -74,11 +78,20 @@ OPERATIONS: dict[str, tuple[str, str]] = {
     "update_landmark": ("PATCH", "/maps/{map}/landmarks/{landmark}"),
     "delete_landmark": ("DELETE", "/maps/{map}/landmarks/{landmark}"),
     "visibility_area": ("GET", "/maps/{map}/landmarks/{landmark}/visibility"),
+    "stored_answers": ("GET", "/answers"),
+    "stored_answer": ("GET", "/answers/{answer}"),
+    "stored_quad_icon": ("GET", "/answers/{answer}/quads/{quad}/icon"),
+    "landmark_model": ("GET", "/maps/{map}/landmarks/{landmark}/model"),
+    "landmark_distances": ("GET", "/maps/{map}/landmarks/{landmark}/distances"),
+    "landmark_icon": ("GET", "/maps/{map}/landmarks/{landmark}/icon"),
+    "duplicates": ("GET", "/maps/{map}/duplicates"),
+    "localise": ("POST", "/maps/{map}/localise"),
     "learn": ("POST", "/maps/{map}/learn"),
     "learn_landmark": ("POST", "/maps/{map}/landmarks/{landmark}/learn"),
     "job": ("GET", "/jobs/{job}"),
     "cancel_job": ("DELETE", "/jobs/{job}"),
     "job_events": ("GET", "/jobs/{job}/events"),
+    "events": ("GET", "/events"),
     "live_events": ("GET", "/maps/{map}/live"),
     "start_mapping": ("POST", "/maps/{map}/mapping"),
     "mapping": ("GET", "/maps/{map}/mapping"),
@@ -171,6 +184,8 @@ CHANGES = frozenset(
 # Pause before a repeat, where the server says none, and the longest, in seconds.
 PAUSE_S = 0.25
 MAX_PAUSE_S = 5.0
+# First pause before a stream is connected again; it doubles with each that fails, in seconds.
+FIRST_PAUSE_S = 0.25
 
 _EVENTS: dict[str, Any] = {
     "answer": LiveAnswer,
@@ -331,6 +346,29 @@ def picture_part(picture: Picture) -> dict[str, tuple[str, bytes]]:
     return {"image": ("image", bytes(as_image(picture).png().data))}
 
 
+def localise_parts(
+    image: Picture | None, intrinsics: Intrinsics | None, mounting: Pose3 | None, scan: Scan | None
+) -> dict[str, Any]:
+    """The parts of a localisation."""
+    texts: dict[str, Any] = {}
+    if intrinsics is not None:
+        texts["intrinsics"] = to_json(intrinsics)
+    if mounting is not None:
+        texts["mounting"] = to_json(mounting)
+    if scan is not None:
+        ranges = [float(each) if math.isfinite(each) else None for each in scan.ranges_m]
+        texts["scan"] = {
+            "robot_from_laser": to_json(scan.robot_from_laser),
+            "first_bearing_rad": scan.first_bearing_rad,
+            "bearing_step_rad": scan.bearing_step_rad,
+            "max_range_m": scan.max_range_m,
+            "ranges_m": ranges,
+        }
+    # A part without a name of a file, so that a form without a picture is one, too.
+    files: dict[str, Any] = {name: (None, json.dumps(value)) for name, value in texts.items()}
+    return {"files": files | (picture_part(image) if image is not None else {})}
+
+
 def live_event(name: str, data: str) -> LiveEvent | None:
     """An event of a map; `None` for one that a newer server may send and is not known here."""
     kind = _EVENTS.get(name)
@@ -343,6 +381,16 @@ def live_event(name: str, data: str) -> LiveEvent | None:
         value["source"] = name
     event: LiveEvent = from_json(kind, value)
     return event
+
+
+def server_event(name: str, value: Any) -> ServerEvent | None:
+    """An event of the server; `None` for the first of a connection, and for one that only a newer server sends."""
+    return from_json(ServerEvent, value) if name == "reset" or name in get_args(EventKind) else None
+
+
+def is_passing(error: WaymarkError) -> bool:
+    """Whether another connection is worth a try."""
+    return isinstance(error, Unreachable) or (isinstance(error, Refused) and error.status in (408, 503))
 
 
 def job_ended(job: Job) -> bool:

@@ -8,11 +8,11 @@ use crate::{
         tokens::{self, TokenInsert},
     },
 };
-use protos::api::Role;
+use protos::{api::Role, v1};
 use serde_json::json;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// `hall` with `r1` and job 1 are the principal's own; `yard` with `r2` and job 2 are not.
+/// `hall` with `r1`, job 1 and answer 1 are the principal's own; `yard` with `r2`, job 2 and answer 2 are not.
 const OWN: [&str; 3] = ["hall", "r1", "1"];
 const FOREIGN: [&str; 3] = ["yard", "r2", "2"];
 const MISSING: [&str; 3] = ["nowhere", "r9", "99"];
@@ -35,6 +35,7 @@ async fn service() -> Service {
     store.write(|tx| Box::pin(robots::put(tx, "r2", "yard", 9))).await.unwrap();
     for map in ["hall", "yard"] {
         store.write(move |tx| Box::pin(jobs::create(tx, "learn", map, "{}", (9, 9)))).await.unwrap();
+        service.answered(map, "r1", v1::Status::NoMatch).await;
     }
     service
 }
@@ -83,8 +84,15 @@ async fn operations(service: &Service) -> Vec<(String, String, String)> {
 
 fn at(path: &str, [map, robot, job]: [&str; 3]) -> String {
     let mut path = format!("/api/v1{path}");
-    let of =
-        [("{map}", map), ("{robot}", robot), ("{job}", job), ("{landmark}", "poster"), ("{camera}", "front")];
+    let of = [
+        ("{map}", map),
+        ("{robot}", robot),
+        ("{job}", job),
+        ("{answer}", job),
+        ("{quad}", "0"),
+        ("{landmark}", "poster"),
+        ("{camera}", "front"),
+    ];
     for (name, value) in of {
         path = path.replace(name, value);
     }
@@ -102,7 +110,7 @@ fn expected(access: Access, role: Option<Role>, is_scoped: bool, target: [&str; 
         return Outcome::Forbidden;
     }
     let is_hidden = match scope {
-        Scope::Map | Scope::Job => target != OWN,
+        Scope::Map | Scope::Job | Scope::Answer => target != OWN,
         Scope::Robot => target == FOREIGN,
         Scope::Own | Scope::Server => false,
     };
@@ -123,7 +131,7 @@ async fn outcome(response: Response<Body>, named: &str) -> Outcome {
         (401, "unauthenticated") => Outcome::Unauthenticated,
         (403, "forbidden") => Outcome::Forbidden,
         (401 | 403, code) => panic!("{named}: {status} {code}"),
-        (404, "unknown_map" | "unknown_robot" | "unknown_job") => Outcome::Hidden,
+        (404, "unknown_map" | "unknown_robot" | "unknown_job" | "unknown_answer") => Outcome::Hidden,
         _ => Outcome::Admitted,
     }
 }

@@ -141,7 +141,10 @@ async fn damaged_pages_of_pictures_stop_neither_the_start_nor_what_needs_no_pict
     assert!(break_pages(&dir.path().join(open::FILE), 0x5a) > 20);
 
     let (store, _task) = Catalogue::open(&config(dir.path())).await.unwrap();
-    assert_eq!(views::page(store.reads(), 1, 0, 9).await.unwrap().len(), 2);
+    assert_eq!(
+        views::page(store.reads(), 1, views::ViewFilter::default(), (None, false), 9).await.unwrap().len(),
+        2
+    );
     assert_eq!(views::of_map(store.reads(), 1).await.unwrap().len(), 2);
     views::icon(store.reads(), "a", "p1", taught).await.unwrap();
     let refused = read(&store, &digest(&large)).await;
@@ -189,7 +192,8 @@ async fn pictures_of_the_schema_before_are_moved() {
     assert_eq!(count(&store).await, 2);
     let (sha256, kind) = views::picture(store.reads(), "a", "p1", 3).await.unwrap();
     assert_eq!((read(&store, &sha256).await.unwrap(), kind.as_str()), (b"one".to_vec(), "png"));
-    let row = &views::page(store.reads(), 1, 0, 9).await.unwrap()[0];
+    let row =
+        &views::page(store.reads(), 1, views::ViewFilter::default(), (None, false), 9).await.unwrap()[0];
     assert_eq!((row.id, row.size_px, row.corners_px[2], row.created_ms), (3, [4, 3], [9.0, 9.0], 8));
     assert_eq!(views::icon(store.reads(), "a", "p1", 3).await.unwrap().pixels, [0.0; 400]);
     let underlay = underlays::get(store.reads(), (1, "a")).await.unwrap();

@@ -195,8 +195,8 @@ class AsyncBase:
                 return tuple(items[:most])
             cursor = page.next
 
-    async def _stream(self, call: str, *at: str | int) -> AsyncEvents:
-        return AsyncEvents(await self._checked(call, at, is_stream=True))
+    async def _stream(self, call: str, *at: str | int, **parts: Any) -> AsyncEvents:
+        return AsyncEvents(await self._checked(call, at, is_stream=True, **parts))
 
 
 @dataclass(frozen=True, slots=True)

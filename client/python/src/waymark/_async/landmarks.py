@@ -19,6 +19,7 @@ from waymark.api import (
     LandmarkHealth,
     LandmarkStatus,
     NewLandmark,
+    NumberOrder,
     Order,
     Place,
     Size,
@@ -131,6 +132,21 @@ class AsyncLandmarks(AsyncBase):
     async def views(self, map: str, landmark: str) -> tuple[TrainingView, ...]:
         """All views of a landmark, by number."""
         return await self._all(TrainingView, "views", map, landmark)
+
+    async def find_views(
+        self,
+        map: str,
+        landmark: str,
+        *,
+        has_capture: bool | None = None,
+        since_ms: int | None = None,
+        until_ms: int | None = None,
+        sort: NumberOrder = "number",
+    ) -> tuple[TrainingView, ...]:
+        """The views of a landmark with or without a capture, stored within these times (ms since the Unix epoch,
+        `until_ms` not included)."""
+        query = {"has_capture": has_capture, "since_ms": since_ms, "until_ms": until_ms, "sort": sort}
+        return await self._all(TrainingView, "views", map, landmark, **query)
 
     async def delete_view(self, map: str, landmark: str, view: int) -> None:
         """Deletes a view. The model stays until the landmark is learnt again."""

@@ -183,8 +183,8 @@ class Base:
                 return tuple(items[:most])
             cursor = page.next
 
-    def _stream(self, call: str, *at: str | int) -> Events:
-        return Events(self._checked(call, at, is_stream=True))
+    def _stream(self, call: str, *at: str | int, **parts: Any) -> Events:
+        return Events(self._checked(call, at, is_stream=True, **parts))
 
 
 @dataclass(frozen=True, slots=True)

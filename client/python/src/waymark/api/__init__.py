@@ -8,6 +8,7 @@ quads and poses of the wire are in `waymark.wire`.
 
 from waymark.api.audit import AuditCheck, AuditEntry, AuditHead
 from waymark.api.backups import Backup, BackupHealth, BackupManifest, BackupMap, BackupState
+from waymark.api.events import EventKind, ServerEvent
 from waymark.api.gathering import (
     AcceptanceBody,
     AcceptedTrackBody,
@@ -27,6 +28,17 @@ from waymark.api.history import (
     RollbackOutcome,
     WallsDifference,
 )
+from waymark.api.landmark_models import (
+    DistanceHistogram,
+    DuplicatePair,
+    IconKeypoint,
+    LandmarkDistances,
+    LandmarkModelDetail,
+    LandmarkPoint,
+    MemoryPart,
+    ThresholdBody,
+    ThresholdLimit,
+)
 from waymark.api.landmarks import (
     BulkOutcome,
     CaptureMetadata,
@@ -40,6 +52,7 @@ from waymark.api.landmarks import (
     LandmarkStatus,
     LookAlikeBody,
     NewLandmark,
+    NumberOrder,
     ObservedPlaceBody,
     Place,
     PlacementReportBody,
@@ -57,6 +70,7 @@ from waymark.api.live import (
     LivePosition,
     LivePresence,
 )
+from waymark.api.localise import LocaliseHypothesisBody, LocaliseResult, LocaliseStatus
 from waymark.api.maps import (
     Distance,
     Health,
@@ -110,6 +124,13 @@ from waymark.api.robots import (
     UploadedView,
     UploadedViews,
 )
+from waymark.api.stored_answers import (
+    AnswerStatus,
+    LandmarkIcon,
+    StoredAnswer,
+    StoredAnswerSummary,
+    StoredQuad,
+)
 from waymark.api.tokens import (
     CreatedToken,
     PageLink,
@@ -136,6 +157,7 @@ __all__ = [
     "AcceptanceBody",
     "AcceptedTrackBody",
     "AdviceBody",
+    "AnswerStatus",
     "AreaBody",
     "AreaStatsBody",
     "AuditCheck",
@@ -165,9 +187,12 @@ __all__ = [
     "CreatedToken",
     "Difference",
     "Distance",
+    "DistanceHistogram",
+    "DuplicatePair",
     "EpochConflictBody",
     "ErrorModelBody",
     "EstimatedPlace",
+    "EventKind",
     "ExtendedLandmark",
     "FailedGate",
     "FindingBody",
@@ -178,6 +203,7 @@ __all__ = [
     "GazeRankingBody",
     "GazeTargetBody",
     "Health",
+    "IconKeypoint",
     "IntrinsicsMonitorBody",
     "IntrinsicsSuspicionBody",
     "Job",
@@ -186,8 +212,12 @@ __all__ = [
     "LandmarkDeletion",
     "LandmarkDifference",
     "LandmarkDifferencePage",
+    "LandmarkDistances",
     "LandmarkHealth",
+    "LandmarkIcon",
     "LandmarkModelBody",
+    "LandmarkModelDetail",
+    "LandmarkPoint",
     "LandmarkStatus",
     "LiveAnswer",
     "LiveEvent",
@@ -196,16 +226,21 @@ __all__ = [
     "LivePose",
     "LivePosition",
     "LivePresence",
+    "LocaliseHypothesisBody",
+    "LocaliseResult",
+    "LocaliseStatus",
     "LookAlikeBody",
     "Map",
     "MappingProgressBody",
     "MappingStage",
+    "MemoryPart",
     "Modality",
     "ModalityMapBody",
     "ModalityStatsBody",
     "MultiPolygon",
     "NamedAreaBody",
     "NewLandmark",
+    "NumberOrder",
     "ObservedPlaceBody",
     "Order",
     "PageLink",
@@ -224,7 +259,13 @@ __all__ = [
     "Role",
     "RollbackOutcome",
     "Ros2Status",
+    "ServerEvent",
     "Size",
+    "StoredAnswer",
+    "StoredAnswerSummary",
+    "StoredQuad",
+    "ThresholdBody",
+    "ThresholdLimit",
     "Token",
     "TrackSummary",
     "TrainingView",

@@ -11,6 +11,7 @@ from waymark.wire import Intrinsics, Pose2Covariance, Pose3
 
 LandmarkStatus = Literal["not_learnt", "learning", "active", "inactive"]
 LandmarkHealth = Literal["sound", "flagged", "quarantined"]
+NumberOrder = Literal["number", "-number"]
 UploadOutcome = Literal["new", "duplicate", "near_duplicate"]
 
 

@@ -1,0 +1,78 @@
+"""Stored answers, and what was learnt of landmarks."""
+
+from __future__ import annotations
+
+from waymark._async.base import AsyncBase
+from waymark._http import localise_parts
+from waymark.api import (
+    AnswerStatus,
+    DuplicatePair,
+    LandmarkDistances,
+    LandmarkModelDetail,
+    LocaliseResult,
+    StoredAnswer,
+    StoredAnswerSummary,
+)
+from waymark.image import Picture
+from waymark.wire import Intrinsics, Pose3, Scan
+
+
+class AsyncAnswers(AsyncBase):
+    """Operations that show why the server said what it said."""
+
+    async def stored_answers(
+        self,
+        *,
+        map: str | None = None,
+        robot: str | None = None,
+        camera: str | None = None,
+        status: AnswerStatus | None = None,
+        refusal: str | None = None,
+        landmark: str | None = None,
+        since_ms: int | None = None,
+        until_ms: int | None = None,
+    ) -> tuple[StoredAnswerSummary, ...]:
+        """The stored answers to frames that have all of this, newest first. `landmark` is one that an answer names or
+        was compared with; times are ms since the Unix epoch, `until_ms` is not included."""
+        query = {"map": map, "robot": robot, "camera": camera, "status": status, "refusal": refusal}
+        times = {"landmark": landmark, "since_ms": since_ms, "until_ms": until_ms}
+        return await self._all(StoredAnswerSummary, "stored_answers", **query, **times)
+
+    async def stored_answer(self, answer: int) -> StoredAnswer:
+        """One stored answer: quads, candidates with their distances and thresholds, poses, paths of pictures."""
+        return await self._send(StoredAnswer, "stored_answer", answer)
+
+    async def stored_quad_icon(self, answer: int, quad: int) -> bytes:
+        """The icon of a quad of a stored answer, by its index: PNG."""
+        return await self._bytes("stored_quad_icon", answer, quad)
+
+    async def localise(
+        self,
+        map: str,
+        image: Picture | None = None,
+        intrinsics: Intrinsics | None = None,
+        mounting: Pose3 | None = None,
+        scan: Scan | None = None,
+    ) -> LocaliseResult:
+        """Finds where a robot is, without knowing anything of it before: by one picture, with the camera's intrinsics
+        and its pose on the robot, one laser scan from the same place, or both."""
+        parts = localise_parts(image, intrinsics, mounting, scan)
+        return await self._send(LocaliseResult, "localise", map, **parts)
+
+    async def landmark_model(self, map: str, landmark: str) -> LandmarkModelDetail:
+        """Thresholds, keypoints, points and sizes of a landmark's model. Refused with `not_learnt` if there is none."""
+        return await self._send(LandmarkModelDetail, "landmark_model", map, landmark)
+
+    async def landmark_distances(self, map: str, landmark: str) -> LandmarkDistances:
+        """Histograms of the distances that its thresholds were fitted to."""
+        return await self._send(LandmarkDistances, "landmark_distances", map, landmark)
+
+    async def landmark_icon(self, map: str, landmark: str) -> bytes:
+        """The learnt icon that is nearest to the mean of its views: PNG."""
+        return await self._bytes("landmark_icon", map, landmark)
+
+    async def duplicates(
+        self, map: str, *, landmark: str | None = None, in_use: bool | None = None
+    ) -> tuple[DuplicatePair, ...]:
+        """The pairs of landmarks that look alike: those with this one; those of which both are in use, or not both."""
+        return await self._all(DuplicatePair, "duplicates", map, landmark=landmark, in_use=in_use)

@@ -1,0 +1,158 @@
+//! `/maps/{map}/localise`: one frame, one scan or both; poses with covariance, or none.
+
+use super::{
+    AppState,
+    error::ApiError,
+    extract::{PathParams, json, too_large},
+    upload::{FORM_OVERHEAD, Form},
+};
+use crate::store::{StoreError, kind::Kind};
+use axum::{
+    Json,
+    extract::{DefaultBodyLimit, Request, State},
+};
+use engine::{
+    localise::{Localisation, LocaliseFrame, LocaliseInput, localise},
+    picture,
+    snapshot::MapSnapshot,
+};
+use map::{extrinsics::CameraExtrinsics, laser::Scan};
+use protos::{
+    api::{LocaliseForm, LocaliseHypothesisBody, LocaliseResult, LocaliseStatus, Problem, ScanBody},
+    convert::{
+        geometry::{self, pose2_covariance_wire},
+        motion::CheckedScan,
+    },
+    v1,
+};
+use std::{
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
+    time::{Duration, Instant},
+};
+use utoipa_axum::{router::OpenApiRouter, routes};
+use vision::frame::Intrinsics;
+
+pub(super) fn router(upload_bytes: usize) -> OpenApiRouter<AppState> {
+    OpenApiRouter::new().routes(routes!(at)).layer(DefaultBodyLimit::max(upload_bytes + FORM_OVERHEAD))
+}
+
+/// Longest search. It ends as soon as the client has gone, too.
+const BUDGET: Duration = Duration::from_secs(10);
+
+/// Set when the request is given up: its handler is dropped.
+struct GivenUp(Arc<AtomicBool>);
+
+impl Drop for GivenUp {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+}
+
+/// What a form holds, checked.
+struct Sensed {
+    frame: Option<(axum::body::Bytes, Intrinsics, CameraExtrinsics)>,
+    scan: Option<Scan>,
+}
+
+/// Finds where a robot is by one picture, one laser scan or both, without knowing anything of it before. A picture needs the
+/// camera's intrinsics and its mounting. "No match" is an answer, with its reason; nothing is stored and no robot's pose
+/// changes. A scan alone is searched for in the whole map, for at most 10 s.
+#[utoipa::path(post, path = "/maps/{map}/localise", tag = "recognition", params(("map" = String, Path)),
+    request_body(content = LocaliseForm, content_type = "multipart/form-data"),
+    responses((status = 200, body = LocaliseResult), (status = 404, body = Problem), (status = 413, body = Problem),
+    (status = 422, body = Problem, description = "missing, bad_image, wrong_encoding, too_large, out_of_range, not_finite, \
+     invalid_value")))]
+async fn at(
+    State(app): State<AppState>,
+    PathParams(map): PathParams<String>,
+    request: Request,
+) -> Result<Json<LocaliseResult>, ApiError> {
+    let snapshot = app.store.snapshots().get(&map);
+    let snapshot = snapshot.ok_or_else(|| StoreError::NotFound { what: Kind::Map, name: map })?;
+    let mut form = Form::read(&app, request, &["image", "intrinsics", "mounting", "scan"]).await?;
+    let sensed = sensed(&mut form, app.config.limits.json_bytes)?;
+    let stopped = Arc::new(AtomicBool::new(false));
+    let _given_up = GivenUp(stopped.clone());
+    let found = app.on_vision_thread(move |app| {
+        let image =
+            sensed.frame.as_ref().map(|(bytes, ..)| picture::decode(bytes, app.config.limits.upload()));
+        let image = image.transpose()?;
+        let frame = sensed.frame.as_ref().zip(image.as_ref());
+        let frame = frame.map(|((_, camera, extrinsics), image)| LocaliseFrame { image, camera, extrinsics });
+        let input = LocaliseInput { map: &snapshot, frame, scan: sensed.scan.as_ref() };
+        let until = Instant::now() + BUDGET;
+        let stop = || stopped.load(Ordering::Relaxed) || Instant::now() >= until;
+        Ok(shown(localise(&input, &stop), &snapshot))
+    });
+    found.await?.map(Json)
+}
+
+/// The parts of the form.
+fn sensed(form: &mut Form, max_scan_bytes: usize) -> Result<Sensed, ApiError> {
+    let text = form.optional("scan");
+    if text.as_ref().is_some_and(|text| text.len() > max_scan_bytes) {
+        return Err(too_large(max_scan_bytes));
+    }
+    let scan = text.map(|text| scan(&text)).transpose()?;
+    let Some(image) = form.optional("image") else {
+        if scan.is_none() {
+            return Err(ApiError::invalid("missing", "image", "a picture or a scan is needed, or both"));
+        }
+        if let Some(part) = ["intrinsics", "mounting"].into_iter().find(|part| form.optional(part).is_some())
+        {
+            return Err(ApiError::invalid("missing", "image", format!("`{part}` is of a picture")));
+        }
+        return Ok(Sensed { frame: None, scan });
+    };
+    let wire: v1::Intrinsics = json(&form.needed("intrinsics")?, "intrinsics")?;
+    let intrinsics = geometry::intrinsics(&wire).map_err(|r| r.inside("intrinsics"))?;
+    let wire: v1::Pose3 = json(&form.needed("mounting")?, "mounting")?;
+    let mounting = geometry::mounting(&wire).map_err(|r| r.inside("mounting"))?;
+    Ok(Sensed { frame: Some((image, intrinsics, mounting)), scan })
+}
+
+fn scan(text: &[u8]) -> Result<Scan, ApiError> {
+    let body: ScanBody = json(text, "scan")?;
+    let message = v1::Scan {
+        odom_from_robot: Some(v1::Pose2::default()),
+        robot_from_laser: Some(body.robot_from_laser),
+        first_bearing_rad: body.first_bearing_rad,
+        bearing_step_rad: body.bearing_step_rad,
+        max_range_m: body.max_range_m,
+        ranges_m: body.ranges_m.into_iter().map(|range| range.unwrap_or(f32::NAN)).collect(),
+        ..v1::Scan::default()
+    };
+    Ok(CheckedScan::try_from(message).map_err(|r| r.inside("scan"))?.scan)
+}
+
+fn shown(found: Localisation, map: &MapSnapshot) -> LocaliseResult {
+    let Localisation { hypotheses, reason, answer } = found;
+    let name = |id| map.landmarks.get(id).map(|landmark| landmark.name.clone());
+    let hypotheses: Vec<_> = hypotheses
+        .iter()
+        .map(|hypothesis| LocaliseHypothesisBody {
+            map_from_robot: pose2_covariance_wire(&hypothesis.pose),
+            probability: hypothesis.probability,
+            landmarks: hypothesis.landmarks.iter().filter_map(name).collect(),
+            matched: hypothesis.matched,
+        })
+        .collect();
+    let status = match (&reason, hypotheses.as_slice()) {
+        (_, []) => LocaliseStatus::NoMatch,
+        (None, _) => LocaliseStatus::Located,
+        (Some(_), _) => LocaliseStatus::Ambiguous,
+    };
+    let pose = hypotheses.first().filter(|_| status == LocaliseStatus::Located);
+    LocaliseResult {
+        map: map.name.clone(),
+        map_version: map.version,
+        status,
+        reason: reason.map(|reason| reason.as_str().to_owned()),
+        map_from_robot: pose.map(|pose| pose.map_from_robot.clone()),
+        hypotheses,
+        answer,
+    }
+}

@@ -1,0 +1,210 @@
+//! Answers to frames as rows: what was said, and the icons of the quads. Only the newest stay.
+
+use super::{StoreError, Tx, kind::Kind, now_ms, statements::statements};
+use engine::answer_records::{AnswerRecord, named_landmarks, refusal_of};
+use protos::{json, prost::Message as _, v1};
+use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
+use std::collections::BTreeSet;
+
+statements! {
+    INSERT = "INSERT INTO stored_answers (map_id, robot, camera, stored_ms, status, has_pose, refusal, landmarks, candidates, \
+              answer) SELECT id, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10 FROM maps WHERE name = ?1 RETURNING id";
+    INSERT_ICON = "INSERT INTO stored_answer_icons (answer_id, quad, icon_side, icon) VALUES (?1, ?2, ?3, ?4)";
+    FORGET = "DELETE FROM stored_answers WHERE id <= (SELECT max(id) FROM stored_answers) - ?1";
+    GET = "SELECT a.id, m.name AS map, a.robot, a.camera, a.stored_ms, a.status, a.has_pose, a.refusal, a.landmarks, \
+           a.candidates, a.answer FROM stored_answers a JOIN maps m ON m.id = a.map_id WHERE a.id = ?1";
+    MAP_OF = "SELECT m.name FROM stored_answers a JOIN maps m ON m.id = a.map_id WHERE a.id = ?1";
+    ICONS = "SELECT quad FROM stored_answer_icons WHERE answer_id = ?1 ORDER BY quad";
+    ICON = "SELECT icon_side, icon FROM stored_answer_icons WHERE answer_id = ?1 AND quad = ?2";
+    LIST = "SELECT a.id, m.name AS map, a.robot, a.camera, a.stored_ms, a.status, a.has_pose, a.refusal, a.landmarks, \
+            a.candidates FROM stored_answers a JOIN maps m ON m.id = a.map_id WHERE a.id < ?9 \
+            AND (?1 IS NULL OR m.name IN (SELECT value FROM json_each(?1))) AND (?2 IS NULL OR a.robot = ?2) \
+            AND (?3 IS NULL OR a.camera = ?3) AND (?4 IS NULL OR a.status = ?4) AND (?5 IS NULL OR a.refusal = ?5) \
+            AND (?6 IS NULL OR ?6 IN (SELECT value FROM json_each(a.landmarks)) \
+                 OR ?6 IN (SELECT value FROM json_each(a.candidates))) \
+            AND (?7 IS NULL OR a.stored_ms >= ?7) AND (?8 IS NULL OR a.stored_ms < ?8) ORDER BY a.id DESC LIMIT ?10";
+    COUNT = "SELECT count(*) FROM stored_answers a JOIN maps m ON m.id = a.map_id \
+             WHERE (?1 IS NULL OR m.name IN (SELECT value FROM json_each(?1))) AND (?2 IS NULL OR a.robot = ?2) \
+             AND (?3 IS NULL OR a.camera = ?3) AND (?4 IS NULL OR a.status = ?4) AND (?5 IS NULL OR a.refusal = ?5) \
+             AND (?6 IS NULL OR ?6 IN (SELECT value FROM json_each(a.landmarks)) \
+                  OR ?6 IN (SELECT value FROM json_each(a.candidates))) \
+             AND (?7 IS NULL OR a.stored_ms >= ?7) AND (?8 IS NULL OR a.stored_ms < ?8)";
+}
+
+/// Largest message that is stored, bytes; a larger answer is left out.
+const MAX_ANSWER_BYTES: usize = 262_144;
+
+/// What is listed of an answer.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct AnswerRow {
+    pub(crate) id: i64,
+    pub(crate) map: String,
+    pub(crate) robot: String,
+    pub(crate) camera: String,
+    pub(crate) stored_ms: i64,
+    /// Word of a [`v1::Status`].
+    pub(crate) status: String,
+    pub(crate) has_pose: bool,
+    pub(crate) refusal: Option<String>,
+    /// Names as they were then.
+    pub(crate) landmarks: Vec<String>,
+    /// The other landmarks that it was compared with.
+    pub(crate) candidates: Vec<String>,
+}
+
+/// Which answers are listed.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub(crate) struct AnswerFilter {
+    /// JSON list of names of maps; `None` for all.
+    pub(crate) maps: Option<String>,
+    pub(crate) robot: Option<String>,
+    pub(crate) camera: Option<String>,
+    pub(crate) status: Option<String>,
+    pub(crate) refusal: Option<String>,
+    /// Named or compared with.
+    pub(crate) landmark: Option<String>,
+    /// ms since the Unix epoch, included.
+    pub(crate) since_ms: Option<i64>,
+    /// Not included.
+    pub(crate) until_ms: Option<i64>,
+}
+
+fn damaged(reason: String) -> StoreError {
+    StoreError::Damaged { what: "a stored answer".into(), reason }
+}
+
+fn answer_row(row: &SqliteRow) -> Result<AnswerRow, StoreError> {
+    let at = || StoreError::during("read answer");
+    let names = |column: &str| {
+        let text: &str = row.try_get(column).map_err(at())?;
+        serde_json::from_str(text).map_err(|e| damaged(e.to_string()))
+    };
+    Ok(AnswerRow {
+        id: row.try_get("id").map_err(at())?,
+        map: row.try_get("map").map_err(at())?,
+        robot: row.try_get("robot").map_err(at())?,
+        camera: row.try_get("camera").map_err(at())?,
+        stored_ms: row.try_get("stored_ms").map_err(at())?,
+        status: row.try_get("status").map_err(at())?,
+        has_pose: row.try_get("has_pose").map_err(at())?,
+        refusal: row.try_get("refusal").map_err(at())?,
+        landmarks: names("landmarks")?,
+        candidates: names("candidates")?,
+    })
+}
+
+/// Stores answers with their icons, and deletes the oldest beyond `max`. Those of maps that are gone are left out.
+pub(crate) async fn add(tx: &mut Tx, records: &[AnswerRecord], max: usize) -> Result<(), StoreError> {
+    let at = || StoreError::during("store answer");
+    for AnswerRecord { key, answer, icons } in records {
+        let message = answer.encode_to_vec();
+        if message.len() > MAX_ANSWER_BYTES {
+            continue;
+        }
+        let named = named_landmarks(answer);
+        let compared = answer.quads.iter().flat_map(|quad| &quad.candidates);
+        let others: BTreeSet<&str> =
+            compared.map(|c| c.landmark.as_str()).filter(|name| !named.contains(name)).collect();
+        let row = sqlx::query_scalar::<_, i64>(INSERT)
+            .bind(&answer.map)
+            .bind(key.robot.as_str())
+            .bind(key.camera.as_str())
+            .bind(now_ms())
+            .bind(json::status::word(answer.status))
+            .bind(answer.map_from_robot.is_some())
+            .bind(refusal_of(answer))
+            .bind(serde_json::json!(named).to_string())
+            .bind(serde_json::json!(others).to_string())
+            .bind(&message)
+            .fetch_optional(&mut tx.conn)
+            .await;
+        let Some(id) = row.map_err(at())? else { continue };
+        for icon in icons {
+            let stored = sqlx::query(INSERT_ICON)
+                .bind(id)
+                .bind(icon.quad as i64)
+                .bind(icon.size as i64)
+                .bind(&icon.pixels)
+                .execute(&mut tx.conn)
+                .await;
+            stored.map_err(at())?;
+        }
+    }
+    let oldest = sqlx::query(FORGET).bind(max as i64).execute(&mut tx.conn).await;
+    oldest.map_err(StoreError::during("delete old answers")).map(drop)
+}
+
+/// One answer, and the indices of the quads whose icons are stored.
+pub(crate) async fn get(
+    db: &sqlx::SqlitePool,
+    id: i64,
+) -> Result<(AnswerRow, v1::Answer, BTreeSet<usize>), StoreError> {
+    let at = || StoreError::during("read answer");
+    let row = sqlx::query(GET).bind(id).fetch_optional(db).await.map_err(at())?;
+    let row = row.ok_or_else(|| unknown(id))?;
+    let message: &[u8] = row.try_get("answer").map_err(at())?;
+    let answer = v1::Answer::decode(message).map_err(|e| damaged(e.to_string()))?;
+    let icons = sqlx::query_scalar::<_, i64>(ICONS).bind(id).fetch_all(db).await.map_err(at())?;
+    Ok((answer_row(&row)?, answer, icons.into_iter().map(|quad| quad as usize).collect()))
+}
+
+/// The map of an answer.
+pub(crate) async fn map_of(db: impl SqliteExecutor<'_>, id: i64) -> Result<String, StoreError> {
+    let name = sqlx::query_scalar(MAP_OF).bind(id).fetch_optional(db).await;
+    name.map_err(StoreError::during("read answer"))?.ok_or_else(|| unknown(id))
+}
+
+/// Side and grey levels of the icon of a quad.
+pub(crate) async fn icon(
+    db: impl SqliteExecutor<'_>,
+    id: i64,
+    quad: i64,
+) -> Result<(usize, Vec<u8>), StoreError> {
+    let at = || StoreError::during("read icon");
+    let row = sqlx::query(ICON).bind(id).bind(quad).fetch_optional(db).await.map_err(at())?;
+    let row = row.ok_or_else(|| unknown(id))?;
+    let side: i64 = row.try_get("icon_side").map_err(at())?;
+    Ok((side as usize, row.try_get("icon").map_err(at())?))
+}
+
+/// The refusal for an answer that is not stored.
+pub(crate) fn unknown(id: i64) -> StoreError {
+    StoreError::NotFound { what: Kind::Answer, name: id.to_string() }
+}
+
+/// Answers with numbers below `before`, newest first.
+pub(crate) async fn page(
+    db: impl SqliteExecutor<'_>,
+    filter: &AnswerFilter,
+    before: i64,
+    limit: usize,
+) -> Result<Vec<AnswerRow>, StoreError> {
+    let rows = sqlx::query(LIST)
+        .bind(&filter.maps)
+        .bind(&filter.robot)
+        .bind(&filter.camera)
+        .bind(&filter.status)
+        .bind(&filter.refusal)
+        .bind(&filter.landmark)
+        .bind(filter.since_ms)
+        .bind(filter.until_ms)
+        .bind(before)
+        .bind(limit as i64);
+    let rows = rows.fetch_all(db).await.map_err(StoreError::during("list answers"))?;
+    rows.iter().map(answer_row).collect()
+}
+
+/// How many answers a list has.
+pub(crate) async fn count(db: impl SqliteExecutor<'_>, filter: &AnswerFilter) -> Result<u64, StoreError> {
+    let count = sqlx::query_scalar::<_, i64>(COUNT)
+        .bind(&filter.maps)
+        .bind(&filter.robot)
+        .bind(&filter.camera)
+        .bind(&filter.status)
+        .bind(&filter.refusal)
+        .bind(&filter.landmark)
+        .bind(filter.since_ms)
+        .bind(filter.until_ms);
+    let count = count.fetch_one(db).await.map_err(StoreError::during("count answers"))?;
+    Ok(count as u64)
+}
