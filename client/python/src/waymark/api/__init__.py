@@ -101,7 +101,9 @@ from waymark.api.robots import (
 )
 from waymark.api.tokens import (
     CreatedToken,
+    EnrolledRobot,
     PageLink,
+    RobotCertificate,
     Role,
     Token,
     Whoami,
@@ -147,6 +149,7 @@ __all__ = [
     "CoverageSampleBody",
     "CreatedToken",
     "Distance",
+    "EnrolledRobot",
     "EpochConflictBody",
     "ErrorModelBody",
     "EstimatedPlace",
@@ -200,6 +203,7 @@ __all__ = [
     "ReferenceRunBody",
     "RelocalisationStatus",
     "Robot",
+    "RobotCertificate",
     "RobotPose",
     "Role",
     "Ros2Status",
