@@ -34,6 +34,7 @@ mod shell;
 pub mod simulated_errors;
 pub mod stopwatch;
 pub mod survey;
+mod validity;
 mod view;
 
 use clap::{CommandFactory as _, Parser, Subcommand};

@@ -5,8 +5,12 @@ use crate::{
     bus::{Bus, BusError, Receivers},
     config::Config,
     gather::{self, Gatherer, GatheringTap, OfferedFrame},
-    http::{self, App, Services},
-    identity::{Sessions, TokenId, certificates::Certificates, local_token::LocalToken},
+    http::{self, App, Enrolment, Services},
+    identity::{
+        Sessions, TokenId,
+        certificates::{CertificateRegistry, Certificates},
+        local_token::LocalToken,
+    },
     jobs::Jobs,
     publication::{Catalogue, CatalogueTasks},
     ros2::Ros2,
@@ -123,7 +127,7 @@ impl Server {
         let config = Arc::new(config);
         let (store, writer) = Catalogue::open(&config).await?;
         let (stop, stopping) = watch::channel(false);
-        let _certificates = open_certificates(&config, &stopping)?;
+        let certificates = open_certificates(&config, &stopping)?;
         let at = |source| StartError::Http { addr: config.http_addr, source };
         let listener = TcpListener::bind(config.http_addr).await.map_err(at)?;
         let http_addr = listener.local_addr().map_err(at)?;
@@ -142,8 +146,9 @@ impl Server {
         let findings = tokio::spawn(store_findings(store.clone(), found, pulse));
         let pictures = tokio::spawn(pictures::check_all((*store).clone(), stopping.clone()));
         let (live, slots) = (engine.live.clone(), engine.slots.clone());
-        let to = receivers(&config, &engine);
-        let bus = Bus::open(&config, to.clone()).await?;
+        let registry = certificates.as_ref().map(|_| store.certificates().clone());
+        let to = receivers(&config, &engine, registry);
+        let bus = Bus::open(&config, to.clone(), certificates.clone()).await?;
         let outbox = bus.outbox().clone();
         let ros2 = Arc::new(Ros2::open(bus.session(), &config.ros2, (&to, &outbox)).await?);
         let publisher = Arc::new(ros2.publisher(outbox.clone()));
@@ -156,6 +161,7 @@ impl Server {
             ros2: ros2.clone(),
             sessions: sessions.clone(),
             backups,
+            enrolment: enrolment(certificates.as_ref(), bus.endpoint()),
             local_token_file: Some(local_token.path().to_owned()),
         };
         let app = App::new(config.clone(), store, services, &engine, stopping.clone());
@@ -196,6 +202,12 @@ fn write_local_token(config: &Config, store: &Catalogue, port: u16) -> Result<Lo
     let written = written.map_err(|e| StartError::LocalToken(e.to_string()))?;
     store.tokens().set_local(written.secret());
     Ok(written)
+}
+
+/// What robots are enrolled with, if their endpoint is encrypted.
+fn enrolment(certificates: Option<&Arc<Certificates>>, zenoh: &str) -> Option<Enrolment> {
+    let certificates = certificates.filter(|_| zenoh.starts_with("tls/"))?.clone();
+    Some(Enrolment { certificates, zenoh: zenoh.to_owned() })
 }
 
 /// The certificates, if connections are encrypted; they renew themselves until the server stops.
@@ -289,7 +301,7 @@ async fn store_findings(store: Catalogue, mut found: Receiver<LandmarkFinding>, 
     drop(pulse);
 }
 
-fn receivers(config: &Config, engine: &Engine) -> Receivers {
+fn receivers(config: &Config, engine: &Engine, certificates: Option<Arc<CertificateRegistry>>) -> Receivers {
     let intake = Intake {
         slots: engine.slots.clone(),
         snapshots: engine.snapshots.clone(),
@@ -303,6 +315,7 @@ fn receivers(config: &Config, engine: &Engine) -> Receivers {
         live: engine.live.clone(),
         gazes: Arc::default(),
         vitals: engine.vitals.clone(),
+        certificates,
     }
 }
 

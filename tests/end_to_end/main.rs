@@ -4,6 +4,7 @@ mod administration;
 mod api_client;
 mod backups;
 mod bad_frames;
+mod certificates;
 mod clocks;
 mod command_line;
 mod demo;

@@ -90,7 +90,7 @@ def test_a_certificate_that_is_not_valid_is_named(enrolled: Path, encrypted: Ser
     other = tmp_path / "robot.json"
     with pytest.raises(CertificateExpired, match="expired"):
         Robot.from_file(changed(enrolled, other, expires_ms=1))
-    with pytest.raises(NotAdmitted, match="waymark robot certificates"):
+    with pytest.raises(NotAdmitted, match="see waymark robot certificates"):
         Robot.from_file(changed(enrolled, other, robot="r2"), timeout_s=2)
     with pytest.raises(TlsRefused, match="waymark robot enrol"):
         Robot.from_file(changed(enrolled, other, authority=None), timeout_s=2)

@@ -19,6 +19,7 @@ mod modalities;
 mod operation;
 mod recognise;
 mod reference_runs;
+mod robot_certificates;
 mod robots;
 mod tokens;
 mod underlay;
@@ -50,6 +51,7 @@ pub fn operations() -> impl Iterator<Item = &'static Operation> {
         modalities::OPERATIONS,
         recognise::OPERATIONS,
         reference_runs::OPERATIONS,
+        robot_certificates::OPERATIONS,
         robots::OPERATIONS,
         tokens::OPERATIONS,
         underlay::OPERATIONS,

@@ -108,6 +108,7 @@ impl From<StoreError> for ApiError {
                     Kind::ReferenceRun => ("unknown_reference_run", "run"),
                     Kind::Underlay => ("unknown_underlay", "underlay"),
                     Kind::Token => ("unknown_token", "token"),
+                    Kind::Certificate => ("unknown_certificate", "serial"),
                     Kind::Backup => ("unknown_backup", "backup"),
                     Kind::Model | Kind::Picture => ("not_found", "path"),
                 };

@@ -29,6 +29,7 @@ mod recognise;
 mod reference_runs;
 mod relocalisation;
 mod revision;
+mod robot_certificates;
 mod robots;
 mod ros2;
 mod router;
@@ -59,6 +60,7 @@ use crate::{
 use axum::http::StatusCode;
 use engine::{live::LiveHub, motion::MotionTracker, panics::Edge, relocalise::Relocalisers, workers::Engine};
 use error::ApiError;
+pub(crate) use robot_certificates::Enrolment;
 use std::{path::PathBuf, sync::Arc, time::Duration};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, SemaphorePermit, watch};
 
@@ -89,6 +91,8 @@ pub(crate) struct App {
     pub(crate) local_token_file: Option<PathBuf>,
     /// Backups.
     pub(crate) backups: Arc<Backups>,
+    /// What robots are enrolled with, where their connections are encrypted.
+    pub(crate) enrolment: Option<Enrolment>,
     /// Becomes true when the server stops; ends event streams.
     pub(crate) stopping: watch::Receiver<bool>,
     /// Places for vision work asked for over HTTP: as many as there are vision threads.
@@ -108,6 +112,7 @@ pub(crate) struct Services {
     pub(crate) sessions: Arc<Sessions>,
     pub(crate) local_token_file: Option<PathBuf>,
     pub(crate) backups: Arc<Backups>,
+    pub(crate) enrolment: Option<Enrolment>,
 }
 
 /// The state of the router.
@@ -117,7 +122,7 @@ impl App {
     pub(crate) fn new(
         config: Arc<Config>,
         store: Catalogue,
-        Services { jobs, gatherer, ros2, sessions, local_token_file, backups }: Services,
+        Services { jobs, gatherer, ros2, sessions, local_token_file, backups, enrolment }: Services,
         engine: &Engine,
         stopping: watch::Receiver<bool>,
     ) -> Self {
@@ -138,6 +143,7 @@ impl App {
             sessions,
             local_token_file,
             backups,
+            enrolment,
             stopping,
             vision,
             streams,

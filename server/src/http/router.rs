@@ -5,7 +5,7 @@ use super::{
     error::{ApiError, method_not_allowed, not_found},
     examples::with_examples,
     gathering, guard, health, landmarks, learning, live, mapping, maps, modalities, page_session, pages,
-    recognise, reference_runs, relocalisation, revision, robots, ros2,
+    recognise, reference_runs, relocalisation, revision, robot_certificates, robots, ros2,
     security::with_security,
     tokens, underlay, views, visibility, visibility_settings, walls,
 };
@@ -52,6 +52,7 @@ fn api(limits: &Limits) -> OpenApiRouter<AppState> {
         .merge(visibility_settings::router())
         .merge(recognise::router(limits.upload_bytes))
         .merge(robots::router())
+        .merge(robot_certificates::router())
         .merge(relocalisation::router())
         .merge(ros2::router())
         .merge(cameras::router())

@@ -12,7 +12,7 @@ mod visibility_areas;
 
 use crate::{
     config::Config,
-    identity::TokenRegistry,
+    identity::{TokenRegistry, certificates::CertificateRegistry},
     store::{OpenError, Store, WriterTask},
 };
 use engine::{snapshot::Snapshots, vitals::Vitals};
@@ -26,6 +26,7 @@ pub(crate) struct Catalogue {
     store: Store,
     snapshots: Arc<Snapshots>,
     tokens: Arc<TokenRegistry>,
+    certificates: Arc<CertificateRegistry>,
 }
 
 impl Deref for Catalogue {
@@ -66,18 +67,24 @@ impl Catalogue {
     pub(crate) async fn open(config: &Config) -> Result<(Self, CatalogueTasks), OpenError> {
         let (snapshots, vitals) = (Arc::new(Snapshots::default()), Arc::new(Vitals::default()));
         let tokens = Arc::<TokenRegistry>::default();
-        let publisher =
-            Publisher::new(snapshots.clone(), tokens.clone(), config.params.clone(), vitals.clone());
+        let certificates = Arc::<CertificateRegistry>::default();
+        let identities = (tokens.clone(), certificates.clone());
+        let publisher = Publisher::new(snapshots.clone(), identities, config.params.clone(), vitals.clone());
         let wake = publisher.derive.clone();
         let (store, writer) = Store::open(config, Arc::new(publisher), vitals.clone()).await?;
         let (stop, stopping) = watch::channel(false);
         let deriver = tokio::spawn(derive::run(snapshots.clone(), vitals, wake, stopping));
-        Ok((Self { store, snapshots, tokens }, CatalogueTasks { writer, deriver, stop }))
+        Ok((Self { store, snapshots, tokens, certificates }, CatalogueTasks { writer, deriver, stop }))
     }
 
     /// What the workers read.
     pub(crate) fn snapshots(&self) -> &Arc<Snapshots> {
         &self.snapshots
+    }
+
+    /// The certificates that robots show.
+    pub(crate) fn certificates(&self) -> &Arc<CertificateRegistry> {
+        &self.certificates
     }
 
     /// The tokens that requests are checked with.

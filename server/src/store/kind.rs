@@ -18,6 +18,7 @@ pub(crate) enum Kind {
     ReferenceRun,
     Underlay,
     Token,
+    Certificate,
     Backup,
 }
 
@@ -37,6 +38,7 @@ impl fmt::Display for Kind {
             Self::ReferenceRun => "reference run",
             Self::Underlay => "underlay of map",
             Self::Token => "token",
+            Self::Certificate => "certificate",
             Self::Backup => "backup",
         })
     }

@@ -31,6 +31,7 @@ const FILES: &[(&str, &str)] = files![
     "0017_tokens",
     "0018_idempotency",
     "0019_revisions",
+    "0020_robot_certificates",
 ];
 
 /// The steps in order.

@@ -27,7 +27,7 @@ ADVICE: dict[str, str] = {
     "unreachable": "is `waymark serve` running, is this its endpoint?",
     "tls_refused": "enrol the robot again (waymark robot enrol), and name the server by one of its tls.names",
     "certificate_expired": "enrol the robot again: waymark robot enrol",
-    "not_admitted": "it was revoked, is another robot's, or the robot was removed: waymark robot certificates lists them",
+    "not_admitted": "it was revoked, is another robot's, or the robot was removed: see waymark robot certificates",
     "no_answer": "the frame or its answer was dropped, or the work takes longer: send again, or give a longer `wait_s`",
     "superseded": "send the next frame of a camera when the last is answered",
     "no_encoder": "pip install 'waymark-client[jpeg]', or send the raw image",
@@ -89,8 +89,8 @@ class Unreachable(WaymarkError):
 
 
 class TlsRefused(Unreachable):
-    """Something listens there, and there is no encrypted session: the robot's certificate is not valid at the server, or
-    the server's own is not signed by the authority in the robot's file, or is for another name."""
+    """Something listens there, and there is no encrypted session: the robot's certificate is not valid at the server,
+    or the server's own is not signed by the authority in the robot's file, or is for another name."""
 
     default_code = "tls_refused"
 

@@ -24,6 +24,7 @@ pub(crate) struct ServerCertificate {
     /// PEM.
     pub(crate) key_pem: PemKey,
     /// The same for rustls.
+    #[allow(dead_code, reason = "for listeners that are not zenoh's")]
     pub(crate) certified: Arc<CertifiedKey>,
     /// When it is to be renewed, ms since the Unix epoch; `None` for files of the operator's own.
     pub(super) renew_ms: Option<i64>,

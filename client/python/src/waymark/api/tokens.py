@@ -44,8 +44,8 @@ class RobotCertificate:
 
 @dataclass(frozen=True, slots=True)
 class EnrolledRobot:
-    """A new certificate, with what a robot needs to connect. `authority_pem` is `None` where the server's certificate is
-    a file of the operator's own; `zenoh` is the endpoint as the server listens."""
+    """A new certificate, with what a robot needs to connect. `authority_pem` is `None` where the server's certificate
+    is a file of the operator's own; `zenoh` is the endpoint as the server listens."""
 
     certificate_pem: str
     authority_pem: str | None
