@@ -146,8 +146,7 @@ impl Server {
         let findings = tokio::spawn(store_findings(store.clone(), found, pulse));
         let pictures = tokio::spawn(pictures::check_all((*store).clone(), stopping.clone()));
         let (live, slots) = (engine.live.clone(), engine.slots.clone());
-        let registry = certificates.as_ref().map(|_| store.certificates().clone());
-        let to = receivers(&config, &engine, registry);
+        let to = receivers(&config, &engine, certificates.as_ref().map(|_| store.certificates().clone()));
         let bus = Bus::open(&config, to.clone(), certificates.clone()).await?;
         let outbox = bus.outbox().clone();
         let ros2 = Arc::new(Ros2::open(bus.session(), &config.ros2, (&to, &outbox)).await?);

@@ -92,6 +92,7 @@ impl IntoResponse for ApiError {
 }
 
 impl From<StoreError> for ApiError {
+    #[expect(clippy::too_many_lines, reason = "a line for each kind and error")]
     fn from(error: StoreError) -> Self {
         let detail = error.to_string();
         match error {

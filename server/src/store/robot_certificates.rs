@@ -1,6 +1,9 @@
 //! Certificates of robots: serial, digest, and until when each is valid.
 
-use super::{CommittedChange, StoreError, Tx, kind::Kind, now_ms, robots, statements::statements, within};
+use super::{
+    CommittedChange, StoreError, Tx, kind::Kind, now_ms, pictures::hex, robots, statements::statements,
+    within,
+};
 use protos::api::RobotCertificate;
 use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
 
@@ -37,7 +40,7 @@ fn certificate_row(row: &SqliteRow) -> Result<RobotCertificate, sqlx::Error> {
     Ok(RobotCertificate {
         serial: row.try_get("serial")?,
         robot: row.try_get("robot")?,
-        sha256: sha256.iter().map(|byte| format!("{byte:02x}")).collect(),
+        sha256: hex(&sha256),
         issued_ms: row.try_get("issued_ms")?,
         expires_ms: row.try_get("expires_ms")?,
         revoked_ms: row.try_get("revoked_ms")?,

@@ -1,9 +1,6 @@
 //! Robots, and the map of each.
 
-use super::{
-    CommittedChange, StoreError, Tx, kind::Kind, maps, now_ms, robot_certificates, statements::statements,
-    within,
-};
+use super::{CommittedChange, StoreError, Tx, kind::Kind, maps, now_ms, statements::statements, within};
 use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
 
 statements! {
@@ -66,6 +63,5 @@ pub(crate) async fn delete(tx: &mut Tx, name: &str) -> Result<(), StoreError> {
     get(&mut tx.conn, name).await?;
     sqlx::query(DELETE).bind(name).execute(&mut tx.conn).await.map_err(StoreError::during("delete robot"))?;
     tx.changed(CommittedChange::Robot { name: name.to_owned(), map: None });
-    robot_certificates::revoke_all(tx, name).await?;
     Ok(())
 }
