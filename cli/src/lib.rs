@@ -36,6 +36,7 @@ pub mod simulated_errors;
 pub mod stopwatch;
 pub mod survey;
 mod version;
+mod validity;
 mod view;
 
 use clap::{CommandFactory as _, Parser, Subcommand};

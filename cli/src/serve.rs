@@ -50,7 +50,7 @@ pub(super) struct Serve {
     /// Where HTTP listens; port 0 takes a free one [default: 127.0.0.1:8080].
     #[arg(long, value_name = "ADDR")]
     http: Option<String>,
-    /// Where robots connect; port 0 takes a free one [default: tcp/127.0.0.1:7447].
+    /// Where robots connect; port 0 takes a free one [default: tcp/127.0.0.1:7447, with encryption tls/127.0.0.1:7447].
     #[arg(long, value_name = "ENDPOINT")]
     zenoh: Option<String>,
     /// Name in every key, waymark/1/{fleet}/... [default: default].
@@ -65,8 +65,8 @@ pub(super) struct Serve {
     /// A DNS name or address by which clients reach this server, for its certificate; may be given several times.
     #[arg(long, value_name = "NAME", requires = "tls")]
     tls_name: Vec<String>,
-    /// Allows addresses beyond loopback. Nothing is encrypted, and robots are not asked who they are: only for a
-    /// network that is trusted as a whole.
+    /// Allows addresses beyond loopback in plain text. There nothing is encrypted, and robots are not asked who they are:
+    /// only for a network that is trusted as a whole. Encrypted endpoints need no such permission.
     #[arg(long)]
     insecure: bool,
 }

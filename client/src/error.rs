@@ -25,6 +25,47 @@ pub enum ClientError {
         /// The transport's message.
         detail: String,
     },
+    /// Something listens, and there is no encrypted session.
+    #[error(
+        "{endpoint} refuses the encrypted connection: the robot's certificate is not valid there (expired, or signed by \
+         another authority), or the server's own is not signed by the authority in the robot's file, or is for another \
+         name; enrol the robot again (waymark robot enrol), and name the server by one of its tls.names ({detail})"
+    )]
+    TlsRefused {
+        /// The endpoint that was tried.
+        endpoint: String,
+        /// The transport's message.
+        detail: String,
+    },
+    /// The robot's certificate has ended.
+    #[error(
+        "{path}: the certificate of robot {robot} has expired; enrol it again: waymark robot enrol {robot}"
+    )]
+    CertificateExpired {
+        /// The robot.
+        robot: String,
+        /// The certificate.
+        path: String,
+    },
+    /// The session is open, and the server takes nothing of this robot.
+    #[error(
+        "the server at {endpoint} takes no messages of robot {robot} with this certificate: it was revoked, is another \
+         robot's, or the robot was removed; waymark robot certificates {robot} lists what there is"
+    )]
+    NotAdmitted {
+        /// The robot.
+        robot: String,
+        /// The server.
+        endpoint: String,
+    },
+    /// The file of `waymark robot enrol` cannot be used.
+    #[error("{path} is not a file of `waymark robot enrol`: {detail}")]
+    RobotFile {
+        /// Which.
+        path: String,
+        /// What is wrong with it.
+        detail: String,
+    },
     /// The transport refused an action on an open session.
     #[error("zenoh could not {action}: {detail}")]
     Transport {

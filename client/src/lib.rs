@@ -10,6 +10,7 @@ pub mod error;
 pub mod http;
 pub mod listener;
 pub mod robot;
+pub mod robot_file;
 mod transport;
 
 pub use capture::Capture;
@@ -22,3 +23,4 @@ pub use protos::{
     v1,
 };
 pub use robot::{Delivery, MapVersions, RobotClient, RobotOptions};
+pub use robot_file::{ROBOT_FILE_VARIABLE, RobotFile, RobotTls};

@@ -54,7 +54,7 @@ impl FleetListener {
         robots: &[Name],
         timeout: Duration,
     ) -> Result<Self, ClientError> {
-        let session = transport::open(endpoint, Delivery::Latest, timeout).await?;
+        let session = transport::open_at(endpoint, Delivery::Latest, timeout, None).await?;
         let keys = Keys::new(fleet);
         let (to, waiting) = mpsc::channel(MAX_WAITING);
         let counters = Arc::new(Counters::default());
@@ -131,6 +131,6 @@ fn is_wanted(key: &Key, robots: &[Name]) -> bool {
         | Key::Scan(robot)
         | Key::Pose(robot) => robots.is_empty() || robots.contains(robot),
         Key::MapChanged(_) => true,
-        Key::Alive(..) | Key::Gaze(_) | Key::MapVersion(_) => false,
+        Key::Alive(..) | Key::Gaze(_) | Key::Hello(_) | Key::MapVersion(_) => false,
     }
 }

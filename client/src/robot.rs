@@ -1,7 +1,7 @@
 //! The robot's side. Out: frames, odometry, scans, a liveliness token. In: answers and fused poses. Frames are best
 //! effort and numbered; the server keeps the newest of each camera, so a robot that sends fast never queues.
 
-use crate::{Capture, ClientError, transport};
+use crate::{Capture, ClientError, RobotTls, transport};
 use map::pose2::Pose2;
 use protos::{Key, Keys, Name, convert::geometry::pose2_wire, prost::Message, v1};
 use std::{
@@ -20,6 +20,10 @@ use zenoh::{
 
 /// Answers and poses buffered for a slow reader; beyond, it misses the oldest.
 pub const INBOX: usize = 64;
+/// Longest wait for one hello of the server.
+const HELLO_WAIT: Duration = Duration::from_millis(500);
+/// Time between two questions for it.
+const HELLO_EVERY: Duration = Duration::from_millis(50);
 
 /// Behaviour when the link is full.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -48,6 +52,8 @@ pub struct RobotOptions {
     /// only if the server restarted, too: a running server drops sequence numbers that begin anew as stale. Two
     /// programs must not use one robot's name at a time: the later one is refused with `epoch_conflict`.
     pub epoch: Option<u64>,
+    /// What the robot shows at a `tls/` endpoint.
+    pub tls: Option<RobotTls>,
 }
 
 impl RobotOptions {
@@ -60,8 +66,27 @@ impl RobotOptions {
             delivery: Delivery::Latest,
             timeout: Duration::from_secs(5),
             epoch: None,
+            tls: None,
         }
     }
+}
+
+/// Whether the server answers a hello: with a certificate that gives no access, everything is dropped without a word.
+async fn admitted(
+    session: &zenoh::Session,
+    keys: &Keys,
+    robot: &Name,
+    options: &RobotOptions,
+) -> Result<(), ClientError> {
+    let (key, until) = (keys.build(&Key::Hello(robot.clone())), Instant::now() + options.timeout);
+    while Instant::now() < until {
+        let replies = session.get(&key).timeout(HELLO_WAIT).await.map_err(fault("ask for the server"))?;
+        if replies.recv_async().await.is_ok_and(|reply| reply.result().is_ok()) {
+            return Ok(());
+        }
+        tokio::time::sleep(HELLO_EVERY).await;
+    }
+    Err(ClientError::NotAdmitted { robot: robot.to_string(), endpoint: options.endpoint.clone() })
 }
 
 /// An answer and the camera it is for.
@@ -110,7 +135,10 @@ impl RobotClient {
         let fleet = name("fleet", &options.fleet)?;
         let robot = name("robot", &options.robot)?;
         let keys = Keys::new(&fleet);
-        let session = transport::open(&options.endpoint, options.delivery, options.timeout).await?;
+        let session = transport::open(options).await?;
+        if options.tls.is_some() {
+            admitted(&session, &keys, &robot, options).await?;
+        }
         let (answers, _) = broadcast::channel(INBOX);
         let (poses, _) = broadcast::channel(INBOX);
         let to_answers = {

@@ -101,6 +101,8 @@ pub enum Key {
     Alive(Name, Option<u64>),
     /// `robot/{robot}/rpc/gaze`: a query of the robot, `GazeRequest` in, `GazeAdvice` out.
     Gaze(Name),
+    /// `robot/{robot}/rpc/hello`: a query of the robot, answered with nothing: its messages arrive.
+    Hello(Name),
     /// `map/{map}/changed`: server to all, `MapChanged`.
     MapChanged(Name),
     /// `map/{map}/version`: a query of anyone, `MapChanged` out with the present version.
@@ -150,6 +152,7 @@ impl Keys {
             Key::Alive(robot, None) => format!("{p}robot/{robot}/alive"),
             Key::Alive(robot, Some(epoch)) => format!("{p}robot/{robot}/alive/{epoch}"),
             Key::Gaze(robot) => format!("{p}robot/{robot}/rpc/gaze"),
+            Key::Hello(robot) => format!("{p}robot/{robot}/rpc/hello"),
             Key::MapChanged(map) => format!("{p}map/{map}/changed"),
             Key::MapVersion(map) => format!("{p}map/{map}/version"),
         }
@@ -173,6 +176,11 @@ impl Keys {
     /// Key expression of the gaze requests of all robots.
     pub fn all_gaze(&self) -> String {
         format!("{}robot/*/rpc/gaze", self.prefix)
+    }
+
+    /// Key expression of the greetings of all robots.
+    pub fn all_hellos(&self) -> String {
+        format!("{}robot/*/rpc/hello", self.prefix)
     }
 
     /// Key expression of the versions of all maps.
@@ -200,6 +208,16 @@ impl Keys {
         format!("{}map/*/changed", self.prefix)
     }
 
+    /// Key expression of the frames of one robot.
+    pub fn frames_of(&self, robot: &Name) -> String {
+        format!("{}robot/{robot}/frame/*", self.prefix)
+    }
+
+    /// Key expression of the liveliness tokens of one robot.
+    pub fn tokens_of(&self, robot: &Name) -> String {
+        format!("{}robot/{robot}/alive/**", self.prefix)
+    }
+
     /// Key expression of all answers for one robot.
     pub fn answers_of(&self, robot: &Name) -> String {
         format!("{}robot/{robot}/answer/*", self.prefix)
@@ -222,6 +240,7 @@ impl Keys {
                 Ok(Key::Answer(robot(r)?, named("camera", c)?))
             }
             [Some("robot"), Some(r), Some("rpc"), Some("gaze"), None] => Ok(Key::Gaze(robot(r)?)),
+            [Some("robot"), Some(r), Some("rpc"), Some("hello"), None] => Ok(Key::Hello(robot(r)?)),
             [Some("robot"), Some(r), Some("odometry"), None, _] => Ok(Key::Odometry(robot(r)?)),
             [Some("robot"), Some(r), Some("scan"), None, _] => Ok(Key::Scan(robot(r)?)),
             [Some("robot"), Some(r), Some("pose"), None, _] => Ok(Key::Pose(robot(r)?)),
@@ -316,6 +335,7 @@ mod tests {
                 Key::MapChanged(a.clone()),
                 Key::MapVersion(a.clone()),
                 Key::Gaze(a.clone()),
+                Key::Hello(a.clone()),
             ] {
                 prop_assert_eq!(keys.parse(&keys.build(&key)), Ok(key));
             }

@@ -32,7 +32,7 @@ use std::{
 use vision::{model::MAX_LANDMARKS, params::Params};
 
 /// Variables that begin with `WAYMARK_` but are read by the command line, not by the settings.
-const NOT_SETTINGS: [&str; 5] = ["config", "server", "map", "log", "token"];
+const NOT_SETTINGS: [&str; 6] = ["config", "server", "map", "log", "token", "robot_file"];
 /// Most vision threads that can be asked for.
 pub const MAX_WORKERS: usize = 256;
 
@@ -52,8 +52,8 @@ pub enum ConfigError {
     },
     /// A listener would be reachable from other machines without encryption.
     #[error(
-        "setting `{field}` = {value} is reachable from other machines in plain text; use a loopback address, or give \
-         --insecure if the network itself is trusted"
+        "setting `{field}` = {value} is reachable from other machines in plain text; use encryption (docs/guides/deploy.md) \
+         or a loopback address, or give --insecure if the network itself is trusted"
     )]
     NotLoopback {
         /// Name of the setting.
@@ -71,7 +71,8 @@ pub struct RawConfig {
     pub data: PathBuf,
     /// Address and port of the HTTP interface; port 0 takes a free one.
     pub http: String,
-    /// Where the zenoh router listens, as zenoh writes it; port 0 takes a free one.
+    /// Where the zenoh router listens, as zenoh writes it; port 0 takes a free one. Empty: `tcp/127.0.0.1:7447`, or
+    /// `tls/127.0.0.1:7447` with encryption.
     pub zenoh: String,
     /// Name in every key: `waymark/1/{fleet}/...`.
     pub fleet: String,
@@ -100,7 +101,7 @@ impl Default for RawConfig {
         Self {
             data: PathBuf::from("waymark-data"),
             http: "127.0.0.1:8080".into(),
-            zenoh: "tcp/127.0.0.1:7447".into(),
+            zenoh: String::new(),
             fleet: "default".into(),
             workers: 0,
             search_every_frame: true,
@@ -276,7 +277,7 @@ pub struct Config {
     pub data: PathBuf,
     /// Where HTTP listens; port 0 takes a free one.
     pub http_addr: SocketAddr,
-    /// Where the zenoh router listens, `tcp/HOST:PORT`; port 0 takes a free one.
+    /// Where the zenoh router listens, `tcp/HOST:PORT` or `tls/HOST:PORT`; port 0 takes a free one.
     pub zenoh_endpoint: String,
     /// Name in every key.
     pub fleet: Name,
@@ -299,7 +300,8 @@ pub struct Config {
 impl Config {
     /// The listeners that other machines can reach, by setting, with their addresses: they are not encrypted.
     pub fn plain_text_beyond_loopback(&self) -> Vec<(&'static str, String)> {
-        let zenoh = zenoh_address(&self.zenoh_endpoint).ok().filter(|a| !is_loopback(a.ip()));
+        let is_plain = |(is_tls, address): &(bool, SocketAddr)| !is_tls && !is_loopback(address.ip());
+        let zenoh = zenoh_address("zenoh", &self.zenoh_endpoint).ok().filter(is_plain);
         let is_http_plain = self.tls.is_none() && !is_loopback(self.http_addr.ip());
         let http = is_http_plain.then(|| ("http", self.http_addr.to_string()));
         http.into_iter().chain(zenoh.map(|_| ("zenoh", self.zenoh_endpoint.clone()))).collect()
@@ -314,11 +316,16 @@ impl TryFrom<RawConfig> for Config {
             .http
             .parse()
             .map_err(|e| invalid("http", format!("`{}` is not ADDRESS:PORT ({e})", raw.http)))?;
-        let zenoh_ip = zenoh_address(&raw.zenoh)?.ip();
         let tls = tls::checked(raw.tls)?;
-        for (field, value, is_plain, ip) in
-            [("http", &raw.http, tls.is_none(), http_addr.ip()), ("zenoh", &raw.zenoh, true, zenoh_ip)]
-        {
+        let zenoh_endpoint = zenoh_endpoint(raw.zenoh, tls.is_some());
+        let (zenoh_is_tls, zenoh_addr) = zenoh_address("zenoh", &zenoh_endpoint)?;
+        if zenoh_is_tls && tls.is_none() {
+            return Err(invalid("zenoh", format!("`{zenoh_endpoint}` is encrypted: set tls.enabled, too")));
+        }
+        for (field, value, is_plain, ip) in [
+            ("http", &raw.http, tls.is_none(), http_addr.ip()),
+            ("zenoh", &zenoh_endpoint, !zenoh_is_tls, zenoh_addr.ip()),
+        ] {
             if is_plain && !raw.insecure && !is_loopback(ip) {
                 return Err(ConfigError::NotLoopback { field, value: value.clone() });
             }
@@ -350,7 +357,7 @@ impl TryFrom<RawConfig> for Config {
         Ok(Self {
             data: raw.data,
             http_addr,
-            zenoh_endpoint: raw.zenoh,
+            zenoh_endpoint,
             fleet,
             workers: if raw.workers == 0 { cores } else { raw.workers },
             search_every_frame: raw.search_every_frame,
@@ -377,10 +384,21 @@ fn is_loopback(ip: IpAddr) -> bool {
     ip.to_canonical().is_loopback()
 }
 
-/// Only `tcp/IP:PORT`: a host name could resolve to anything, and the other transports are not compiled in.
-fn zenoh_address(endpoint: &str) -> Result<SocketAddr, ConfigError> {
-    endpoint.strip_prefix("tcp/").and_then(|rest| rest.parse().ok()).ok_or_else(|| {
-        invalid("zenoh", format!("`{endpoint}` is not tcp/ADDRESS:PORT with a numeric address"))
+/// Where robots connect if the settings do not say.
+fn zenoh_endpoint(asked: String, is_tls: bool) -> String {
+    let default = if is_tls { "tls/127.0.0.1:7447" } else { "tcp/127.0.0.1:7447" };
+    if asked.is_empty() { default.to_owned() } else { asked }
+}
+
+/// Whether it encrypts, and its address. Only `tcp/IP:PORT` and `tls/IP:PORT`: a host name could resolve to anything,
+/// and the other transports are not compiled in.
+fn zenoh_address(field: &'static str, endpoint: &str) -> Result<(bool, SocketAddr), ConfigError> {
+    let parts = endpoint.split_once('/').filter(|(protocol, _)| ["tcp", "tls"].contains(protocol));
+    let parsed = parts.and_then(|(protocol, rest)| Some((protocol == "tls", rest.parse().ok()?)));
+    parsed.ok_or_else(|| {
+        let reason =
+            format!("`{endpoint}` is not tcp/ADDRESS:PORT or tls/ADDRESS:PORT with a numeric address");
+        invalid(field, reason)
     })
 }
 

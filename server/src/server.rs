@@ -6,8 +6,12 @@ use crate::{
     config::Config,
     events::{EventLog, watch_changes::watch_changes},
     gather::{self, Gatherer, GatheringTap, OfferedFrame},
-    http::{self, App, Services},
-    identity::{Sessions, TokenId, certificates::Certificates, local_token::LocalToken},
+    http::{self, App, Enrolment, Services},
+    identity::{
+        Sessions, TokenId,
+        certificates::{CertificateRegistry, Certificates},
+        local_token::LocalToken,
+    },
     jobs::Jobs,
     publication::{Catalogue, CatalogueTasks},
     recording_answers::store_answers,
@@ -151,8 +155,8 @@ impl Server {
         let recorders = recorders(&config, &store, (found, recorded, &engine.live), &stopping);
         let pictures = tokio::spawn(pictures::check_all((*store).clone(), stopping.clone()));
         let (live, slots) = (engine.live.clone(), engine.slots.clone());
-        let to = receivers(&config, &engine);
-        let bus = Bus::open(&config, to.clone()).await?;
+        let to = receivers(&config, &engine, certificates.as_ref().map(|_| store.certificates().clone()));
+        let bus = Bus::open(&config, to.clone(), certificates.clone()).await?;
         let outbox = bus.outbox().clone();
         let ros2 = Arc::new(Ros2::open(bus.session(), &config.ros2, (&to, &outbox)).await?);
         let publisher = Arc::new(ros2.publisher(outbox.clone()));
@@ -165,6 +169,7 @@ impl Server {
             ros2: ros2.clone(),
             sessions: sessions.clone(),
             backups,
+            enrolment: enrolment(certificates.as_ref(), bus.endpoint()),
             local_token_file: Some(local_token.path().to_owned()),
         };
         let app = App::new(config.clone(), store, services, &engine, stopping.clone());
@@ -209,6 +214,12 @@ fn write_local_token(config: &Config, store: &Catalogue, port: u16) -> Result<Lo
     let written = written.map_err(|e| StartError::LocalToken(e.to_string()))?;
     store.tokens().set_local(written.secret());
     Ok(written)
+}
+
+/// What robots are enrolled with, if their endpoint is encrypted.
+fn enrolment(certificates: Option<&Arc<Certificates>>, zenoh: &str) -> Option<Enrolment> {
+    let certificates = certificates.filter(|_| zenoh.starts_with("tls/"))?.clone();
+    Some(Enrolment { certificates, zenoh: zenoh.to_owned() })
 }
 
 /// The certificates, if connections are encrypted; they renew themselves until the server stops.
@@ -328,7 +339,7 @@ async fn store_findings(store: Catalogue, mut found: Receiver<LandmarkFinding>, 
     drop(pulse);
 }
 
-fn receivers(config: &Config, engine: &Engine) -> Receivers {
+fn receivers(config: &Config, engine: &Engine, certificates: Option<Arc<CertificateRegistry>>) -> Receivers {
     let intake = Intake {
         slots: engine.slots.clone(),
         snapshots: engine.snapshots.clone(),
@@ -342,6 +353,7 @@ fn receivers(config: &Config, engine: &Engine) -> Receivers {
         live: engine.live.clone(),
         gazes: Arc::default(),
         vitals: engine.vitals.clone(),
+        certificates,
     }
 }
 

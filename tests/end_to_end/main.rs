@@ -5,6 +5,7 @@ mod api_client;
 mod audit;
 mod backups;
 mod bad_frames;
+mod certificates;
 mod clocks;
 mod command_line;
 mod demo;

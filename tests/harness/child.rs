@@ -26,13 +26,25 @@ impl Child {
 
     /// The same with these settings, as environment variables.
     pub fn start_with(data: &Path, settings: &[(&str, &str)]) -> Self {
-        let mut process = Command::new(program())
+        Self::start_from(&mut Self::command(data, settings))
+    }
+
+    /// The command that starts it.
+    pub fn command(data: &Path, settings: &[(&str, &str)]) -> Command {
+        let is_tls = settings.iter().any(|(name, _)| *name == "WAYMARK_TLS__ENABLED");
+        let zenoh = if is_tls { "tls/127.0.0.1:0" } else { "tcp/127.0.0.1:0" };
+        let mut command = Command::new(program());
+        command
             .envs(settings.iter().copied())
-            .args(["serve", "--http", "127.0.0.1:0", "--zenoh", "tcp/127.0.0.1:0", "--log", "warn", "--data"])
-            .arg(data)
-            .stdout(Stdio::piped())
-            .spawn()
-            .expect("the program starts");
+            .env("WAYMARK_LOG", "warn")
+            .args(["serve", "--http", "127.0.0.1:0", "--zenoh", zenoh, "--data"])
+            .arg(data);
+        command
+    }
+
+    /// Starts that command and waits until it says that it is ready.
+    pub fn start_from(command: &mut Command) -> Self {
+        let mut process = command.stdout(Stdio::piped()).spawn().expect("the program starts");
         let stdout = process.stdout.take().expect("its output");
         let mut lines = BufReader::new(stdout).lines().map(|line| line.expect("a line"));
         let mut after = |label: &str| {

@@ -49,10 +49,11 @@ impl Inside {
     /// Starts one with these settings but for data and addresses.
     pub async fn start_with(settings: RawConfig) -> Self {
         let data = TempDir::new().expect("a temporary directory");
+        let protocol = if settings.tls.enabled { "tls" } else { "tcp" };
         let raw = RawConfig {
             data: data.path().to_owned(),
             http: "127.0.0.1:0".into(),
-            zenoh: "tcp/127.0.0.1:0".into(),
+            zenoh: format!("{protocol}/127.0.0.1:0"),
             ..settings
         };
         let config = Config::try_from(raw).expect("a valid configuration");

@@ -23,6 +23,7 @@ mod modalities;
 mod operation;
 mod recognise;
 mod reference_runs;
+mod robot_certificates;
 mod robots;
 mod tls;
 mod server_events;
@@ -63,6 +64,7 @@ pub fn operations() -> impl Iterator<Item = &'static Operation> {
         modalities::OPERATIONS,
         recognise::OPERATIONS,
         reference_runs::OPERATIONS,
+        robot_certificates::OPERATIONS,
         robots::OPERATIONS,
         server_events::OPERATIONS,
         stored_answers::OPERATIONS,

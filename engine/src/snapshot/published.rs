@@ -64,6 +64,11 @@ impl Snapshots {
         self.world.load().robots.get(robot).cloned()
     }
 
+    /// Every registered robot with its map.
+    pub fn robots(&self) -> BTreeMap<String, String> {
+        self.world.load().robots.clone()
+    }
+
     /// Events of [`Snapshots::publish`] and [`Snapshots::remove_map`] from now on.
     pub fn changes(&self) -> broadcast::Receiver<MapChange> {
         self.changes.subscribe()

@@ -50,7 +50,7 @@ pub(super) async fn answer_gaze(
 }
 
 fn advise(to: &Receivers, robot: &Name, query: &Query) -> Result<v1::GazeAdvice, Rejection> {
-    let name = to.intake.snapshots.robot_map(robot.as_str());
+    let name = to.intake.snapshots.robot_map(robot.as_str()).filter(|_| to.admits(robot));
     let name = name.ok_or_else(|| Rejection::new(Code::UnknownRobot, "robot", "not registered"))?;
     let map = to.intake.snapshots.get(&name);
     let map = map.ok_or_else(|| Rejection::new(Code::UnknownMap, "map", "not loaded"))?;

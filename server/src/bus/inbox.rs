@@ -34,6 +34,7 @@ pub(super) async fn subscribe(
         let (keys, to, outbox) = (keys.clone(), to.clone(), outbox.clone());
         move |sample: Sample| {
             if let Ok(Key::Odometry(robot)) = keys.parse(sample.key_expr().as_str())
+                && to.admits(&robot)
                 && let Some(pose) = to.motion.odometry(&robot, bytes(&sample), Instant::now())
             {
                 outbox.pose(&robot, &pose);
@@ -43,7 +44,9 @@ pub(super) async fn subscribe(
     let scans = {
         let (keys, to) = (keys.clone(), to.clone());
         move |sample: Sample| {
-            if let Ok(Key::Scan(robot)) = keys.parse(sample.key_expr().as_str()) {
+            if let Ok(Key::Scan(robot)) = keys.parse(sample.key_expr().as_str())
+                && to.admits(&robot)
+            {
                 to.motion.scan(&robot, bytes(&sample), Instant::now());
             }
         }
@@ -100,6 +103,10 @@ fn frame(keys: &Keys, to: &Receivers, outbox: &Outbox, sample: &Sample) {
 
 /// Passes a `Frame` message to the intake. A refusal is answered.
 pub(crate) fn take_frame(to: &Receivers, outbox: &Outbox, slot: &SlotKey, message: Bytes) {
+    if !to.admits(&slot.robot) {
+        tracing::debug!(?slot, "frame_of_a_revoked_robot");
+        return to.intake.slots.refuse(protos::Code::UnknownRobot);
+    }
     let panics = to.vitals.panics();
     let follows = "it is refused as internal";
     let received =

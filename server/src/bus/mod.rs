@@ -4,7 +4,10 @@
 //! Callbacks run on zenoh's threads and never wait: they check and hand over. What goes out passes a bounded queue
 //! and its own thread, so a slow link holds up no worker.
 
+mod access;
+mod gate;
 mod gaze;
+mod hello;
 mod inbox;
 mod outbox;
 mod router;
@@ -15,7 +18,11 @@ mod tests;
 pub(crate) use inbox::{announce_presence, take_frame};
 pub use outbox::Outbox;
 
-use crate::config::Config;
+use crate::{
+    config::Config,
+    identity::certificates::{CertificateRegistry, Certificates, LinkCertificates},
+    store::now_ms,
+};
 use engine::{
     gaze::GazeControllers,
     intake::Intake,
@@ -24,7 +31,9 @@ use engine::{
     panics::Edge,
     vitals::{Pulse, Vitals},
 };
-use protos::{Key, Keys, v1};
+use gate::{Gate, GateSettings};
+use protos::{Key, Keys, Name, v1};
+use router::{RouterSettings, RouterTls};
 use std::sync::Arc;
 use tokio::{sync::broadcast::error::RecvError, task::JoinHandle};
 use zenoh::{pubsub::Subscriber, query::Queryable};
@@ -71,6 +80,16 @@ pub struct Receivers {
     pub gazes: Arc<GazeControllers>,
     /// Pulses of tasks, and counters of panics.
     pub vitals: Arc<Vitals>,
+    /// Certificates of robots, where connections are encrypted.
+    pub(crate) certificates: Option<Arc<CertificateRegistry>>,
+}
+
+impl Receivers {
+    /// Whether messages of a robot are taken: access control forbids those of revoked certificates, and this those that
+    /// arrive until it does.
+    pub(crate) fn admits(&self, robot: &Name) -> bool {
+        self.certificates.as_ref().is_none_or(|certificates| certificates.admits(robot, now_ms()))
+    }
 }
 
 /// The open bus.
@@ -80,7 +99,8 @@ pub struct Bus {
     outbox: Outbox,
     changes: JoinHandle<()>,
     subscribers: Vec<Subscriber<()>>,
-    queryables: [Queryable<()>; 2],
+    queryables: [Queryable<()>; 3],
+    gate: Option<Gate>,
 }
 
 impl std::fmt::Debug for Bus {
@@ -91,11 +111,19 @@ impl std::fmt::Debug for Bus {
 
 impl Bus {
     /// Opens the router and starts to receive. Needs a multi-threaded runtime.
-    pub async fn open(config: &Config, to: Receivers) -> Result<Self, BusError> {
+    pub(crate) async fn open(
+        config: &Config,
+        to: Receivers,
+        certificates: Option<Arc<Certificates>>,
+    ) -> Result<Self, BusError> {
         let endpoint = router::endpoint(&config.zenoh_endpoint)?;
-        let session = router::open(&endpoint, config.limits.robots, config.limits.frame_bytes).await?;
+        let encrypted = certificates.filter(|_| endpoint.starts_with("tls/"));
+        let (session, link) = match &encrypted {
+            None => (router::open(&plain(config, vec![endpoint.clone()])).await?, None),
+            Some(_) => linked(config).await.map(|(session, link)| (session, Some(link)))?,
+        };
         let keys = Keys::new(&config.fleet);
-        let outbox = Outbox::start(session.clone(), keys.clone(), to.vitals.panics().clone())?;
+        let outbox = Outbox::start(session.clone(), keys.clone(), &to)?;
         let changes = tokio::spawn(forward_map_changes(
             to.clone(),
             outbox.clone(),
@@ -105,9 +133,28 @@ impl Bus {
         let queryables = [
             gaze::answer_gaze(&session, &keys, &to).await?,
             versions::answer_versions(&session, &keys, &to).await?,
+            hello::answer_hellos(&session, &keys, &to).await?,
         ];
+        let gate = match encrypted.zip(link) {
+            None => None,
+            Some((certificates, (link_endpoint, link))) => {
+                let settings = GateSettings {
+                    endpoint: endpoint.clone(),
+                    link_endpoint,
+                    link,
+                    keys,
+                    certificates,
+                    registry: to.certificates.clone().unwrap_or_default(),
+                    snapshots: to.intake.snapshots.clone(),
+                    ros2: config.ros2.clone(),
+                    robots: config.limits.robots,
+                    frame_bytes: config.limits.frame_bytes,
+                };
+                Some(Gate::open(settings, to.vitals.begin("the task that admits robots")).await?)
+            }
+        };
         tracing::info!(endpoint, fleet = %config.fleet, "robots may connect");
-        Ok(Self { endpoint, session, outbox, changes, subscribers, queryables })
+        Ok(Self { endpoint, session, outbox, changes, subscribers, queryables, gate })
     }
 
     /// Where robots connect, with the real port.
@@ -128,6 +175,7 @@ impl Bus {
     /// Stops receiving, sends what is queued, closes the router.
     pub async fn close(self) {
         self.changes.abort();
+        let gate = self.gate;
         for subscriber in self.subscribers {
             if let Err(error) = subscriber.undeclare().await {
                 tracing::warn!(%error, "zenoh_undeclare_failed");
@@ -139,10 +187,34 @@ impl Bus {
             }
         }
         self.outbox.drain().await;
+        if let Some(gate) = gate {
+            gate.close().await;
+        }
         if let Err(error) = self.session.close().await {
             tracing::warn!(%error, "zenoh_close_failed");
         }
     }
+}
+
+fn plain(config: &Config, listen: Vec<String>) -> RouterSettings<'_> {
+    let (robots, frame_bytes) = (config.limits.robots, config.limits.frame_bytes);
+    RouterSettings { listen, connect: None, tls: None, access: None, robots, frame_bytes }
+}
+
+/// The server's own router behind a gate: it listens for the gate, and on the plain endpoint of the settings.
+async fn linked(config: &Config) -> Result<(zenoh::Session, (String, LinkCertificates)), BusError> {
+    let endpoint = router::endpoint("tls/127.0.0.1:0")?;
+    let made = LinkCertificates::new(now_ms());
+    let link = made.map_err(|e| BusError::Listen { endpoint: endpoint.clone(), detail: e.to_string() })?;
+    let mut listen = vec![endpoint.clone()];
+    listen.extend(config.tls.as_ref().and_then(|tls| tls.local_zenoh.clone()));
+    let tls = RouterTls {
+        authorities: link.authority_pem.clone(),
+        listener: (&link.listener.0, &link.listener.1),
+        client: None,
+    };
+    let session = router::open(&RouterSettings { tls: Some(tls), ..plain(config, listen) }).await?;
+    Ok((session, (endpoint, link)))
 }
 
 /// A zenoh callback that catches panics: a panic would end the task that receives from a robot. `kind` names the message.

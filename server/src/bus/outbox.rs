@@ -4,7 +4,7 @@
 //! other. No message must arrive: the next answer or pose replaces the last, and `map/{map}/version` answers queries for the
 //! version of a map.
 
-use super::BusError;
+use super::{BusError, Receivers};
 use engine::{
     panics::{Edge, Panics},
     slots::SlotKey,
@@ -37,6 +37,8 @@ struct OutgoingMessage {
 #[derive(Clone)]
 pub struct Outbox {
     keys: Keys,
+    /// Who may get messages.
+    to: Receivers,
     queue: Arc<Mutex<Option<SyncSender<OutgoingMessage>>>>,
     thread: Arc<Mutex<Option<JoinHandle<()>>>>,
     dropped: Arc<AtomicU64>,
@@ -49,7 +51,8 @@ impl std::fmt::Debug for Outbox {
 }
 
 impl Outbox {
-    pub(super) fn start(session: zenoh::Session, keys: Keys, panics: Arc<Panics>) -> Result<Self, BusError> {
+    pub(super) fn start(session: zenoh::Session, keys: Keys, to: &Receivers) -> Result<Self, BusError> {
+        let panics = to.vitals.panics().clone();
         let (queue, messages) = sync_channel(QUEUE);
         let thread = std::thread::Builder::new()
             .name("outbox".into())
@@ -57,6 +60,7 @@ impl Outbox {
             .map_err(|source| BusError::Thread { name: "outbox", source })?;
         Ok(Self {
             keys,
+            to: to.clone(),
             queue: Arc::new(Mutex::new(Some(queue))),
             thread: Arc::new(Mutex::new(Some(thread))),
             dropped: Arc::default(),
@@ -98,10 +102,16 @@ impl Outbox {
 
 impl Publish for Outbox {
     fn answer(&self, key: &SlotKey, answer: &v1::Answer) {
+        if !self.to.admits(&key.robot) {
+            return;
+        }
         self.send(&Key::Answer(key.robot.clone(), key.camera.clone()), answer);
     }
 
     fn pose(&self, robot: &Name, pose: &v1::RobotPose) {
+        if !self.to.admits(robot) {
+            return;
+        }
         self.send(&Key::Pose(robot.clone()), pose);
     }
 }

@@ -1,6 +1,9 @@
-//! The embedded zenoh router: settings and opening.
+//! The embedded zenoh routers: settings and opening.
 
 use super::BusError;
+use crate::identity::certificates::PemKey;
+use base64::{Engine as _, prelude::BASE64_STANDARD};
+use serde_json::{Value, json};
 use std::{net::TcpListener, time::Duration};
 
 /// Sessions beyond the robots: tools and a second connection while the first times out.
@@ -16,85 +19,141 @@ const WAIT_BEFORE_DROP_US: u64 = 1000;
 /// of ROS gives up to four at once (pose, detections, initial pose, transform), and zenoh's two lose the third of them
 /// while the sending task waits for a core. At most 64 KiB each, allocated when they are needed.
 const ANSWER_BATCHES: usize = 8;
+/// The same for a message of several parts. Through the gate only frames are, on their way to the server.
+const FRAGMENTS_WAIT_US: u64 = 50_000;
 /// A robot that does not take a reply to its own query for this long is disconnected.
 const WAIT_BEFORE_CLOSE_US: u64 = 1_000_000;
 /// Longest wait for the router to open.
 const OPEN_TIMEOUT: Duration = Duration::from_secs(10);
 
+/// Certificates of a router, PEM.
+pub(super) struct RouterTls<'a> {
+    /// Who signs the certificates of the other ends.
+    pub(super) authorities: String,
+    /// What it shows as a listener.
+    pub(super) listener: (&'a str, &'a PemKey),
+    /// What it shows where it connects.
+    pub(super) client: Option<(&'a str, &'a PemKey)>,
+}
+
+/// What a router is opened with.
+pub(super) struct RouterSettings<'a> {
+    pub(super) listen: Vec<String>,
+    /// Another router.
+    pub(super) connect: Option<&'a str>,
+    pub(super) tls: Option<RouterTls<'a>>,
+    /// `access_control`; everything is allowed without.
+    pub(super) access: Option<Value>,
+    pub(super) robots: usize,
+    pub(super) frame_bytes: usize,
+}
+
 /// The endpoint with a real port: port 0 is replaced by a free one, because zenoh does not say which it took.
 pub(super) fn endpoint(asked: &str) -> Result<String, BusError> {
-    let Some(address) = asked.strip_prefix("tcp/").and_then(|a| a.strip_suffix(":0")) else {
+    let parts = asked.split_once('/').and_then(|(protocol, a)| Some((protocol, a.strip_suffix(":0")?)));
+    let Some((protocol, address)) = parts else {
         return Ok(asked.to_owned());
     };
     let fault = |e: std::io::Error| BusError::Listen { endpoint: asked.to_owned(), detail: e.to_string() };
     let free = TcpListener::bind(format!("{address}:0")).map_err(fault)?;
-    Ok(format!("tcp/{address}:{}", free.local_addr().map_err(fault)?.port()))
+    Ok(format!("{protocol}/{address}:{}", free.local_addr().map_err(fault)?.port()))
 }
 
-/// Opens the router on `endpoint`.
-pub(super) async fn open(
-    endpoint: &str,
-    robots: usize,
-    frame_bytes: usize,
-) -> Result<zenoh::Session, BusError> {
-    let fault = |detail: String| BusError::Listen { endpoint: endpoint.to_owned(), detail };
-    let config = config(endpoint, robots, frame_bytes).map_err(|e| fault(e.to_string()))?;
+/// Opens a router.
+pub(super) async fn open(settings: &RouterSettings<'_>) -> Result<zenoh::Session, BusError> {
+    let endpoint = settings.listen.first().cloned().unwrap_or_default();
+    let fault = |detail: String| BusError::Listen { endpoint: endpoint.clone(), detail };
+    let config = config(settings).map_err(|e| fault(e.to_string()))?;
     match tokio::time::timeout(OPEN_TIMEOUT, zenoh::open(config)).await {
         Ok(opened) => opened.map_err(|e| fault(e.to_string())),
         Err(_) => Err(fault(format!("not open after {OPEN_TIMEOUT:?}"))),
     }
 }
 
-fn config(endpoint: &str, robots: usize, frame_bytes: usize) -> zenoh::Result<zenoh::Config> {
-    let endpoint = serde_json::to_string(endpoint)?;
-    let sessions = robots + SPARE_SESSIONS;
-    let message_bytes = frame_bytes + MESSAGE_SPARE_BYTES;
+fn config(settings: &RouterSettings<'_>) -> zenoh::Result<zenoh::Config> {
+    let RouterSettings { listen, connect, tls, access, robots, frame_bytes } = settings;
+    let fragments_us = if connect.is_some() { FRAGMENTS_WAIT_US } else { WAIT_BEFORE_DROP_US };
     // No time stamps: clocks of robots decide nothing here, and a clock far ahead would have its samples refused.
-    zenoh::Config::from_json5(&format!(
-        r#"{{
-            mode: "router",
-            listen: {{ endpoints: [{endpoint}], timeout_ms: 0, exit_on_failure: true }},
-            connect: {{ endpoints: [] }},
-            scouting: {{ delay: 0, multicast: {{ enabled: false }}, gossip: {{ enabled: false }} }},
-            timestamping: {{ enabled: {{ router: false, peer: false, client: false }} }},
-            adminspace: {{ enabled: false }},
-            transport: {{
-                unicast: {{ max_sessions: {sessions}, max_links: 1 }},
-                link: {{
-                    tx: {{ lease: {LEASE_MS}, queue: {{
-                        size: {{ interactive_high: {ANSWER_BATCHES} }},
-                        congestion_control: {{
-                            drop: {{
-                                wait_before_drop: {WAIT_BEFORE_DROP_US},
-                                max_wait_before_drop_fragments: {WAIT_BEFORE_DROP_US},
-                            }},
-                            block: {{ wait_before_close: {WAIT_BEFORE_CLOSE_US} }},
-                        }},
-                    }} }},
-                    rx: {{ max_message_size: {message_bytes} }},
-                }},
-                shared_memory: {{ enabled: false }},
-            }},
-        }}"#
-    ))
+    let mut config = json!({
+        "mode": "router",
+        "listen": { "endpoints": listen, "timeout_ms": 0, "exit_on_failure": true },
+        "connect": {
+            "endpoints": connect.as_slice(),
+            "timeout_ms": OPEN_TIMEOUT.as_millis() as u64,
+            "exit_on_failure": true,
+            "retry": { "period_init_ms": 20, "period_max_ms": 200 },
+        },
+        "scouting": { "delay": 0, "multicast": { "enabled": false }, "gossip": { "enabled": false } },
+        "timestamping": { "enabled": { "router": false, "peer": false, "client": false } },
+        "adminspace": { "enabled": false },
+        "transport": {
+            "unicast": { "max_sessions": robots + SPARE_SESSIONS, "max_links": 1 },
+            "link": {
+                "tx": { "lease": LEASE_MS, "queue": {
+                    "size": { "interactive_high": ANSWER_BATCHES },
+                    "congestion_control": {
+                        "drop": {
+                            "wait_before_drop": WAIT_BEFORE_DROP_US,
+                            "max_wait_before_drop_fragments": fragments_us,
+                        },
+                        "block": { "wait_before_close": WAIT_BEFORE_CLOSE_US },
+                    },
+                } },
+                "rx": { "max_message_size": frame_bytes + MESSAGE_SPARE_BYTES },
+            },
+            "shared_memory": { "enabled": false },
+        },
+    });
+    if let Some(tls) = tls {
+        config["transport"]["link"]["tls"] = tls_config(tls);
+    }
+    if let Some(access) = access {
+        config["access_control"] = access.clone();
+    }
+    zenoh::Config::from_json5(&config.to_string())
+}
+
+fn tls_config(RouterTls { authorities, listener, client }: &RouterTls<'_>) -> Value {
+    let encoded = |pem: &str| BASE64_STANDARD.encode(pem);
+    let mut tls = json!({
+        "root_ca_certificate_base64": encoded(authorities),
+        "listen_certificate_base64": encoded(listener.0),
+        "listen_private_key_base64": encoded(&listener.1.0),
+        "enable_mtls": true,
+        "verify_name_on_connect": true,
+        "close_link_on_expiration": true,
+    });
+    if let Some((certificate, key)) = client {
+        tls["connect_certificate_base64"] = encoded(certificate).into();
+        tls["connect_private_key_base64"] = encoded(&key.0).into();
+    }
+    tls
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn plain(endpoint: &str) -> RouterSettings<'_> {
+        let listen = vec![endpoint.to_owned()];
+        RouterSettings { listen, connect: None, tls: None, access: None, robots: 10, frame_bytes: 1000 }
+    }
+
     #[test]
     fn port_0_becomes_a_real_one() {
-        let endpoint = endpoint("tcp/127.0.0.1:0").unwrap();
-        let port: u16 = endpoint.strip_prefix("tcp/127.0.0.1:").unwrap().parse().unwrap();
-        assert_ne!(port, 0);
+        for protocol in ["tcp", "tls"] {
+            let endpoint = endpoint(&format!("{protocol}/127.0.0.1:0")).unwrap();
+            let port: u16 =
+                endpoint.strip_prefix(&format!("{protocol}/127.0.0.1:")).unwrap().parse().unwrap();
+            assert_ne!(port, 0);
+        }
         assert_eq!(super::endpoint("tcp/[::1]:7447").unwrap(), "tcp/[::1]:7447");
         assert_eq!(super::endpoint("tcp/127.0.0.1:70").unwrap(), "tcp/127.0.0.1:70");
     }
 
     #[test]
     fn the_settings_are_understood() {
-        let config = config("tcp/127.0.0.1:7447", 10, 1000).unwrap();
+        let config = config(&plain("tcp/127.0.0.1:7447")).unwrap();
         assert_eq!(config.get_json("transport/unicast/max_sessions").unwrap(), "18");
         assert_eq!(config.get_json("transport/link/rx/max_message_size").unwrap(), "66536");
         let of_queue =
@@ -109,7 +168,7 @@ mod tests {
     async fn a_taken_port_is_an_error_that_names_it() {
         let taken = TcpListener::bind("127.0.0.1:0").unwrap();
         let endpoint = format!("tcp/{}", taken.local_addr().unwrap());
-        let error = open(&endpoint, 1, 1000).await.unwrap_err().to_string();
+        let error = open(&plain(&endpoint)).await.unwrap_err().to_string();
         assert!(error.contains(&endpoint), "{error}");
     }
 }

@@ -37,8 +37,9 @@ async fn running(engine: Engine, workers: usize) -> Running {
         live: engine.live.clone(),
         gazes: Arc::default(),
         vitals: engine.vitals.clone(),
+        certificates: None,
     };
-    let bus = Bus::open(&config, to).await.unwrap();
+    let bus = Bus::open(&config, to, None).await.unwrap();
     let workers = Workers::start(&engine, workers, &Arc::new(bus.outbox().clone())).unwrap();
     Running { bus, engine, workers }
 }

@@ -170,6 +170,14 @@ pub struct Ros2Robot {
     pub outputs: Ros2Outputs,
 }
 
+impl Ros2Robot {
+    /// The prefix, if keys behind it are those of this robot alone: not where it is empty, or that of Waymark's own keys.
+    pub(crate) fn own_prefix(&self) -> Option<&str> {
+        let first = self.key_prefix.split('/').next().unwrap_or_default();
+        (!first.is_empty() && first != protos::keys::ROOT).then_some(self.key_prefix.as_str())
+    }
+}
+
 /// What a robot of ROS 2 gets, by absolute topics.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ros2Outputs {

@@ -139,6 +139,20 @@ fn plain_text_beyond_loopback_is_refused() {
 }
 
 #[test]
+fn an_encrypted_endpoint_may_be_reached_from_everywhere() {
+    let with = |enabled, zenoh: &str| {
+        let tls = RawTls { enabled, ..RawTls::default() };
+        let raw = RawConfig { zenoh: zenoh.into(), tls, ..RawConfig::default() };
+        Config::try_from(raw).map(|config| config.zenoh_endpoint)
+    };
+    assert_eq!(with(false, "").unwrap(), "tcp/127.0.0.1:7447");
+    assert_eq!(with(true, "").unwrap(), "tls/127.0.0.1:7447");
+    assert_eq!(with(true, "tls/0.0.0.0:7447").unwrap(), "tls/0.0.0.0:7447");
+    assert!(matches!(with(true, "tcp/0.0.0.0:7447"), Err(ConfigError::NotLoopback { .. })));
+    assert!(matches!(with(false, "tls/127.0.0.1:7447"), Err(ConfigError::Invalid { .. })));
+}
+
+#[test]
 #[expect(clippy::large_stack_arrays, reason = "cases of a test")]
 fn bad_settings_are_named() {
     let limits = |f: fn(&mut Limits)| {

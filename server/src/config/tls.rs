@@ -1,6 +1,6 @@
 //! Settings of encryption. In: names and paths of files. Out: checked names, and which files are the operator's own.
 
-use super::{ConfigError, invalid};
+use super::{ConfigError, invalid, is_loopback, zenoh_address};
 use serde::{Deserialize, Serialize};
 use std::{net::IpAddr, path::PathBuf};
 
@@ -25,6 +25,9 @@ pub struct RawTls {
     pub key: PathBuf,
     /// PEM file of the authorities whose certificates robots show. Empty: the built-in authority signs them.
     pub client_authority: PathBuf,
+    /// A plain endpoint on loopback beside the encrypted one, `tcp/127.0.0.1:7446`: whoever reaches it may speak for any
+    /// robot. Empty: none.
+    pub local_zenoh: String,
 }
 
 /// How connections are encrypted.
@@ -36,6 +39,8 @@ pub struct Tls {
     pub own: Option<OwnCertificate>,
     /// The operator's own authority for robots; `None`: the built-in one.
     pub client_authority: Option<PathBuf>,
+    /// The plain endpoint on loopback.
+    pub local_zenoh: Option<String>,
 }
 
 /// Files of the operator's own.
@@ -68,7 +73,15 @@ pub(super) fn checked(raw: RawTls) -> Result<Option<Tls>, ConfigError> {
         (Some(_), None) => return Err(invalid("tls.key", "the certificate's private key is missing".into())),
         (None, Some(_)) => return Err(invalid("tls.certificate", "the key's certificate is missing".into())),
     };
-    Ok(Some(Tls { names: raw.names, own, client_authority: file(raw.client_authority) }))
+    let local_zenoh = Some(raw.local_zenoh).filter(|endpoint| !endpoint.is_empty());
+    if let Some(endpoint) = &local_zenoh {
+        let (is_tls, address) = zenoh_address("tls.local_zenoh", endpoint)?;
+        if is_tls || !is_loopback(address.ip()) {
+            let reason = format!("`{endpoint}` is not tcp/ with a loopback address");
+            return Err(invalid("tls.local_zenoh", reason));
+        }
+    }
+    Ok(Some(Tls { names: raw.names, own, client_authority: file(raw.client_authority), local_zenoh }))
 }
 
 /// Letters, digits and `-` between dots; no wildcard.
@@ -117,6 +130,10 @@ mod tests {
         assert_eq!(refused(on(&["a"; MAX_TLS_NAMES + 1], "", "")), Some("tls.names".into()));
         assert_eq!(refused(on(&[], "c.pem", "")), Some("tls.key".into()));
         assert_eq!(refused(on(&[], "", "k.pem")), Some("tls.certificate".into()));
+        for bad in ["tcp/192.168.1.4:1", "tls/127.0.0.1:1", "127.0.0.1:1"] {
+            let raw = RawTls { local_zenoh: bad.into(), ..on(&[], "", "") };
+            assert_eq!(refused(raw), Some("tls.local_zenoh".into()), "{bad}");
+        }
         assert!(checked(on(&[], "c.pem", "k.pem")).unwrap().unwrap().own.is_some());
     }
 }

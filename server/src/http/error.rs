@@ -105,6 +105,7 @@ fn unknown(what: Kind) -> (&'static str, &'static str) {
         Kind::ReferenceRun => ("unknown_reference_run", "run"),
         Kind::Underlay => ("unknown_underlay", "underlay"),
         Kind::Token => ("unknown_token", "token"),
+        Kind::Certificate => ("unknown_certificate", "serial"),
         Kind::Backup => ("unknown_backup", "backup"),
         Kind::Commit => ("unknown_commit", "commit"),
         Kind::Answer => ("unknown_answer", "answer"),
@@ -113,6 +114,7 @@ fn unknown(what: Kind) -> (&'static str, &'static str) {
 }
 
 impl From<StoreError> for ApiError {
+    #[expect(clippy::too_many_lines, reason = "a line for each kind and error")]
     fn from(error: StoreError) -> Self {
         let detail = error.to_string();
         match error {

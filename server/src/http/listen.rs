@@ -233,7 +233,8 @@ mod tests {
     #[tokio::test]
     async fn plain_text_from_another_machine_gets_the_refusal_alone() {
         let folder = tempfile::tempdir().unwrap();
-        let settings = crate::config::Tls { names: Vec::new(), own: None, client_authority: None };
+        let settings =
+            crate::config::Tls { names: Vec::new(), own: None, client_authority: None, local_zenoh: None };
         let certificates = Certificates::open(&settings, folder.path(), 1_800_000_000_000).unwrap();
         let mut http = http1::Builder::new();
         http.timer(TokioTimer::new());

@@ -37,6 +37,7 @@ mod recognise;
 mod reference_runs;
 mod relocalisation;
 mod revision;
+mod robot_certificates;
 mod robots;
 mod ros2;
 mod router;
@@ -63,6 +64,7 @@ use authorise::Asker;
 use axum::http::StatusCode;
 use engine::{live::LiveHub, motion::MotionTracker, panics::Edge, relocalise::Relocalisers, workers::Engine};
 use error::ApiError;
+pub(crate) use robot_certificates::Enrolment;
 use std::{
     path::PathBuf,
     sync::Arc,
@@ -97,6 +99,8 @@ pub(crate) struct App {
     pub(crate) local_token_file: Option<PathBuf>,
     /// Backups.
     pub(crate) backups: Arc<Backups>,
+    /// What robots are enrolled with, where their connections are encrypted.
+    pub(crate) enrolment: Option<Enrolment>,
     /// Becomes true when the server stops; ends event streams.
     pub(crate) stopping: watch::Receiver<bool>,
     /// Places for vision work asked for over HTTP: as many as there are vision threads.
@@ -116,6 +120,7 @@ pub(crate) struct Services {
     pub(crate) sessions: Arc<Sessions>,
     pub(crate) local_token_file: Option<PathBuf>,
     pub(crate) backups: Arc<Backups>,
+    pub(crate) enrolment: Option<Enrolment>,
 }
 
 /// The state of the router.
@@ -125,7 +130,7 @@ impl App {
     pub(crate) fn new(
         config: Arc<Config>,
         store: Catalogue,
-        Services { jobs, gatherer, ros2, sessions, local_token_file, backups }: Services,
+        Services { jobs, gatherer, ros2, sessions, local_token_file, backups, enrolment }: Services,
         engine: &Engine,
         stopping: watch::Receiver<bool>,
     ) -> Self {
@@ -146,6 +151,7 @@ impl App {
             sessions,
             local_token_file,
             backups,
+            enrolment,
             stopping,
             vision,
             streams,

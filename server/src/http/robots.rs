@@ -9,7 +9,10 @@ use super::{
 };
 use crate::{
     identity::Principal,
-    store::robots::{self, RobotRow},
+    store::{
+        robot_certificates,
+        robots::{self, RobotRow},
+    },
 };
 use axum::{Extension, Json, extract::State, http::StatusCode};
 use engine::{
@@ -137,6 +140,7 @@ async fn delete(
     let write = app.store.write(move |tx| {
         Box::pin(async move {
             robots::delete(tx, gone.as_str()).await?;
+            robot_certificates::revoke_all(tx, gone.as_str()).await?;
             // A run of it that is being recorded would keep its place for ever.
             tx.after(move || drop(motion.take_recording(&gone)));
             Ok(())

@@ -6,7 +6,8 @@ use super::{
     events,
     examples::with_examples,
     gathering, guard, health, history, landmark_models, landmarks, learning, live, localise, mapping, maps,
-    modalities, page_session, pages, recognise, reference_runs, relocalisation, revision, robots, ros2,
+    modalities, page_session, pages, recognise, reference_runs, relocalisation, revision, robot_certificates,
+    robots, ros2,
     security::with_security,
     stored_answers, tokens, underlay, views, visibility, visibility_settings, walls,
 };
@@ -57,6 +58,7 @@ fn api(limits: &Limits) -> OpenApiRouter<AppState> {
         .merge(localise::router(limits.upload_bytes))
         .merge(stored_answers::router())
         .merge(robots::router())
+        .merge(robot_certificates::router())
         .merge(relocalisation::router())
         .merge(ros2::router())
         .merge(cameras::router())

@@ -14,8 +14,8 @@ mod teaching;
 
 use super::*;
 use crate::{
-    config::{Limits, RawConfig},
-    identity::{Secret, TokenText},
+    config::{Limits, RawConfig, RawTls},
+    identity::{Secret, TokenText, certificates::Certificates},
     publication::CatalogueTasks,
     store::{StoreError, maps},
 };
@@ -65,6 +65,21 @@ impl Service {
         let hall = Arc::new(MapSnapshot::empty("hall", 1));
         let engine =
             Engine { vitals: store.vitals().clone(), frame_tap: Arc::new(tap), ..scene::engine(&[hall]) };
+        let enrolment = {
+            let tls = RawTls { enabled: true, ..RawTls::default() };
+            let settings = Config::try_from(RawConfig { tls, ..RawConfig::default() }).unwrap();
+            let certificates = Certificates::open(settings.tls.as_ref().unwrap(), data.path(), 0).unwrap();
+            Enrolment { certificates: Arc::new(certificates), zenoh: settings.zenoh_endpoint }
+        };
+        // As a gate does that has nothing to close.
+        let follower = store.certificates().clone();
+        tokio::spawn(async move {
+            let mut changes = follower.changes();
+            while changes.changed().await.is_ok() {
+                let change = *changes.borrow_and_update();
+                follower.set_applied(change);
+            }
+        });
         let app = App::new(
             config,
             store.clone(),
@@ -75,6 +90,7 @@ impl Service {
                 sessions: Arc::default(),
                 local_token_file: Some("/data/local-token".into()),
                 backups,
+                enrolment: Some(enrolment),
             },
             &engine,
             stopping,

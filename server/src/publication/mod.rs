@@ -13,7 +13,7 @@ mod visibility_areas;
 use crate::{
     config::Config,
     events::EventLog,
-    identity::TokenRegistry,
+    identity::{TokenRegistry, certificates::CertificateRegistry},
     store::{OpenError, Store, WriterTask},
 };
 use engine::{snapshot::Snapshots, vitals::Vitals};
@@ -28,6 +28,7 @@ pub(crate) struct Catalogue {
     snapshots: Arc<Snapshots>,
     tokens: Arc<TokenRegistry>,
     events: Arc<EventLog>,
+    certificates: Arc<CertificateRegistry>,
 }
 
 impl Deref for Catalogue {
@@ -68,14 +69,15 @@ impl Catalogue {
     pub(crate) async fn open(config: &Config) -> Result<(Self, CatalogueTasks), OpenError> {
         let (snapshots, vitals) = (Arc::new(Snapshots::default()), Arc::new(Vitals::default()));
         let tokens = Arc::<TokenRegistry>::default();
-        let publisher =
-            Publisher::new(snapshots.clone(), tokens.clone(), config.params.clone(), vitals.clone());
+        let certificates = Arc::<CertificateRegistry>::default();
+        let identities = (tokens.clone(), certificates.clone());
+        let publisher = Publisher::new(snapshots.clone(), identities, config.params.clone(), vitals.clone());
         let wake = publisher.derive.clone();
         let (store, writer) = Store::open(config, Arc::new(publisher), vitals.clone()).await?;
         let (stop, stopping) = watch::channel(false);
         let deriver = tokio::spawn(derive::run(snapshots.clone(), vitals, wake, stopping));
         Ok((
-            Self { store, snapshots, tokens, events: Arc::default() },
+            Self { store, snapshots, tokens, certificates, events: Arc::default() },
             CatalogueTasks { writer, deriver, stop },
         ))
     }
@@ -83,6 +85,11 @@ impl Catalogue {
     /// What the workers read.
     pub(crate) fn snapshots(&self) -> &Arc<Snapshots> {
         &self.snapshots
+    }
+
+    /// The certificates that robots show.
+    pub(crate) fn certificates(&self) -> &Arc<CertificateRegistry> {
+        &self.certificates
     }
 
     /// The tokens that requests are checked with.

@@ -5,8 +5,10 @@
 
 use super::build;
 use crate::{
-    identity::{PublishedToken, TokenRegistry},
-    store::{CommittedChange, OnCommit, StoreError, map_locations, map_rows, robots, tokens},
+    identity::{PublishedToken, TokenRegistry, certificates::CertificateRegistry},
+    store::{
+        CommittedChange, OnCommit, StoreError, map_locations, map_rows, robot_certificates, robots, tokens,
+    },
 };
 use engine::{panics::Edge, snapshot::Snapshots, vitals::Vitals};
 use futures::{FutureExt, future::BoxFuture};
@@ -23,6 +25,7 @@ const PAGE: usize = 500;
 pub(super) struct Publisher {
     snapshots: Arc<Snapshots>,
     tokens: Arc<TokenRegistry>,
+    certificates: Arc<CertificateRegistry>,
     params: Arc<Params>,
     vitals: Arc<Vitals>,
     /// Notified when a version has data to derive.
@@ -32,11 +35,11 @@ pub(super) struct Publisher {
 impl Publisher {
     pub(super) fn new(
         snapshots: Arc<Snapshots>,
-        tokens: Arc<TokenRegistry>,
+        (tokens, certificates): (Arc<TokenRegistry>, Arc<CertificateRegistry>),
         params: Arc<Params>,
         vitals: Arc<Vitals>,
     ) -> Self {
-        Self { snapshots, tokens, params, vitals, derive: Arc::default() }
+        Self { snapshots, tokens, certificates, params, vitals, derive: Arc::default() }
     }
 
     async fn all(&self, conn: &mut SqliteConnection) -> Result<(), StoreError> {
@@ -48,6 +51,7 @@ impl Publisher {
         }
         self.links(conn).await?;
         self.tokens(conn).await?;
+        self.certificates(conn).await?;
         let mut after = String::new();
         loop {
             let page = robots::page(&mut *conn, &after, PAGE).await?;
@@ -68,6 +72,11 @@ impl Publisher {
         let all = tokens::page(conn, 0, tokens::MAX_TOKENS).await?;
         let published = |row: tokens::TokenRow| PublishedToken { token: row.token, sha256: row.sha256 };
         self.tokens.publish(all.into_iter().map(published));
+        Ok(())
+    }
+
+    async fn certificates(&self, conn: &mut SqliteConnection) -> Result<(), StoreError> {
+        self.certificates.publish(robot_certificates::all(conn).await?);
         Ok(())
     }
 
@@ -127,9 +136,16 @@ impl OnCommit for Publisher {
                     self.snapshots.remove_map(&name);
                     self.vitals.published(&name);
                 }
-                CommittedChange::Links => self.links(conn).await?,
+                CommittedChange::Links => {
+                    self.links(conn).await?;
+                    self.certificates.touch();
+                }
+                CommittedChange::Certificates => self.certificates(conn).await?,
                 CommittedChange::Tokens => self.tokens(conn).await?,
-                CommittedChange::Robot { name, map } => self.snapshots.set_robot(&name, map.as_deref()),
+                CommittedChange::Robot { name, map } => {
+                    self.snapshots.set_robot(&name, map.as_deref());
+                    self.certificates.touch();
+                }
                 // The writer tells the jobs itself.
                 CommittedChange::Jobs => {}
             }

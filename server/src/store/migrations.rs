@@ -36,6 +36,7 @@ const FILES: &[(&str, &str)] = files![
     "0023_commits",
     "0030_audit",
     "0025_stored_answers",
+    "0020_robot_certificates",
 ];
 
 /// The steps in order.

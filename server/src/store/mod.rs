@@ -28,6 +28,7 @@ pub(crate) mod gatherings;
 pub(crate) mod track_acceptance;
 pub(crate) mod modality_stats;
 pub(crate) mod visibility_settings;
+pub(crate) mod robot_certificates;
 pub(crate) mod robots;
 pub(crate) mod stored_answers;
 pub(crate) mod tokens;

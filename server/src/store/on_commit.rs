@@ -15,6 +15,8 @@ pub(crate) enum CommittedChange {
     Links,
     /// Tokens, or the maps that they are for.
     Tokens,
+    /// Certificates of robots.
+    Certificates,
     /// A job is queued.
     Jobs,
     /// The robot is on this map, or is gone.

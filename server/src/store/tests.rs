@@ -9,6 +9,7 @@ async fn every_statement_prepares_on_the_migrated_schema() {
     let mut opened = open::open(dir.path()).await.unwrap();
     let all = [
         maps::ALL,
+        robot_certificates::ALL,
         map_locations::ALL,
         visibility_settings::ALL,
         landmarks::ALL,

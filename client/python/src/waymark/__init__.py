@@ -18,12 +18,15 @@ from waymark._values import UNSET
 from waymark.api import CaptureMetadata, Job, Landmark, Map, Place, Size, WallBody
 from waymark.async_robot import AsyncInbox, AsyncRobot
 from waymark.errors import (
+    CertificateExpired,
     InvalidInput,
     JobFailed,
     JobTimeout,
     NoAnswer,
+    NotAdmitted,
     Refused,
     Superseded,
+    TlsRefused,
     Unexpected,
     Unreachable,
     Untrusted,
@@ -32,6 +35,7 @@ from waymark.errors import (
 from waymark.image import Capture, Image
 from waymark.named import NamedLandmark, named, named_landmarks, quad_corners
 from waymark.robot import Inbox, Robot
+from waymark.robot_file import RobotFile
 from waymark.wire import (
     Answer,
     CameraAnswer,
@@ -57,6 +61,7 @@ __all__ = [
     "CameraAnswer",
     "Capture",
     "CaptureMetadata",
+    "CertificateExpired",
     "Delivery",
     "Image",
     "Inbox",
@@ -72,6 +77,7 @@ __all__ = [
     "MapClient",
     "NamedLandmark",
     "NoAnswer",
+    "NotAdmitted",
     "Place",
     "Pose2",
     "Pose2Covariance",
@@ -81,11 +87,13 @@ __all__ = [
     "Region",
     "Revised",
     "Robot",
+    "RobotFile",
     "RobotPose",
     "Scan",
     "Size",
     "Subscription",
     "Superseded",
+    "TlsRefused",
     "Unexpected",
     "Unreachable",
     "Untrusted",

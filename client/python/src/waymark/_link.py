@@ -11,6 +11,7 @@ import json
 import logging
 import re
 import secrets
+import socket
 import threading
 import time
 import weakref
@@ -21,8 +22,9 @@ import zenoh
 from google.protobuf.message import DecodeError, Message
 
 from waymark._values import fill, from_message
-from waymark.errors import InvalidInput, NoAnswer, Unexpected, Unreachable
+from waymark.errors import InvalidInput, NoAnswer, NotAdmitted, TlsRefused, Unexpected, Unreachable
 from waymark.image import Capture, Encoding, Image, Picture, as_image
+from waymark.robot_file import RobotFile
 from waymark.v1 import waymark_pb2 as pb
 from waymark.wire import Answer, CameraAnswer, GazeAdvice, GazeRequest, MapChanged, Pose2, RobotPose, Scan
 
@@ -37,6 +39,11 @@ INBOX = 64
 _MAX_MESSAGE_BYTES = 4 << 20
 # What a droppable message waits for room on the link, in microseconds.
 _DROP_US = 50_000
+# Longest wait for one hello of the server, and time between two questions for it, in seconds.
+_HELLO_WAIT_S = 0.5
+_HELLO_EVERY_S = 0.05
+# Longest wait for a connection that only shows whether something listens, in seconds.
+_PROBE_S = 0.5
 _NAME = re.compile(r"[a-z0-9_-]{1,64}")
 _ENCODINGS: dict[Encoding, pb.ImageEncoding] = {
     "jpeg": pb.IMAGE_ENCODING_JPEG,
@@ -108,7 +115,14 @@ class Link:
     """An open session under a robot's name."""
 
     def __init__(
-        self, robot: str, endpoint: str, fleet: str, delivery: Delivery, timeout_s: float, epoch: int | None
+        self,
+        robot: str,
+        endpoint: str,
+        fleet: str,
+        delivery: Delivery,
+        timeout_s: float,
+        epoch: int | None,
+        file: RobotFile | None = None,
     ) -> None:
         self.robot = name("robot", robot)
         self.endpoint = endpoint
@@ -121,7 +135,9 @@ class Link:
         self._congestion = zenoh.CongestionControl.BLOCK if delivery == "every" else zenoh.CongestionControl.DROP
         self.answers: Listeners[CameraAnswer] = Listeners()
         self.poses: Listeners[RobotPose] = Listeners()
-        self._session = _open(endpoint, delivery, timeout_s)
+        self._session = _open(endpoint, delivery, timeout_s, file)
+        if file is not None:
+            self._greet(timeout_s)
         try:
             # Held: dropping them ends subscriptions and token.
             self._held: list[Any] = [
@@ -141,6 +157,25 @@ class Link:
             for each in self._held:
                 each.undeclare()
             self._session.close()
+
+    @classmethod
+    def of_file(cls, file: RobotFile, delivery: Delivery, timeout_s: float, epoch: int | None) -> Link:
+        """A session of an enrolled robot."""
+        file.check()
+        return cls(file.robot, file.endpoint, file.fleet, delivery, timeout_s, epoch, file)
+
+    def _greet(self, timeout_s: float) -> None:
+        """Waits for the server's answer: with a certificate that gives no access, everything is dropped silently."""
+        until = time.monotonic() + timeout_s
+        while time.monotonic() < until:
+            for answer in self._session.get(f"{self._own}/rpc/hello", timeout=_HELLO_WAIT_S):
+                if answer.ok is not None:
+                    return
+            time.sleep(_HELLO_EVERY_S)
+        self._session.close()
+        raise NotAdmitted(
+            f"the server at {self.endpoint} takes no messages of robot {self.robot} with this certificate"
+        )
 
     def _on_answer(self, sample: zenoh.Sample) -> None:
         if not self.answers:
@@ -298,7 +333,7 @@ def _decoded(kind: type[T], message: Message, sample: zenoh.Sample) -> T | None:
     return from_message(kind, message)
 
 
-def _open(endpoint: str, delivery: Delivery, timeout_s: float) -> zenoh.Session:
+def _open(endpoint: str, delivery: Delivery, timeout_s: float, file: RobotFile | None) -> zenoh.Session:
     """Opens the session. A listener that is silent and not zenoh can hold a handshake longer than zenoh's own
     timeout, so it is opened on a thread of its own."""
     result: list[zenoh.Session | Exception] = []
@@ -306,7 +341,7 @@ def _open(endpoint: str, delivery: Delivery, timeout_s: float) -> zenoh.Session:
 
     def run() -> None:
         try:
-            session = zenoh.open(zenoh.Config.from_json5(_config(endpoint, delivery, timeout_s)))
+            session = zenoh.open(zenoh.Config.from_json5(_config(endpoint, delivery, timeout_s, file)))
             if is_late.is_set():
                 session.close()
             result.append(session)
@@ -321,10 +356,24 @@ def _open(endpoint: str, delivery: Delivery, timeout_s: float) -> zenoh.Session:
         return opened
     is_late.set()
     detail = f": {opened}" if opened is not None else f" within {timeout_s} s"
-    raise Unreachable(f"no session with a server at {endpoint}{detail}", field="endpoint") from opened
+    kind = TlsRefused if _listens(endpoint) else Unreachable
+    raise kind(f"no session with a server at {endpoint}{detail}", field="endpoint") from opened
 
 
-def _config(endpoint: str, delivery: Delivery, timeout_s: float) -> str:
+def _listens(endpoint: str) -> bool:
+    """Whether something takes connections at an encrypted endpoint."""
+    protocol, _, address = endpoint.partition("/")
+    host, _, port = address.rpartition(":")
+    if protocol != "tls" or not port.isdecimal():
+        return False
+    try:
+        with socket.create_connection((host.strip("[]"), int(port)), timeout=_PROBE_S):
+            return True
+    except OSError:
+        return False
+
+
+def _config(endpoint: str, delivery: Delivery, timeout_s: float, file: RobotFile | None = None) -> str:
     # A session whose sender waits must not be closed.
     close_us = 60_000_000 if delivery == "every" else 5_000_000
     return json.dumps(
@@ -349,6 +398,7 @@ def _config(endpoint: str, delivery: Delivery, timeout_s: float) -> str:
                         },
                     },
                     "rx": {"max_message_size": _MAX_MESSAGE_BYTES},
+                    **({} if file is None else {"tls": file.settings()}),
                 },
                 "shared_memory": {"enabled": False},
             },

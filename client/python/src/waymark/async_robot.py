@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import os
 from collections import deque
 from collections.abc import AsyncIterator
 from typing import Any, Generic, TypeVar
@@ -13,6 +14,7 @@ from waymark._link import INBOX, Delivery, Link, Listener, Subscription
 from waymark.errors import NoAnswer
 from waymark.image import Capture, Picture
 from waymark.robot import matching
+from waymark.robot_file import RobotFile
 from waymark.wire import Answer, CameraAnswer, GazeAdvice, GazeRequest, MapChanged, Pose2, RobotPose, Scan
 
 T = TypeVar("T")
@@ -97,6 +99,24 @@ class AsyncRobot:
     ) -> AsyncRobot:
         """Connects as `Robot.connect` does."""
         return cls(await asyncio.to_thread(Link, robot, endpoint, fleet, delivery, timeout_s, epoch))
+
+    @classmethod
+    async def from_file(
+        cls,
+        path: str | os.PathLike[str] | None = None,
+        *,
+        delivery: Delivery = "latest",
+        timeout_s: float = 5.0,
+        epoch: int | None = None,
+    ) -> AsyncRobot:
+        """Connects with encryption as the robot of a file of `waymark robot enrol`, or of the file that the variable
+        WAYMARK_ROBOT_FILE names.
+
+        Raises `CertificateExpired`; `TlsRefused` if the two sides do not accept each other's certificates;
+        `NotAdmitted` if this one was revoked; `Unreachable` after `timeout_s`.
+        """
+        file = RobotFile.read(path)
+        return cls(await asyncio.to_thread(Link.of_file, file, delivery, timeout_s, epoch))
 
     @property
     def name(self) -> str:

@@ -26,6 +26,9 @@ ADVICE: dict[str, str] = {
     "too_many": "stop a robot or a camera that is not needed, or raise the server's limits",
     "unreachable": "is `waymark serve` running, is this its endpoint?",
     "untrusted": "give `MapClient` the `authority` that signs it, and a name that is in it",
+    "tls_refused": "enrol the robot again (waymark robot enrol), and name the server by one of its tls.names",
+    "certificate_expired": "enrol the robot again: waymark robot enrol",
+    "not_admitted": "it was revoked, is another robot's, or the robot was removed: see waymark robot certificates",
     "no_answer": "the frame or its answer was dropped, or the work takes longer: send again, or give a longer `wait_s`",
     "superseded": "send the next frame of a camera when the last is answered",
     "no_encoder": "pip install 'waymark-client[jpeg]', or send the raw image",
@@ -90,6 +93,25 @@ class Untrusted(WaymarkError):
     """The server's certificate is not signed by whom this client believes, or not for this name."""
 
     default_code = "untrusted"
+
+
+class TlsRefused(Unreachable):
+    """Something listens there, and there is no encrypted session: the robot's certificate is not valid at the server,
+    or the server's own is not signed by the authority in the robot's file, or is for another name."""
+
+    default_code = "tls_refused"
+
+
+class CertificateExpired(WaymarkError):
+    """The robot's certificate has ended."""
+
+    default_code = "certificate_expired"
+
+
+class NotAdmitted(WaymarkError):
+    """The session is open, and the server takes nothing of this robot with this certificate."""
+
+    default_code = "not_admitted"
 
 
 class NoAnswer(WaymarkError):

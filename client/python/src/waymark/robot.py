@@ -4,6 +4,7 @@ and numbered; the server keeps the newest of each camera, so a robot that sends 
 
 from __future__ import annotations
 
+import os
 import threading
 import time
 from collections import deque
@@ -14,6 +15,7 @@ from weakref import WeakSet
 from waymark._link import INBOX, Delivery, Link, Listener, Subscription
 from waymark.errors import NoAnswer, Superseded
 from waymark.image import Capture, Picture
+from waymark.robot_file import RobotFile
 from waymark.wire import Answer, CameraAnswer, GazeAdvice, GazeRequest, MapChanged, Pose2, RobotPose, Scan
 
 T = TypeVar("T")
@@ -97,6 +99,23 @@ class Robot:
         the server; random if absent. Raises `Unreachable` after `timeout_s`.
         """
         return cls(Link(robot, endpoint, fleet, delivery, timeout_s, epoch))
+
+    @classmethod
+    def from_file(
+        cls,
+        path: str | os.PathLike[str] | None = None,
+        *,
+        delivery: Delivery = "latest",
+        timeout_s: float = 5.0,
+        epoch: int | None = None,
+    ) -> Robot:
+        """Connects with encryption as the robot of a file of `waymark robot enrol`, or of the file that the variable
+        WAYMARK_ROBOT_FILE names.
+
+        Raises `CertificateExpired`; `TlsRefused` if the two sides do not accept each other's certificates;
+        `NotAdmitted` if this one was revoked; `Unreachable` after `timeout_s`.
+        """
+        return cls(Link.of_file(RobotFile.read(path), delivery, timeout_s, epoch))
 
     @property
     def name(self) -> str:

@@ -16,7 +16,7 @@ pub(crate) const AUTHORITY_FILE: &str = "authority.pem";
 /// Its private key, of mode 0600.
 pub(crate) const KEY_FILE: &str = "authority.key";
 /// Time for which a new authority is valid: robots keep its certificate.
-const AUTHORITY_VALID: Duration = Duration::from_hours(20 * 365 * 24);
+pub(super) const AUTHORITY_VALID: Duration = Duration::from_hours(20 * 365 * 24);
 /// Certificates begin so long ago: clocks of robots may be behind.
 const BEGINS_BEFORE: Duration = Duration::from_hours(48);
 /// Longest request for a certificate that is read, in bytes.
@@ -65,6 +65,14 @@ impl Authority {
         }
     }
 
+    /// One in memory, for what is needed only in this process.
+    pub(super) fn ephemeral(now_ms: i64) -> Result<Self, rcgen::Error> {
+        let pair = KeyPair::generate()?;
+        let params = authority_params(now_ms);
+        let certificate_pem = params.self_signed(&pair)?.pem();
+        Ok(Self { certificate_pem, issuer: Issuer::new(params, pair) })
+    }
+
     fn load(certificate: &Path, key: &Path) -> Result<Self, CertificateError> {
         let read = |path: &Path| fs::read_to_string(path).map_err(CertificateError::at(path));
         private_file::close_to_others(key, 0o600).map_err(CertificateError::at(key))?;
@@ -79,9 +87,7 @@ impl Authority {
     fn create(certificate: &Path, key: &Path, now_ms: i64) -> Result<Self, CertificateError> {
         let bad = CertificateError::bad(certificate);
         let pair = KeyPair::generate().map_err(&bad)?;
-        let mut params = params("Waymark authority", now_ms, AUTHORITY_VALID);
-        params.is_ca = IsCa::Ca(BasicConstraints::Constrained(0));
-        params.key_usages = vec![KeyUsagePurpose::KeyCertSign, KeyUsagePurpose::CrlSign];
+        let params = authority_params(now_ms);
         let certificate_pem = params.self_signed(&pair).map_err(&bad)?.pem();
         // The certificate last: it is there only together with its key.
         private_file::write(key, &pair.serialize_pem()).map_err(CertificateError::at(key))?;
@@ -101,13 +107,37 @@ impl Authority {
         now_ms: i64,
         valid: Duration,
     ) -> Result<(String, PemKey), rcgen::Error> {
+        self.issue_listener("Waymark server", names, now_ms, valid)
+    }
+
+    /// A fresh certificate of a listener, with its key, PEM.
+    pub(super) fn issue_listener(
+        &self,
+        common_name: &str,
+        names: Vec<String>,
+        now_ms: i64,
+        valid: Duration,
+    ) -> Result<(String, PemKey), rcgen::Error> {
         let pair = KeyPair::generate()?;
-        let mut params = params("Waymark server", now_ms, valid);
+        let mut params = params(common_name, now_ms, valid);
         params.subject_alt_names = CertificateParams::new(names)?.subject_alt_names;
         params.key_usages = vec![KeyUsagePurpose::DigitalSignature];
         params.extended_key_usages = vec![ExtendedKeyUsagePurpose::ServerAuth];
         let certificate = params.signed_by(&pair, &self.issuer)?;
         Ok((certificate.pem(), PemKey(pair.serialize_pem())))
+    }
+
+    /// A fresh certificate of a program that connects, with its key, PEM.
+    pub(super) fn issue_client(
+        &self,
+        common_name: &str,
+        now_ms: i64,
+        valid: Duration,
+    ) -> Result<(String, PemKey), rcgen::Error> {
+        let pair = KeyPair::generate()?;
+        let mut params = params(common_name, now_ms, valid);
+        params.extended_key_usages = vec![ExtendedKeyUsagePurpose::ClientAuth];
+        Ok((params.signed_by(&pair, &self.issuer)?.pem(), PemKey(pair.serialize_pem())))
     }
 
     /// Signs a robot's request (PKCS #10, PEM). Of the request only the public key is taken; it must prove that its sender
@@ -143,6 +173,13 @@ impl Authority {
             expires_ms: now_ms + valid.as_millis() as i64,
         })
     }
+}
+
+fn authority_params(now_ms: i64) -> CertificateParams {
+    let mut params = params("Waymark authority", now_ms, AUTHORITY_VALID);
+    params.is_ca = IsCa::Ca(BasicConstraints::Constrained(0));
+    params.key_usages = vec![KeyUsagePurpose::KeyCertSign, KeyUsagePurpose::CrlSign];
+    params
 }
 
 /// A name and a time; the ends are whole seconds.

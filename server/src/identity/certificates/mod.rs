@@ -1,14 +1,16 @@
 //! Certificates. In: the settings of encryption and the folder `tls` of the data directory. Out: the server's certificate in
 //! use, for HTTP and zenoh, and certificates of robots.
 
-#![cfg_attr(not(test), expect(dead_code, reason = "listeners and enrolment follow"))]
-
 mod authority;
+mod link;
+mod registry;
 mod server;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use authority::Authority;
+pub(crate) use authority::{Authority, common_name};
+pub(crate) use link::LinkCertificates;
+pub(crate) use registry::CertificateRegistry;
 pub(crate) use server::ServerCertificate;
 
 use crate::config::Tls;
@@ -122,6 +124,21 @@ impl Certificates {
             Some(path) => fs::read_to_string(path).map_err(CertificateError::at(path)),
             None => Ok(self.authority.certificate_pem().to_owned()),
         }
+    }
+
+    /// Whether the built-in authority signs robots' certificates.
+    pub(crate) fn enrols_robots(&self) -> bool {
+        self.settings.client_authority.is_none()
+    }
+
+    /// Its certificate, if it has signed that of the server.
+    pub(crate) fn server_authority_pem(&self) -> Option<&str> {
+        self.settings.own.is_none().then(|| self.authority.certificate_pem())
+    }
+
+    /// Names and addresses of the settings.
+    pub(crate) fn names(&self) -> &[String] {
+        &self.settings.names
     }
 
     /// Renews what is due. Whether there is another certificate now.

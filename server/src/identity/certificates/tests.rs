@@ -12,7 +12,12 @@ use rustls::{
 const DAY: Duration = Duration::from_hours(24);
 
 fn tls(names: &[&str]) -> Tls {
-    Tls { names: names.iter().map(|&name| name.into()).collect(), own: None, client_authority: None }
+    Tls {
+        names: names.iter().map(|&name| name.into()).collect(),
+        own: None,
+        client_authority: None,
+        local_zenoh: None,
+    }
 }
 
 fn roots(pem: &str) -> Arc<RootCertStore> {

@@ -43,7 +43,12 @@ async fn an_edit_computes_only_what_it_changed_and_not_in_the_writer() {
     let dir = tempfile::tempdir().unwrap();
     let config = config(dir.path());
     let (snapshots, vitals) = (Arc::new(Snapshots::default()), Arc::new(Vitals::default()));
-    let publisher = Publisher::new(snapshots.clone(), Arc::default(), config.params.clone(), vitals.clone());
+    let publisher = Publisher::new(
+        snapshots.clone(),
+        (Arc::default(), Arc::default()),
+        config.params.clone(),
+        vitals.clone(),
+    );
     let wake = publisher.derive.clone();
     // Nothing derives yet: what the writer publishes is all there is.
     let (store, _task) = Store::open(&config, Arc::new(publisher), vitals.clone()).await.unwrap();

@@ -133,7 +133,9 @@ from waymark.api.stored_answers import (
 )
 from waymark.api.tokens import (
     CreatedToken,
+    EnrolledRobot,
     PageLink,
+    RobotCertificate,
     Role,
     Token,
     Whoami,
@@ -189,6 +191,7 @@ __all__ = [
     "Distance",
     "DistanceHistogram",
     "DuplicatePair",
+    "EnrolledRobot",
     "EpochConflictBody",
     "ErrorModelBody",
     "EstimatedPlace",
@@ -255,6 +258,7 @@ __all__ = [
     "ReferenceRunBody",
     "RelocalisationStatus",
     "Robot",
+    "RobotCertificate",
     "RobotPose",
     "Role",
     "RollbackOutcome",

@@ -1,4 +1,4 @@
-"""Tokens: who may do what."""
+"""Tokens and certificates: who may do what."""
 
 from __future__ import annotations
 
@@ -28,6 +28,31 @@ class CreatedToken:
 
     text: str = field(repr=False)
     token: Token
+
+
+@dataclass(frozen=True, slots=True)
+class RobotCertificate:
+    """A certificate of a robot. `sha256` is of the certificate (DER), hexadecimal; times are ms since 1970."""
+
+    serial: str
+    robot: str
+    sha256: str
+    issued_ms: int
+    expires_ms: int
+    revoked_ms: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class EnrolledRobot:
+    """A new certificate, with what a robot needs to connect. `authority_pem` is `None` where the server's certificate
+    is a file of the operator's own; `zenoh` is the endpoint as the server listens."""
+
+    certificate_pem: str
+    authority_pem: str | None
+    zenoh: str
+    names: tuple[str, ...]
+    fleet: str
+    certificate: RobotCertificate
 
 
 @dataclass(frozen=True, slots=True)

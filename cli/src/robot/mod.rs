@@ -1,5 +1,8 @@
 //! `waymark robot`: which robots may send frames, on which map each drives, how each is.
 
+mod certificates;
+mod enrol;
+
 use super::{
     answers::{pose_line, trust},
     names::name,
@@ -35,6 +38,20 @@ enum Verb {
         /// The robot.
         robot: String,
     },
+    /// Give a robot a certificate for the encrypted listener
+    ///
+    /// The private key is made here and stays here: run it on the robot's machine, or bring the folder there as a secret.
+    /// Programs of the SDKs take the file robot.json of the folder. For example:
+    ///   waymark robot enrol r1 --out r1 --server https://server.example.org:8080
+    #[command(verbatim_doc_comment)]
+    Enrol(enrol::Args),
+    /// List the certificates of a robot, with those that were revoked or have expired.
+    Certificates {
+        /// The robot.
+        robot: String,
+    },
+    /// Revoke certificates of a robot: its messages are refused at once, and its connection is closed.
+    Revoke(certificates::RevokeArgs),
     /// Remove a robot; its frames are refused from now on.
     Remove {
         /// The robot.
@@ -47,11 +64,11 @@ enum Verb {
 /// Runs the command.
 pub(crate) async fn run(args: &Args) -> anyhow::Result<()> {
     let session = args.server.session()?;
-    let done = on_server(&session, &args.verb).await;
+    let done = on_server(&session, &args.verb, args.server.url()).await;
     session.explained(done).await
 }
 
-async fn on_server(session: &Session, verb: &Verb) -> anyhow::Result<()> {
+async fn on_server(session: &Session, verb: &Verb, server: &str) -> anyhow::Result<()> {
     let maps = session.maps();
     match verb {
         Verb::Add { robot, map } => {
@@ -79,6 +96,9 @@ async fn on_server(session: &Session, verb: &Verb) -> anyhow::Result<()> {
             )
         }
         Verb::Show { robot } => show(session, robot).await,
+        Verb::Enrol(args) => enrol::run(session, args, server).await,
+        Verb::Certificates { robot } => certificates::list(session, robot).await,
+        Verb::Revoke(args) => certificates::revoke(session, args).await,
         Verb::Remove { robot, consent } => {
             maps.robot(robot).await?;
             consent.ask(&format!("Remove the robot {robot}? Its frames are refused from then on."))?;

@@ -1,0 +1,156 @@
+//! Who may do what on the encrypted listener, as access control of zenoh. In: certificates, robots with their maps, prefixes
+//! of robots of ROS 2. Out: rules by which a robot writes its own keys alone, and reads its own answers and its maps' changes.
+//! What no rule allows is dropped.
+//!
+//! zenoh knows of a certificate nothing but its name, and reads the rules once, when a session opens: [`super::gate`] opens
+//! it again when they change.
+
+use crate::{config::Ros2Robot, identity::certificates::common_name};
+use engine::snapshot::Snapshots;
+use protos::{Key, Keys, Name};
+use serde_json::{Value, json};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Every kind of message that zenoh's access control knows.
+const ALL_MESSAGES: [&str; 9] = [
+    "put",
+    "delete",
+    "declare_subscriber",
+    "query",
+    "reply",
+    "declare_queryable",
+    "liveliness_token",
+    "liveliness_query",
+    "declare_liveliness_subscriber",
+];
+/// Every key: wildcards do not stand for parts that begin with `@`, which ROS 2 uses.
+const ALL_KEYS: [&str; 4] = ["**", "@ros2_lv/**", "**/@ros2_lv/**", "**/@adv/**"];
+/// The server's own link among the subjects.
+const SERVER: &str = "server";
+
+/// What one robot is known by, and may.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct Grant {
+    /// Names in its valid certificates.
+    common_names: BTreeSet<String>,
+    /// Its map, and those linked with it.
+    maps: BTreeSet<String>,
+    /// Where its messages of ROS 2 are.
+    ros2_prefix: Option<String>,
+}
+
+/// What all robots may.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub(super) struct Policy {
+    robots: BTreeMap<Name, Grant>,
+}
+
+impl Policy {
+    /// What follows from the valid certificates. `by_name`: certificates of the operator's own authority have the robot's
+    /// name, and every registered robot may have one.
+    pub(super) fn new(
+        valid: &BTreeMap<String, Vec<String>>,
+        snapshots: &Snapshots,
+        ros2: &[Ros2Robot],
+        by_name: bool,
+    ) -> Self {
+        let registered = snapshots.robots();
+        let mut linked = BTreeMap::<&str, BTreeSet<String>>::new();
+        let mut robots = BTreeMap::new();
+        for (robot, map) in &registered {
+            let Ok(name) = Name::new(robot.as_str()) else { continue };
+            let serials = valid.get(robot).into_iter().flatten();
+            let mut common_names: BTreeSet<String> =
+                serials.map(|serial| common_name(robot, serial)).collect();
+            if by_name {
+                common_names.insert(robot.clone());
+            }
+            if common_names.is_empty() {
+                continue;
+            }
+            let maps = linked.entry(map).or_insert_with(|| linked_with(snapshots, map)).clone();
+            let of_ros2 = ros2.iter().find(|of_ros2| of_ros2.robot == name);
+            let ros2_prefix = of_ros2.and_then(Ros2Robot::own_prefix).map(str::to_owned);
+            robots.insert(name, Grant { common_names, maps, ros2_prefix });
+        }
+        Self { robots }
+    }
+
+    /// As zenoh's settings want it. `server`: the name in the certificate of the server's other router.
+    pub(super) fn access_control(&self, keys: &Keys, server: &str) -> Value {
+        let mut rules = vec![rule(SERVER, &ALL_KEYS, &ALL_MESSAGES, &["ingress", "egress"])];
+        let mut subjects = vec![json!({ "id": SERVER, "cert_common_names": [server] })];
+        let mut policies = vec![json!({ "rules": [SERVER], "subjects": [SERVER] })];
+        rules.extend(shared(keys));
+        for (robot, grant) in &self.robots {
+            let own = of_robot(keys, robot, grant);
+            let mut ids: Vec<Value> = own.iter().map(|rule| rule["id"].clone()).collect();
+            ids.extend(["inputs", "questions", "maps"].map(Value::from));
+            rules.extend(own);
+            // Names of robots are not subjects of their own: one may be called as the server's.
+            let subject = format!("robot {robot}");
+            subjects.push(json!({ "id": subject, "cert_common_names": grant.common_names }));
+            policies.push(json!({ "rules": ids, "subjects": [subject] }));
+        }
+        json!({
+            "enabled": true,
+            "default_permission": "deny",
+            "rules": rules,
+            "subjects": subjects,
+            "policies": policies,
+        })
+    }
+}
+
+/// The map itself, and every map that lies in the same coordinates.
+fn linked_with(snapshots: &Snapshots, map: &str) -> BTreeSet<String> {
+    let others = snapshots.all().into_iter().map(|other| other.name.clone());
+    let mut maps: BTreeSet<String> =
+        others.filter(|other| snapshots.relation(map, other).is_some()).collect();
+    maps.insert(map.to_owned());
+    maps
+}
+
+fn rule(id: &str, keys: &[impl AsRef<str>], messages: &[&str], flows: &[&str]) -> Value {
+    let keys: Vec<&str> = keys.iter().map(AsRef::as_ref).collect();
+    json!({ "id": id, "permission": "allow", "flows": flows, "messages": messages, "key_exprs": keys })
+}
+
+/// What each robot may: learn that the server listens, and ask for changes of maps, of which only its own arrive.
+fn shared(keys: &Keys) -> [Value; 3] {
+    let inputs = [keys.all_frames(), keys.all_odometry(), keys.all_scans()];
+    let questions = [keys.all_gaze(), keys.all_hellos(), keys.all_map_versions()];
+    let maps = [keys.all_map_changes(), keys.all_map_versions()];
+    [
+        rule("inputs", &inputs, &["declare_subscriber"], &["egress"]),
+        rule("questions", &questions, &["declare_queryable"], &["egress"]),
+        rule("maps", &maps, &["declare_subscriber", "query"], &["ingress"]),
+    ]
+}
+
+/// What a robot may by its name.
+fn of_robot(keys: &Keys, robot: &Name, grant: &Grant) -> Vec<Value> {
+    let key = |key: &Key| keys.build(key);
+    let id = |what: &str| format!("{robot} {what}");
+    let written = [keys.frames_of(robot), key(&Key::Odometry(robot.clone())), key(&Key::Scan(robot.clone()))];
+    let read = [keys.answers_of(robot), key(&Key::Pose(robot.clone()))];
+    let asked = [key(&Key::Gaze(robot.clone())), key(&Key::Hello(robot.clone()))];
+    let mut rules = vec![
+        rule(&id("writes"), &written, &["put"], &["ingress"]),
+        rule(&id("lives"), &[keys.tokens_of(robot)], &["liveliness_token"], &["ingress"]),
+        rule(&id("asks"), &asked, &["query"], &["ingress"]),
+        rule(&id("is answered"), &asked, &["reply"], &["egress"]),
+        rule(&id("listens"), &read, &["declare_subscriber"], &["ingress"]),
+        rule(&id("reads"), &read, &["put"], &["egress"]),
+    ];
+    let maps: Vec<Name> = grant.maps.iter().filter_map(|map| Name::new(map.as_str()).ok()).collect();
+    let changes: Vec<String> = maps.iter().map(|map| key(&Key::MapChanged(map.clone()))).collect();
+    let versions: Vec<String> = maps.iter().map(|map| key(&Key::MapVersion(map.clone()))).collect();
+    rules.push(rule(&id("reads maps"), &changes, &["put"], &["egress"]));
+    rules.push(rule(&id("reads versions"), &versions, &["reply"], &["egress"]));
+    if let Some(prefix) = &grant.ros2_prefix {
+        let inside = ALL_KEYS.map(|key| format!("{prefix}/{key}"));
+        rules.push(rule(&id("speaks ROS"), &inside, &ALL_MESSAGES, &["ingress", "egress"]));
+    }
+    rules
+}

@@ -1,0 +1,175 @@
+//! The router that robots on other machines meet: TLS with certificates of both sides, and access control. Behind it is the
+//! server's own router, over a link of this process.
+//!
+//! Access control is read when a session opens. So when certificates, robots or their maps change what robots may, the gate
+//! closes and opens again: robots connect again by themselves, within about a second, and the server's own router, its
+//! subscriptions and its other robots stay. What was revoked is refused in code meanwhile ([`super::Receivers::admits`]).
+
+use super::{
+    BusError,
+    access::Policy,
+    router::{self, RouterSettings, RouterTls},
+};
+use crate::{
+    config::Ros2Robot,
+    identity::certificates::{CertificateError, CertificateRegistry, Certificates, LinkCertificates},
+};
+use engine::{snapshot::Snapshots, vitals::Pulse};
+use protos::{Key, Keys, Name};
+use std::{sync::Arc, time::Duration};
+use tokio::{sync::watch, task::JoinHandle, time::Instant};
+
+/// Changes so close together are one.
+const GATHER: Duration = Duration::from_millis(20);
+/// How often certificates that have expired are looked for.
+const LOOK_EVERY: Duration = Duration::from_mins(1);
+/// Time between two attempts to open.
+const RETRY: Duration = Duration::from_millis(200);
+/// Longest wait until the two routers know of each other.
+const JOIN: Duration = Duration::from_secs(10);
+/// Between two questions whether they do.
+const ASK_EVERY: Duration = Duration::from_millis(20);
+/// Who asks that: no robot's certificate is needed.
+const ASKS: &str = "gate";
+
+/// What a gate rests on.
+pub(super) struct GateSettings {
+    /// Where robots connect, with a real port.
+    pub(super) endpoint: String,
+    /// Where the server's own router listens for it.
+    pub(super) link_endpoint: String,
+    pub(super) link: LinkCertificates,
+    pub(super) keys: Keys,
+    pub(super) certificates: Arc<Certificates>,
+    pub(super) registry: Arc<CertificateRegistry>,
+    pub(super) snapshots: Arc<Snapshots>,
+    pub(super) ros2: Vec<Ros2Robot>,
+    pub(super) robots: usize,
+    pub(super) frame_bytes: usize,
+}
+
+/// The gate at work.
+pub(super) struct Gate {
+    task: JoinHandle<()>,
+    stop: watch::Sender<bool>,
+}
+
+impl GateSettings {
+    fn policy(&self) -> Policy {
+        let valid = self.registry.valid(crate::store::now_ms());
+        Policy::new(&valid, &self.snapshots, &self.ros2, !self.certificates.enrols_robots())
+    }
+
+    async fn open(&self, policy: &Policy) -> Result<zenoh::Session, BusError> {
+        let shown = self.certificates.current().borrow().clone();
+        let authorities = self.certificates.client_authorities_pem();
+        let authorities = authorities.map_err(|e| self.fault(&e))?;
+        let (certificate, key) = &self.link.client;
+        let settings = RouterSettings {
+            listen: vec![self.endpoint.clone()],
+            connect: Some(&self.link_endpoint),
+            tls: Some(RouterTls {
+                authorities: format!("{authorities}\n{}", self.link.authority_pem),
+                listener: (&shown.chain_pem, &shown.key_pem),
+                client: Some((certificate, key)),
+            }),
+            access: Some(policy.access_control(&self.keys, &self.link.listener_name)),
+            robots: self.robots,
+            frame_bytes: self.frame_bytes,
+        };
+        let session = router::open(&settings).await?;
+        self.join(&session).await;
+        Ok(session)
+    }
+
+    fn fault(&self, error: &CertificateError) -> BusError {
+        BusError::Listen { endpoint: self.endpoint.clone(), detail: error.to_string() }
+    }
+
+    /// Waits until messages pass to the server's own router: earlier ones would be lost.
+    async fn join(&self, session: &zenoh::Session) {
+        let Ok(robot) = Name::new(ASKS) else { return };
+        let (key, until) = (self.keys.build(&Key::Hello(robot)), Instant::now() + JOIN);
+        while Instant::now() < until {
+            if let Ok(replies) = session.get(&key).timeout(ASK_EVERY * 10).await
+                && replies.recv_async().await.is_ok_and(|reply| reply.result().is_ok())
+            {
+                return;
+            }
+            tokio::time::sleep(ASK_EVERY).await;
+        }
+        tracing::error!(follows = "messages of robots may not arrive", "routers_not_joined");
+    }
+}
+
+impl Gate {
+    /// Opens the gate, and keeps it after what robots may.
+    pub(super) async fn open(settings: GateSettings, pulse: Pulse) -> Result<Self, BusError> {
+        let change = *settings.registry.changes().borrow();
+        let policy = settings.policy();
+        let session = settings.open(&policy).await?;
+        settings.registry.set_applied(change);
+        let (stop, stopping) = watch::channel(false);
+        let task = tokio::spawn(keep(settings, policy, session, stopping, pulse));
+        Ok(Self { task, stop })
+    }
+
+    pub(super) async fn close(self) {
+        self.stop.send_replace(true);
+        if let Err(error) = self.task.await {
+            tracing::error!(%error, "gate_panicked");
+        }
+    }
+}
+
+async fn keep(
+    settings: GateSettings,
+    mut policy: Policy,
+    mut session: zenoh::Session,
+    mut stopping: watch::Receiver<bool>,
+    pulse: Pulse,
+) {
+    let (mut changes, mut shown) = (settings.registry.changes(), settings.certificates.current());
+    loop {
+        let is_other_certificate = tokio::select! {
+            _ = stopping.wait_for(|stop| *stop) => break,
+            Ok(()) = changes.changed() => false,
+            Ok(()) = shown.changed() => true,
+            () = tokio::time::sleep(LOOK_EVERY) => false,
+        };
+        tokio::time::sleep(GATHER).await;
+        let change = *changes.borrow_and_update();
+        let wanted = settings.policy();
+        if wanted == policy && !is_other_certificate {
+            settings.registry.set_applied(change);
+            continue;
+        }
+        close(&session).await;
+        let opened = tokio::select! {
+            _ = stopping.wait_for(|stop| *stop) => break,
+            opened = reopened(&settings, &wanted) => opened,
+        };
+        (session, policy) = (opened, wanted);
+        settings.registry.set_applied(change);
+        tracing::info!(endpoint = settings.endpoint, follows = "robots connect again", "access_changed");
+    }
+    close(&session).await;
+    pulse.end();
+}
+
+/// Tries until it is open: the port may be taken for a moment.
+async fn reopened(settings: &GateSettings, policy: &Policy) -> zenoh::Session {
+    loop {
+        match settings.open(policy).await {
+            Ok(session) => return session,
+            Err(error) => tracing::error!(%error, follows = "it is tried again", "gate_not_open"),
+        }
+        tokio::time::sleep(RETRY).await;
+    }
+}
+
+async fn close(session: &zenoh::Session) {
+    if let Err(error) = session.close().await {
+        tracing::warn!(%error, "zenoh_close_failed");
+    }
+}

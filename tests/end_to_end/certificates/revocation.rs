@@ -1,0 +1,89 @@
+//! Enrolling and revoking take effect at once; other robots go on.
+
+use super::Fleet;
+use client::{Capture, ClientError, RobotClient, RobotOptions, v1};
+use std::time::Duration;
+use tests::eventually;
+use vision::frame::GrayImage;
+
+fn picture() -> Capture {
+    Capture::gray(&GrayImage::from_fn(64, 48, |u, _| u as u8))
+}
+
+/// Sends frames until one is answered: while the gate opens again they are lost.
+async fn answered(robot: &RobotClient) {
+    let ask = || async {
+        let answer = robot.recognise("front", picture(), Duration::from_millis(500)).await.ok()?;
+        (answer.status() == v1::Status::NoMatch).then_some(())
+    };
+    eventually("an answer", ask).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_robot_that_is_enrolled_works_and_those_at_work_go_on() {
+    let fleet = Fleet::start().await;
+    let r1 = RobotClient::connect(&fleet.options("r1")).await.expect("connected");
+    answered(&r1).await;
+    fleet.add("r3", "cellar").await;
+    let r3 = RobotClient::connect(&fleet.options("r3")).await.expect("connected");
+    answered(&r3).await;
+    answered(&r1).await;
+    // Another map is another right, too.
+    fleet.inside.maps().put_robot("r3", "hall").await.expect("moved");
+    let told = || async { r3.map_version("hall", Duration::from_secs(1)).await.ok().flatten() };
+    eventually("the version of the map it drives on now", told).await;
+    answered(&r1).await;
+    fleet.inside.server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_revoked_certificate_gives_nothing_at_once() {
+    let fleet = Fleet::start().await;
+    let (r1, r2) = (fleet.options("r1"), fleet.options("r2"));
+    let (r1, r2) =
+        (RobotClient::connect(&r1).await.expect("r1"), RobotClient::connect(&r2).await.expect("r2"));
+    answered(&r1).await;
+    answered(&r2).await;
+    let maps = fleet.inside.maps();
+    let serial = maps.robot_certificates("r1").await.expect("certificates")[0].serial.clone();
+    maps.revoke_robot_certificate("r1", &serial).await.expect("revoked");
+    let before = fleet.inside.server.slots.counts();
+    let answers = r1.answers();
+    for _ in 0..20 {
+        r1.publish_frame("front", picture()).await.expect("sent");
+    }
+    answered(&r2).await;
+    tokio::time::sleep(Duration::from_millis(300)).await;
+    assert!(answers.is_empty(), "an answer to a revoked robot");
+    let after = fleet.inside.server.slots.counts();
+    assert_eq!(before.missing() + after.missing(), 0, "{after:?}");
+    let again = RobotOptions { timeout: Duration::from_secs(3), ..fleet.options("r1") };
+    assert!(matches!(RobotClient::connect(&again).await, Err(ClientError::NotAdmitted { .. })));
+    // A new certificate is another one.
+    fleet.enrol("r1", "r1-again");
+    let r1 = RobotClient::connect(&fleet.options("r1-again")).await.expect("connected");
+    answered(&r1).await;
+    let all = maps.robot_certificates("r1").await.expect("certificates");
+    assert_eq!(all.iter().map(|c| c.revoked_ms.is_some()).collect::<Vec<_>>(), [true, false]);
+    fleet.inside.server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn one_of_two_certificates_is_revoked_and_the_other_stays() {
+    let fleet = Fleet::start().await;
+    fleet.enrol("r1", "r1-spare");
+    let maps = fleet.inside.maps();
+    let serials: Vec<_> =
+        maps.robot_certificates("r1").await.expect("certificates").into_iter().map(|c| c.serial).collect();
+    maps.revoke_robot_certificate("r1", &serials[0]).await.expect("revoked");
+    let spare = RobotClient::connect(&fleet.options("r1-spare")).await.expect("connected");
+    answered(&spare).await;
+    let first = RobotOptions { timeout: Duration::from_secs(3), ..fleet.options("r1") };
+    assert!(matches!(RobotClient::connect(&first).await, Err(ClientError::NotAdmitted { .. })));
+    // A robot that is removed takes its certificates with it, also where its name is given again.
+    maps.delete_robot("r1").await.expect("removed");
+    maps.put_robot("r1", "hall").await.expect("another robot");
+    let ghost = RobotOptions { timeout: Duration::from_secs(3), ..fleet.options("r1-spare") };
+    assert!(matches!(RobotClient::connect(&ghost).await, Err(ClientError::NotAdmitted { .. })));
+    fleet.inside.server.stop().await;
+}
