@@ -18,6 +18,8 @@ mod jobs;
 pub mod gather;
 pub mod calibrating;
 mod http;
+mod running;
 mod server;
 
-pub use server::{RunningServer, Server, StartError};
+pub use running::RunningServer;
+pub use server::{Server, StartError};

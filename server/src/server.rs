@@ -1,43 +1,39 @@
-//! Starts everything in order and stops it in the opposite order: store, jobs, engine, bus, HTTP.
+//! Starts everything in order: store, jobs, engine, bus, HTTP.
 
 use crate::{
     backup::Backups,
     bus::{Bus, BusError, Receivers},
-    config::Config,
+    config::{Config, Tls},
     events::{EventLog, watch_changes::watch_changes},
     gather::{self, Gatherer, GatheringTap, OfferedFrame},
     http::{self, App, Enrolment, Services},
     identity::{
-        Sessions, TokenId,
+        Sessions,
         certificates::{CertificateRegistry, Certificates},
         local_token::LocalToken,
     },
     jobs::Jobs,
-    publication::{Catalogue, CatalogueTasks},
+    publication::Catalogue,
     recording_answers::store_answers,
     ros2::Ros2,
+    running::{RunningServer, Tasks},
     store::{OpenError, StoreError, actor::Actor, landmarks, now_ms, pictures},
 };
 use engine::{
     answer_records::{AnswerRecord, answer_records},
     decode::ImageLimits,
     findings::{FindingSender, LandmarkFinding, findings},
-    intake::{FrameJob, Intake},
+    intake::Intake,
     live::LiveHub,
     motion::MotionTracker,
     panics::Panics,
     slots::Slots,
     snapshot::Snapshots,
-    vitals::{Failure, Pulse, Vitals},
+    vitals::{Pulse, Vitals},
     workers::{Engine, Workers},
 };
 use protos::Name;
-use std::{
-    net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr},
-    path::Path,
-    sync::Arc,
-    time::{Duration, Instant},
-};
+use std::{net::SocketAddr, sync::Arc, time::Duration};
 use tokio::{
     net::TcpListener,
     sync::{mpsc::Receiver, watch},
@@ -89,46 +85,6 @@ impl From<OpenError> for StartError {
 #[derive(Debug)]
 pub struct Server;
 
-/// A server at work. Dropping it leaves it running; call [`RunningServer::stop`].
-#[derive(Debug)]
-pub struct RunningServer {
-    /// Where HTTP listens, with the real port.
-    pub http_addr: SocketAddr,
-    /// Where robots connect, with the real port.
-    pub zenoh_endpoint: String,
-    /// Maps and robots as the workers see them.
-    pub snapshots: Arc<Snapshots>,
-    /// What robots are doing now.
-    pub live: Arc<LiveHub>,
-    /// Frames that wait, and the counters of all frames.
-    pub slots: Arc<Slots<FrameJob>>,
-    /// Robots of ROS 2.
-    pub ros2: Arc<Ros2>,
-    sessions: Arc<Sessions>,
-    local_token: LocalToken,
-    /// The first name of the certificate, or else the address; `None` without TLS.
-    tls_name: Option<String>,
-    stop: watch::Sender<bool>,
-    vitals: Arc<Vitals>,
-    tasks: Tasks,
-}
-
-/// What must end, in this order.
-#[derive(Debug)]
-struct Tasks {
-    workers: Workers,
-    bus: Bus,
-    http: JoinHandle<()>,
-    jobs: JoinHandle<()>,
-    /// Of findings, stored answers and events.
-    recorders: [JoinHandle<()>; 3],
-    gather: JoinHandle<()>,
-    pictures: JoinHandle<()>,
-    backups: JoinHandle<()>,
-    writer: CatalogueTasks,
-    watch: JoinHandle<()>,
-}
-
 impl Server {
     /// Starts a server. When this returns, it answers.
     pub async fn start(config: Config) -> Result<RunningServer, StartError> {
@@ -136,11 +92,7 @@ impl Server {
         let (store, writer) = Catalogue::open(&config).await?;
         let (stop, stopping) = watch::channel(false);
         let certificates = open_certificates(&config, &stopping)?;
-        let tls = certificates.as_ref().map(|all| http::encryption::acceptor(all.current())).transpose();
-        let tls = tls.map_err(|e| StartError::Certificates(e.to_string()))?;
-        let at = |source| StartError::Http { addr: config.http_addr, source };
-        let listener = TcpListener::bind(config.http_addr).await.map_err(at)?;
-        let http_addr = listener.local_addr().map_err(at)?;
+        let (listener, tls, http_addr) = listen(&config, certificates.as_ref()).await?;
         let local_token = write_local_token(&config, &store, http_addr.port())?;
         let sessions = Arc::<Sessions>::default();
         let (snapshots, vitals) = (store.snapshots().clone(), store.vitals().clone());
@@ -148,10 +100,7 @@ impl Server {
         let teaching = Teaching::start(&config, &store, (&tap, offered), &stopping).await?;
         let (findings, found) = findings();
         let (engine, recorded) = engine(&config, snapshots.clone(), vitals.clone(), (findings, tap));
-        let is_on =
-            |map: &Name, robot: &Name| snapshots.robot_map(robot.as_str()).as_deref() == Some(map.as_str());
-        engine.motion.mappings().count_in(vitals.panics().clone());
-        engine.motion.mappings().resume_in(config.data.join("mapping"), is_on);
+        resume_mappings(&engine, &config, &snapshots);
         let recorders = recorders(&config, &store, (found, recorded, &engine.live), &stopping);
         let pictures = tokio::spawn(pictures::check_all((*store).clone(), stopping.clone()));
         let (live, slots) = (engine.live.clone(), engine.slots.clone());
@@ -176,9 +125,8 @@ impl Server {
         let http = serve((listener, tls), app, &config, vitals.begin("the HTTP listener"), stopping);
         let watch = tokio::spawn(vitals.clone().watch());
         let zenoh_endpoint = bus.endpoint().to_owned();
-        let tls_name = config.tls.as_ref().map(|tls| {
-            tls.names.first().cloned().unwrap_or_else(|| http_addr.ip().to_canonical().to_string())
-        });
+        let first_name = |tls: &Tls| tls.names.first().cloned();
+        let tls_name = config.tls.as_ref().map(|tls| first_name(tls).unwrap_or(http_addr.ip().to_string()));
         let tasks = Tasks {
             workers,
             bus,
@@ -206,6 +154,27 @@ impl Server {
             tasks,
         })
     }
+}
+
+/// The listener of HTTP, how it encrypts, and its address.
+async fn listen(
+    config: &Config,
+    certificates: Option<&Arc<Certificates>>,
+) -> Result<(TcpListener, Option<TlsAcceptor>, SocketAddr), StartError> {
+    let tls = certificates.map(|all| http::encryption::acceptor(all.current())).transpose();
+    let tls = tls.map_err(|e| StartError::Certificates(e.to_string()))?;
+    let at = |source| StartError::Http { addr: config.http_addr, source };
+    let listener = TcpListener::bind(config.http_addr).await.map_err(at)?;
+    let http_addr = listener.local_addr().map_err(at)?;
+    Ok((listener, tls, http_addr))
+}
+
+/// Drives that an earlier server was mapping go on.
+fn resume_mappings(engine: &Engine, config: &Config, snapshots: &Snapshots) {
+    let is_on =
+        |map: &Name, robot: &Name| snapshots.robot_map(robot.as_str()).as_deref() == Some(map.as_str());
+    engine.motion.mappings().count_in(engine.vitals.panics().clone());
+    engine.motion.mappings().resume_in(config.data.join("mapping"), is_on);
 }
 
 /// The token for programs of this user on this machine.
@@ -354,80 +323,5 @@ fn receivers(config: &Config, engine: &Engine, certificates: Option<Arc<Certific
         gazes: Arc::default(),
         vitals: engine.vitals.clone(),
         certificates,
-    }
-}
-
-impl RunningServer {
-    /// Which parts run.
-    pub fn vitals(&self) -> &Arc<Vitals> {
-        &self.vitals
-    }
-
-    /// File with an administrator's token for programs of this user on this machine, absolute.
-    pub fn local_token_file(&self) -> &Path {
-        self.local_token.path()
-    }
-
-    /// A link that opens the page as an administrator, once, within ten minutes. It is a secret. `None` if the system has
-    /// no randomness for it.
-    pub fn page_link(&self) -> Option<String> {
-        let code = self.sessions.code(TokenId::Local, Instant::now()).ok()?;
-        Some(format!("{}/open?code={code}", self.local_url()))
-    }
-
-    /// Address of the pages and of the HTTP interface for other machines; for this one where no other can reach it.
-    pub fn url(&self) -> String {
-        let Some(name) = &self.tls_name else { return self.local_url() };
-        let name = if name.parse::<Ipv6Addr>().is_ok() { format!("[{name}]") } else { name.clone() };
-        format!("https://{name}:{}", self.http_addr.port())
-    }
-
-    /// The same for this machine. With TLS, plain text is answered on loopback alone.
-    fn local_url(&self) -> String {
-        let mut at = self.http_addr;
-        if at.ip().is_unspecified() {
-            at.set_ip(IpAddr::V4(Ipv4Addr::LOCALHOST));
-        }
-        let is_plain = self.tls_name.is_none() || at.ip().to_canonical().is_loopback();
-        format!("{}://{at}", if is_plain { "http" } else { "https" })
-    }
-
-    /// Returns when a part of the server has ended untold, with its name and the reason: stop, and start again from disk.
-    pub async fn failed(&self) -> Failure {
-        self.vitals.failed().await
-    }
-
-    /// Answers what is in work, then closes everything.
-    pub async fn stop(self) {
-        self.vitals.stop();
-        self.local_token.remove();
-        self.stop.send_replace(true);
-        let Tasks { workers, bus, http, jobs, recorders, gather, pictures, backups, writer, watch } =
-            self.tasks;
-        watch.abort();
-        // Workers first: what they have in work is still answered over the open bus.
-        let workers = tokio::task::spawn_blocking(move || workers.stop());
-        if let Err(error) = workers.await {
-            tracing::error!(%error, "worker_stop_failed");
-        }
-        self.ros2.close().await;
-        bus.close().await;
-        let [findings, answers, events] = recorders;
-        let others = [
-            ("HTTP", http),
-            ("jobs", jobs),
-            ("findings", findings),
-            ("stored answers", answers),
-            ("events", events),
-            ("gathering", gather),
-            ("the check of the pictures", pictures),
-            ("the timetable of backups", backups),
-        ];
-        for (what, task) in others {
-            if let Err(error) = task.await {
-                tracing::error!(%error, what, "task_panicked");
-            }
-        }
-        writer.close().await;
     }
 }

@@ -42,7 +42,7 @@ enum Verb {
     ///
     /// The private key is made here and stays here: run it on the robot's machine, or bring the folder there as a secret.
     /// Programs of the SDKs take the file robot.json of the folder. For example:
-    ///   waymark robot enrol r1 --out r1 --server https://server.example.org:8080
+    ///   waymark robot enrol r1 --out r1
     #[command(verbatim_doc_comment)]
     Enrol(enrol::Args),
     /// List the certificates of a robot, with those that were revoked or have expired.

@@ -114,7 +114,6 @@ fn unknown(what: Kind) -> (&'static str, &'static str) {
 }
 
 impl From<StoreError> for ApiError {
-    #[expect(clippy::too_many_lines, reason = "a line for each kind and error")]
     fn from(error: StoreError) -> Self {
         let detail = error.to_string();
         match error {

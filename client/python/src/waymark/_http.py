@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-import ssl
 import math
+import ssl
 import uuid
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

@@ -136,11 +136,9 @@ class AsyncMaps(AsyncBase):
         """One kept commit; `Refused` with code `unknown_commit` if it is not kept any more."""
         return await self._send(Commit, "commit", map, commit)
 
-    async def difference(
-        self, map: str, since: int, to: int | None = None, *, cursor: str | None = None
-    ) -> Difference:
-        """What differs between a map at the commit `since` and at a later one, or now. `landmarks.next` is the cursor of
-        the next page of landmarks."""
+    async def difference(self, map: str, since: int, to: int | None = None, *, cursor: str | None = None) -> Difference:
+        """What differs between a map at the commit `since` and at a later one, or now. `landmarks.next` is the cursor
+        of the next page of landmarks."""
         query = {"from": since, **present(to=to, cursor=cursor)}
         return await self._send(Difference, "difference", map, params=query)
 

@@ -27,6 +27,7 @@ from waymark._http import (
     refusal,
     request_of,
     revision_of,
+    trusted,
     unreachable,
 )
 
@@ -37,10 +38,18 @@ B = TypeVar("B", bound="Base")
 class Base:
     """Sends requests."""
 
-    def __init__(self, server: str = "http://127.0.0.1:8080", token: str | None = None) -> None:
+    def __init__(
+        self,
+        server: str = "http://127.0.0.1:8080",
+        token: str | None = None,
+        *,
+        authority: str | PathLike[str] | None = None,
+    ) -> None:
         """A client of the server at this address, with a token of `waymark token create`. Nothing is sent yet.
 
-        Without a token, that of a server on this machine is taken once it is asked for.
+        Without a token, that of a server on this machine is taken once it is asked for. `authority` is a PEM file of
+        who signs the server's certificate, for `https`: the server's administrator has it, `tls/authority.pem` in the
+        data directory. Without it, the authorities of the system are believed; with it, no other.
         """
         self._base = server.rstrip("/")
         self._token = token
@@ -49,7 +58,9 @@ class Base:
         self._revision: str | None = None
         self._why: str | None = None
         # Ignores proxies of the environment: the server is in the robot's own network.
-        self._http = httpx.Client(base_url=self._base, timeout=TIMEOUT_S, trust_env=False)
+        self._http = httpx.Client(
+            base_url=self._base, timeout=TIMEOUT_S, trust_env=False, verify=trusted(self._base, authority)
+        )
 
     def with_idempotency_key(self: B, key: str) -> B:
         """The same with this key for its next creation, in place of a fresh one: a program that repeats a creation by

@@ -138,8 +138,8 @@ class Maps(Base):
         return self._send(Commit, "commit", map, commit)
 
     def difference(self, map: str, since: int, to: int | None = None, *, cursor: str | None = None) -> Difference:
-        """What differs between a map at the commit `since` and at a later one, or now. `landmarks.next` is the cursor of
-        the next page of landmarks."""
+        """What differs between a map at the commit `since` and at a later one, or now. `landmarks.next` is the cursor
+        of the next page of landmarks."""
         query = {"from": since, **present(to=to, cursor=cursor)}
         return self._send(Difference, "difference", map, params=query)
 
