@@ -22,6 +22,9 @@ struct Arguments {
     /// The robot's name; `PUT /api/v1/robots/ROBOT {"map": ...}` makes it known.
     #[arg(long, default_value = "r1")]
     robot: String,
+    /// The file robot.json of `waymark robot enrol`, for an encrypted server: in place of the other three.
+    #[arg(long)]
+    robot_file: Option<PathBuf>,
     /// JPEG or PNG files.
     #[arg(required = true)]
     images: Vec<PathBuf>,
@@ -31,10 +34,11 @@ struct Arguments {
 async fn main() -> Result<(), anyhow::Error> {
     let arguments = Arguments::parse();
     // Every photograph counts here, so wait for a full link. A driving robot keeps `Delivery::Latest`.
-    let options = RobotOptions {
-        delivery: Delivery::Every,
-        ..RobotOptions::new(&arguments.endpoint, &arguments.fleet, &arguments.robot)
+    let options = match &arguments.robot_file {
+        Some(file) => RobotOptions::from_file(file)?,
+        None => RobotOptions::new(&arguments.endpoint, &arguments.fleet, &arguments.robot),
     };
+    let options = RobotOptions { delivery: Delivery::Every, ..options };
     let robot = RobotClient::connect(&options).await?;
     let count = arguments.images.len();
     for (i, path) in arguments.images.iter().enumerate() {

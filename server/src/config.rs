@@ -4,6 +4,7 @@
 //! Precedence, weakest first: defaults, TOML file, `WAYMARK_...` variables (`WAYMARK_LIMITS__FRAME_BYTES=100000`),
 //! command line.
 
+mod addresses;
 mod backup;
 mod ros2;
 mod tls;
@@ -16,6 +17,7 @@ pub use ros2::{
 };
 pub use tls::{MAX_TLS_NAMES, OwnCertificate, RawTls, Tls};
 
+use addresses::{is_loopback, zenoh_address, zenoh_endpoint};
 use engine::decode::ImageLimits;
 use figment::{
     Figment,
@@ -25,7 +27,7 @@ use protos::Name;
 use serde::{Deserialize, Serialize};
 use std::{
     borrow::Cow,
-    net::{IpAddr, SocketAddr},
+    net::SocketAddr,
     path::{Path, PathBuf},
     sync::Arc,
 };
@@ -378,28 +380,6 @@ impl Default for Config {
 
 fn invalid(field: impl Into<Cow<'static, str>>, reason: String) -> ConfigError {
     ConfigError::Invalid { field: field.into(), reason }
-}
-
-fn is_loopback(ip: IpAddr) -> bool {
-    ip.to_canonical().is_loopback()
-}
-
-/// Where robots connect if the settings do not say.
-fn zenoh_endpoint(asked: String, is_tls: bool) -> String {
-    let default = if is_tls { "tls/127.0.0.1:7447" } else { "tcp/127.0.0.1:7447" };
-    if asked.is_empty() { default.to_owned() } else { asked }
-}
-
-/// Whether it encrypts, and its address. Only `tcp/IP:PORT` and `tls/IP:PORT`: a host name could resolve to anything,
-/// and the other transports are not compiled in.
-fn zenoh_address(field: &'static str, endpoint: &str) -> Result<(bool, SocketAddr), ConfigError> {
-    let parts = endpoint.split_once('/').filter(|(protocol, _)| ["tcp", "tls"].contains(protocol));
-    let parsed = parts.and_then(|(protocol, rest)| Some((protocol == "tls", rest.parse().ok()?)));
-    parsed.ok_or_else(|| {
-        let reason =
-            format!("`{endpoint}` is not tcp/ADDRESS:PORT or tls/ADDRESS:PORT with a numeric address");
-        invalid(field, reason)
-    })
 }
 
 #[cfg(test)]

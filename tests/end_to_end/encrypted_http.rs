@@ -115,7 +115,7 @@ async fn commands_keep_token_and_authority_of_a_server() {
     assert!(status == 3 && said.contains("/nowhere"), "{status} {said}");
     // On the server's machine nothing is to be given.
     let plain = inside.url();
-    assert_eq!(waymark(&["map", "list", "--server", &plain], tests::SOON).status, 0);
+    assert_eq!(waymark(["map", "list", "--server", &plain], tests::SOON).status, 0);
     inside.server.stop().await;
 }
 

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 use std::{path::Path, process::Command};
-use tests::{documents::markdown, guide_files, guides};
+use tests::{documents::markdown, guide_files, guides, machines, skipped};
 
 /// Guides that are run by tests of another part.
 const ELSEWHERE: [(&str, &str); 1] = [("python", "client/python/tests/test_guide.py")];
@@ -91,6 +91,40 @@ fn the_commands_of_take_a_change_back_work() {
 #[test]
 fn the_commands_of_deploy_work() {
     run("deploy");
+}
+
+#[test]
+fn deploy_secures_a_server_and_connects_the_robot_of_a_second_machine() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let [mut server, mut robot] = match machines::pair(folder.path(), ["192.168.1.4", "192.168.1.20"]) {
+        Ok(pair) => pair,
+        Err(reason) => return skipped(&format!("no network namespaces: {reason}")),
+    };
+    guide_files::write(robot.folder());
+    let guide = markdown("docs/guides").into_iter().find(|g| g.ends_with("deploy.md")).expect("a guide");
+    let text = std::fs::read_to_string(guide).expect("UTF-8");
+    let mut answers = Vec::new();
+    for (machine, commands, status) in machines::blocks_for(&text, ["server", "robot"]) {
+        let last = commands.len().saturating_sub(1);
+        for (i, command) in commands.iter().enumerate() {
+            let (ended, said) = [&mut server, &mut robot][machine].run(command);
+            let wanted = if i == last { status } else { 0 };
+            assert_eq!(ended, wanted, "`{command}` said\n{said}");
+            if command.starts_with("cargo run") {
+                answers.push(said);
+            }
+        }
+    }
+    assert!(answers.len() == 2 && answers[0].contains("poster with confidence"), "{answers:?}");
+    assert!(answers[1].contains("certificate"), "{answers:?}");
+    // What the page forbids: plain text, and no certificate.
+    let asks =
+        r#"exec 3<>/dev/tcp/192.168.1.4/8080; printf 'GET / HTTP/1.1\r\nHost: x\r\n\r\n' >&3; head -n1 <&3"#;
+    let (_, plain) = robot.run(&format!("bash -c \"{asks}\""));
+    assert!(plain.contains(" 426 "), "{plain}");
+    let program = "\"$TESTED_PROGRAMS\"/examples/01_recognise --endpoint tcp/192.168.1.4:7447 here.jpg";
+    let (status, said) = robot.run(program);
+    assert!(status == 1 && said.contains("no server reachable"), "{status} {said}");
 }
 
 #[test]

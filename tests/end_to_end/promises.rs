@@ -14,8 +14,9 @@ fn tests_in(folder: &Path, found: &mut BTreeSet<String>) {
             }
             continue;
         }
-        let is_python = name.starts_with("test_") && name.ends_with(".py");
-        if !is_python && !name.ends_with(".rs") {
+        let kind = path.extension().and_then(|kind| kind.to_str());
+        let is_python = name.starts_with("test_") && kind == Some("py");
+        if !is_python && kind != Some("rs") {
             continue;
         }
         let text = fs::read_to_string(&path).expect("UTF-8");

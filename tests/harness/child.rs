@@ -55,6 +55,9 @@ impl Child {
             rest.trim().trim_end_matches('/').to_owned()
         };
         let (url, zenoh) = (after("pages"), after("robots"));
+        // With TLS the address is that for other machines; this one is served in plain text.
+        let port = url.strip_prefix("https://").and_then(|rest| rest.rsplit(':').next());
+        let url = port.map_or(url.clone(), |port| format!("http://127.0.0.1:{port}"));
         Self { process, url, zenoh }
     }
 

@@ -91,7 +91,7 @@ pub fn blocks(text: &str) -> Vec<Block> {
     found
 }
 
-fn commands(body: &str) -> Vec<String> {
+pub(crate) fn commands(body: &str) -> Vec<String> {
     let joined = body.replace("\\\n", " ");
     let is_command = |l: &&str| !l.is_empty() && !l.starts_with('#');
     joined.lines().map(str::trim).filter(is_command).map(str::to_owned).collect()
@@ -156,16 +156,7 @@ impl Drop for Server {
 
 impl Guide {
     fn new(folder: &Path) -> Self {
-        let tools = folder.join(".tools");
-        fs::create_dir_all(&tools).expect("a folder");
-        let cargo = tools.join("cargo");
-        fs::write(&cargo, CARGO).expect("a script");
-        #[cfg(unix)]
-        fs::set_permissions(&cargo, std::os::unix::fs::PermissionsExt::from_mode(0o755)).expect("executable");
-        let programs = program().parent().expect("its folder");
-        let inherited = std::env::var("PATH").unwrap_or_default();
-        let path = format!("{}:{}:{inherited}", tools.display(), programs.display());
-        Self { folder: folder.to_owned(), path, server: None }
+        Self { folder: folder.to_owned(), path: path_with(folder, &[("cargo", CARGO)]), server: None }
     }
 
     /// Address of the server that the guide started.
@@ -232,11 +223,27 @@ impl Guide {
     }
 }
 
+/// `PATH` with scripts in place of programs, then the programs of this build, then what there is.
+pub(crate) fn path_with(folder: &Path, scripts: &[(&str, &str)]) -> String {
+    let tools = folder.join(".tools");
+    fs::create_dir_all(&tools).expect("a folder");
+    for (name, text) in scripts {
+        let script = tools.join(name);
+        fs::write(&script, text).expect("a script");
+        #[cfg(unix)]
+        fs::set_permissions(&script, std::os::unix::fs::PermissionsExt::from_mode(0o755))
+            .expect("executable");
+    }
+    let programs = program().parent().expect("its folder");
+    let inherited = std::env::var("PATH").unwrap_or_default();
+    format!("{}:{}:{inherited}", tools.display(), programs.display())
+}
+
 /// Longest run of one command.
 const LONGEST: Duration = Duration::from_mins(10);
 
 /// Stands for cargo: examples of this build are run, nothing is installed.
-const CARGO: &str = r#"#!/usr/bin/env bash
+pub(crate) const CARGO: &str = r#"#!/usr/bin/env bash
 set -euo pipefail
 case "$1" in
 install)

@@ -7,6 +7,7 @@ pub mod command;
 pub mod documents;
 pub mod guide_files;
 pub mod guides;
+pub mod machines;
 mod open_data;
 pub mod pictures;
 pub mod robots;

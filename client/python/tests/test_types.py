@@ -19,7 +19,7 @@ from conftest import Server
 
 import waymark
 from waymark import Capture, Image, Intrinsics, InvalidInput, Pose2, Pose2Covariance, Pose3, Unexpected, api, wire
-from waymark._http import EventParser, live_event
+from waymark._events import EventParser, live_event
 from waymark._link import frame_bytes
 from waymark._values import MismatchError, fill, from_json, from_message, given, to_json
 from waymark.v1 import waymark_pb2 as pb

@@ -1,6 +1,10 @@
 //! Settings of encryption. In: names and paths of files. Out: checked names, and which files are the operator's own.
 
-use super::{ConfigError, invalid, is_loopback, zenoh_address};
+use super::{
+    ConfigError,
+    addresses::{is_loopback, zenoh_address},
+    invalid,
+};
 use serde::{Deserialize, Serialize};
 use std::{net::IpAddr, path::PathBuf};
 

@@ -31,12 +31,12 @@ const FILES: &[(&str, &str)] = files![
     "0017_tokens",
     "0018_idempotency",
     "0019_revisions",
+    "0020_robot_certificates",
     "0021_model_contents",
     "0022_history",
     "0023_commits",
-    "0030_audit",
     "0025_stored_answers",
-    "0020_robot_certificates",
+    "0030_audit",
 ];
 
 /// The steps in order.

@@ -39,8 +39,16 @@ fn every_key(robot: &str, map: &str) -> Vec<Key> {
     ];
     for key in &all {
         match key {
-            Key::Frame(..) | Key::Answer(..) | Key::Odometry(_) | Key::Scan(_) | Key::Pose(_) => {}
-            Key::Alive(..) | Key::Gaze(_) | Key::Hello(_) | Key::MapChanged(_) | Key::MapVersion(_) => {}
+            Key::Frame(..)
+            | Key::Answer(..)
+            | Key::Odometry(_)
+            | Key::Scan(_)
+            | Key::Pose(_)
+            | Key::Alive(..)
+            | Key::Gaze(_)
+            | Key::Hello(_)
+            | Key::MapChanged(_)
+            | Key::MapVersion(_) => {}
         }
     }
     all

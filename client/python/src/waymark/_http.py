@@ -6,10 +6,10 @@ import json
 import math
 import ssl
 import uuid
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from os import PathLike
-from typing import Any, Generic, Literal, TypeAlias, TypeVar, get_args
+from typing import Any, Generic, Literal, TypeAlias, TypeVar
 from urllib.parse import quote
 
 import httpx
@@ -17,16 +17,7 @@ import httpx
 from waymark._values import MismatchError, from_json, to_json
 from waymark.api import (
     CaptureMetadata,
-    EventKind,
     Job,
-    LiveAnswer,
-    LiveEvent,
-    LiveMapChange,
-    LiveMissed,
-    LivePose,
-    LivePosition,
-    LivePresence,
-    ServerEvent,
     Size,
 )
 from waymark.errors import InvalidInput, JobFailed, Refused, Unexpected, Unreachable, Untrusted, WaymarkError
@@ -37,8 +28,6 @@ T = TypeVar("T")
 
 # Longest wait for one request, and longest silence of a stream, in seconds; the server sends something every 15 s.
 TIMEOUT_S = 60.0
-# Largest event, in bytes.
-MAX_EVENT_BYTES = 4 << 20
 # Period of polling a job, in seconds.
 JOB_POLL_S = 0.2
 
@@ -189,16 +178,6 @@ PAUSE_S = 0.25
 MAX_PAUSE_S = 5.0
 # First pause before a stream is connected again; it doubles with each that fails, in seconds.
 FIRST_PAUSE_S = 0.25
-
-_EVENTS: dict[str, Any] = {
-    "answer": LiveAnswer,
-    "pose": LivePose,
-    "odometry": LivePosition,
-    "truth": LivePosition,
-    "presence": LivePresence,
-    "map_changed": LiveMapChange,
-    "missed": LiveMissed,
-}
 
 
 def request_of(call: str, at: Sequence[str | int]) -> tuple[str, str]:
@@ -372,25 +351,6 @@ def localise_parts(
     return {"files": files | (picture_part(image) if image is not None else {})}
 
 
-def live_event(name: str, data: str) -> LiveEvent | None:
-    """An event of a map; `None` for one that a newer server may send and is not known here."""
-    kind = _EVENTS.get(name)
-    if kind is None:
-        return None
-    value = json.loads(data)
-    if kind is LiveMissed:
-        return LiveMissed(int(value))
-    if kind is LivePosition:
-        value["source"] = name
-    event: LiveEvent = from_json(kind, value)
-    return event
-
-
-def server_event(name: str, value: Any) -> ServerEvent | None:
-    """An event of the server; `None` for the first of a connection, and for one that only a newer server sends."""
-    return from_json(ServerEvent, value) if name == "reset" or name in get_args(EventKind) else None
-
-
 def is_passing(error: WaymarkError) -> bool:
     """Whether another connection is worth a try."""
     return isinstance(error, Unreachable) or (isinstance(error, Refused) and error.status in (408, 503))
@@ -401,30 +361,3 @@ def job_ended(job: Job) -> bool:
     if job.state in ("failed", "cancelled"):
         raise JobFailed(f"job {job.id} {job.state}: {job.message}", code=f"job_{job.state}")
     return job.state == "done"
-
-
-class EventParser:
-    """Cuts a stream of lines into events: name and data."""
-
-    def __init__(self) -> None:
-        self._names: list[str] = []
-        self._data: list[str] = []
-        self._bytes = 0
-
-    def push(self, line: str) -> Iterator[tuple[str, str]]:
-        """Takes a line without its end; yields the event that it ends. Comments are skipped."""
-        if line:
-            self._bytes += len(line)
-            if self._bytes > MAX_EVENT_BYTES:
-                raise Unexpected(f"an event of more than {MAX_EVENT_BYTES} bytes")
-            field, _, value = line.partition(":")
-            value = value.removeprefix(" ")
-            if field == "event":
-                self._names.append(value)
-            elif field == "data":
-                self._data.append(value)
-            return
-        names, data = self._names, self._data
-        self._names, self._data, self._bytes = [], [], 0
-        if names or data:
-            yield (names[-1] if names else "message", "\n".join(data))

@@ -14,9 +14,9 @@ from typing import Any, Generic, TypeVar
 import httpx
 
 from waymark import _local_token
+from waymark._events import EventParser
 from waymark._http import (
     TIMEOUT_S,
-    EventParser,
     Revised,
     headers_of,
     parsed,

@@ -7,7 +7,8 @@ import json
 from collections.abc import AsyncIterator, Iterable
 
 from waymark._async.base import AsyncBase, AsyncEvents
-from waymark._http import FIRST_PAUSE_S, MAX_PAUSE_S, is_passing, query_of, server_event
+from waymark._events import server_event
+from waymark._http import FIRST_PAUSE_S, MAX_PAUSE_S, is_passing, query_of
 from waymark.api import EventKind, ServerEvent
 from waymark.errors import WaymarkError
 

@@ -6,7 +6,8 @@ from collections.abc import Iterable
 from os import PathLike
 
 from waymark._async.base import AsyncBase, AsyncEvents, AsyncStream
-from waymark._http import Revised, live_event, picture_part
+from waymark._events import live_event
+from waymark._http import Revised, picture_part
 from waymark._values import UNSET, Unset, given, present, to_json
 from waymark.api import (
     Backup,

@@ -7,7 +7,8 @@ import json
 import time
 from collections.abc import Iterable, Iterator
 
-from waymark._http import FIRST_PAUSE_S, MAX_PAUSE_S, is_passing, query_of, server_event
+from waymark._events import server_event
+from waymark._http import FIRST_PAUSE_S, MAX_PAUSE_S, is_passing, query_of
 from waymark._sync.base import Base, Events
 from waymark.api import EventKind, ServerEvent
 from waymark.errors import WaymarkError
