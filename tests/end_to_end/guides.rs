@@ -119,7 +119,7 @@ fn deploy_secures_a_server_and_connects_the_robot_of_a_second_machine() {
     assert!(answers[1].contains("certificate"), "{answers:?}");
     // What the page forbids: plain text, and no certificate.
     let asks =
-        r#"exec 3<>/dev/tcp/192.168.1.4/8080; printf 'GET / HTTP/1.1\r\nHost: x\r\n\r\n' >&3; head -n1 <&3"#;
+        r"exec 3<>/dev/tcp/192.168.1.4/8080; printf 'GET / HTTP/1.1\r\nHost: x\r\n\r\n' >&3; head -n1 <&3";
     let (_, plain) = robot.run(&format!("bash -c \"{asks}\""));
     assert!(plain.contains(" 426 "), "{plain}");
     let program = "\"$TESTED_PROGRAMS\"/examples/01_recognise --endpoint tcp/192.168.1.4:7447 here.jpg";

@@ -55,7 +55,7 @@ pub fn pair(within: &Path, addresses: [&str; 2]) -> Result<[Machine; 2], String>
     });
     // Namespaces that were made go with their machines, also where the next one fails.
     let made = made.collect::<Result<Vec<_>, String>>()?;
-    let [a, b] = <[Machine; 2]>::try_from(made).map_err(|_| "there are two".to_owned())?;
+    let [a, b] = <[Machine; 2]>::try_from(made).map_err(|_other| "there are two".to_owned())?;
     ip(&format!("link add eth0 netns {} type veth peer name eth0 netns {}", a.namespace, b.namespace))?;
     for (machine, address) in [&a, &b].into_iter().zip(addresses) {
         let namespace = &machine.namespace;
@@ -97,7 +97,7 @@ impl Machine {
         let lines = BufReader::new(server.stdout.take().expect("its output")).lines();
         let said: Vec<String> = lines.take(4).map(|line| line.expect("a line")).collect();
         self.servers.push(server);
-        (if said.len() == 4 { 0 } else { 1 }, said.join("\n"))
+        (i32::from(said.len() != 4), said.join("\n"))
     }
 }
 

@@ -67,7 +67,7 @@ pub(super) fn refusing() -> Router {
     Router::new().fallback(async || {
         let detail = "this server is encrypted: ask for https:// in place of http://. What was sent could be read on the \
                       way: revoke a token that was in it";
-        ApiError::new(StatusCode::UPGRADE_REQUIRED, "not_encrypted", detail)
+        ApiError::new(StatusCode::UPGRADE_REQUIRED, "encryption_required", detail)
     })
 }
 
