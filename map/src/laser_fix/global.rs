@@ -14,7 +14,7 @@ use crate::{
 use nalgebra::{Point2, Vector2};
 use std::f64::consts::TAU;
 
-/// Most positions of the grid; a larger map has a coarser grid, up to [`MAX_STEP_M`].
+/// Most positions of the grid; a larger map has a coarser grid, up to `MAX_STEP_M`.
 pub const MAX_POSITIONS: usize = 40_000;
 /// Most poses that are returned.
 pub const MAX_POSES: usize = 16;
