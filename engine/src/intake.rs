@@ -47,6 +47,9 @@ pub struct Intake {
     pub frame_bytes: usize,
     /// Deadline of frames that name none.
     pub deadline: Duration,
+    /// Whether robots are tied to certificates. Then a frame may name the robot's map and maps linked with it alone; others
+    /// look as if they did not exist.
+    pub linked_maps_only: bool,
 }
 
 impl Intake {
@@ -86,9 +89,12 @@ impl Intake {
         };
         let frame = CheckedFrame::try_from(frame)?;
         self.motion.epochs().admit(&key.robot, frame.epoch, received)?;
-        let map = frame.map.as_ref().map_or(robot_map, ToString::to_string);
+        let map = frame.map.as_ref().map_or_else(|| robot_map.clone(), ToString::to_string);
         echo.map.clone_from(&map);
-        if self.snapshots.get(&map).is_none() {
+        let is_open = || {
+            !self.linked_maps_only || map == robot_map || self.snapshots.relation(&robot_map, &map).is_some()
+        };
+        if self.snapshots.get(&map).is_none() || !is_open() {
             return Err(unknown_map(&map));
         }
         let wait = frame.deadline_ms.map_or(self.deadline, |ms| Duration::from_millis(u64::from(ms)));
@@ -118,6 +124,10 @@ fn clock_suspect(captured_ns: i64) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use map::{
+        map_links::MapLink,
+        pose2::{Pose2, Pose2Covariance},
+    };
     use protos::Name;
 
     fn intake() -> Intake {
@@ -127,7 +137,8 @@ mod tests {
         snapshots.set_robot("lost", Some("gone"));
         let slots = Arc::new(Slots::new(4));
         let motion = Arc::new(MotionTracker::new(snapshots.clone(), Arc::default()));
-        Intake { slots, snapshots, motion, frame_bytes: 1000, deadline: Duration::from_millis(500) }
+        let deadline = Duration::from_millis(500);
+        Intake { slots, snapshots, motion, frame_bytes: 1000, deadline, linked_maps_only: false }
     }
 
     fn key(robot: &str) -> SlotKey {
@@ -154,6 +165,31 @@ mod tests {
         assert_eq!(answer.status(), v1::Status::Rejected);
         let r = answer.rejection.unwrap();
         (r.code, r.field, answer.seq)
+    }
+
+    #[test]
+    fn a_robot_with_a_certificate_names_maps_that_are_linked_with_its_own() {
+        let mut intake = intake();
+        for name in ["annex", "yard"] {
+            intake.snapshots.publish(Arc::new(crate::snapshot::MapSnapshot::empty(name, 3)));
+        }
+        let covariance = nalgebra::Matrix3::identity() * 1e-4;
+        let parent_from_map = Pose2Covariance { pose: Pose2::default(), covariance };
+        let link = MapLink { parent: "hall".to_owned(), parent_from_map, level_m: 0.0 };
+        intake.snapshots.set_links([("annex".to_owned(), link)].into());
+        let mut seq = 0;
+        let mut asks = |intake: &Intake, map: &str| {
+            seq += 1;
+            let asked = v1::Frame { map: map.into(), ..frame(seq) };
+            intake.receive(key("r1"), asked.encode_to_vec().into())
+        };
+        assert!(["hall", "annex", "yard"].into_iter().all(|map| asks(&intake, map).is_ok()));
+        intake.linked_maps_only = true;
+        assert!(["hall", "annex", ""].into_iter().all(|map| asks(&intake, map).is_ok()));
+        let foreign = asks(&intake, "yard").unwrap_err().rejection.unwrap();
+        let missing = asks(&intake, "nowhere").unwrap_err().rejection.unwrap();
+        assert_eq!((foreign.code, foreign.field), (missing.code, missing.field));
+        assert_eq!(foreign.detail.replace("yard", "nowhere"), missing.detail);
     }
 
     #[test]

@@ -315,6 +315,7 @@ fn receivers(config: &Config, engine: &Engine, certificates: Option<Arc<Certific
         motion: engine.motion.clone(),
         frame_bytes: config.limits.frame_bytes,
         deadline: Duration::from_millis(u64::from(config.limits.frame_deadline_ms)),
+        linked_maps_only: certificates.is_some(),
     };
     Receivers {
         intake: Arc::new(intake),

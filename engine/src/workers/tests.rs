@@ -21,7 +21,8 @@ impl Publish for Sent {
 
 fn intake(engine: &Engine, deadline: Duration) -> Intake {
     let (slots, snapshots) = (engine.slots.clone(), engine.snapshots.clone());
-    Intake { slots, snapshots, motion: engine.motion.clone(), frame_bytes: 100_000, deadline }
+    let motion = engine.motion.clone();
+    Intake { slots, snapshots, motion, frame_bytes: 100_000, deadline, linked_maps_only: false }
 }
 
 fn key(camera: usize) -> SlotKey {

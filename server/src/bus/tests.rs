@@ -30,6 +30,7 @@ async fn running(engine: Engine, workers: usize) -> Running {
         motion: engine.motion.clone(),
         frame_bytes: config.limits.frame_bytes,
         deadline: Duration::from_secs(30),
+        linked_maps_only: false,
     });
     let to = Receivers {
         intake,
