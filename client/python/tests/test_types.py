@@ -46,6 +46,8 @@ NOT_DESCRIBED = {
     "TrajectoriesBody",
     # A page.
     "LandmarkDifferencePage",
+    # A page, which has another name there.
+    "LandmarkDifferencePage",
     # A part of a form; one of several forms.
     "CaptureMetadata",
     "FindingBody",

@@ -61,7 +61,7 @@ fn add_errors(operation: &mut Operation, is_changing: bool) {
         let RefOr::T(p) = p else { continue };
         match p.name.as_str() {
             "limit" => errors.push(("422", "out_of_range")),
-            "cursor" => errors.push(("422", "invalid_value")),
+            "cursor" | "Waymark-Why" => errors.push(("422", "invalid_value")),
             "Idempotency-Key" => {
                 errors.extend([("409", "in_progress"), ("422", "idempotency_key_reused, invalid_value")]);
             }

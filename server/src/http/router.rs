@@ -28,7 +28,7 @@ use utoipa_swagger_ui::SwaggerUi;
 
 #[derive(OpenApi)]
 #[openapi(
-    components(schemas(protos::api::ListOrder, protos::api::NumberOrder)),
+    components(schemas(protos::api::LandmarkDifference, protos::api::ListOrder, protos::api::NumberOrder)),
     info(
         title = "Waymark",
         description = "Maps, landmarks, lessons and robots. Errors are application/problem+json with a stable `code` and \
