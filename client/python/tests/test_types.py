@@ -46,8 +46,6 @@ NOT_DESCRIBED = {
     "TrajectoriesBody",
     # A page.
     "LandmarkDifferencePage",
-    # A page, which has another name there.
-    "LandmarkDifferencePage",
     # A part of a form; one of several forms.
     "CaptureMetadata",
     "FindingBody",
