@@ -31,6 +31,10 @@ Teach a first landmark from a photograph of a picture on a wall:
 Commands and SDKs of the same user on the same machine find the token that `serve` writes to local-token in its data
 directory. `waymark open` prints a link that opens the page; `waymark token create` makes tokens for others.
 
+For other machines, encrypted, with a certificate for each robot (`waymark robot enrol`):
+
+  waymark serve --tls --tls-name 192.168.1.4 --http 0.0.0.0:8080 --zenoh tls/0.0.0.0:7447
+
 Runs until Ctrl-C or SIGTERM. If a part of it ends by itself, /readyz answers 503 with its name and the program ends with
 an error: start it again, and it goes on from what is on the disk.
 
