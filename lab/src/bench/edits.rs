@@ -1,49 +1,38 @@
-//! Latency of one change of a large map over HTTP, until the server acknowledges it: a landmark moved, a landmark
-//! quarantined, a lesson. Derived data that follows later is timed apart.
+//! Latency of one change of a large map over HTTP, until the server acknowledges it, while a robot's frames are answered: a
+//! landmark moved, a landmark quarantined, a lesson. Derived data that follows later is timed apart. Then how long it takes
+//! to make as many landmarks once more, one request at a time and in one request.
 
-use super::recognise::landmarks::models;
+mod large_map;
+
 use crate::evaluate::statistics::quantile;
 use anyhow::Context as _;
 use cli::{pictures, scratch, screen};
 use client::{
-    LandmarkRegion, MapClient,
-    api::{NewMap, Place, WallsBody},
+    Capture, LandmarkRegion, MapClient, RobotClient, RobotOptions,
+    api::{NewLandmark, NewMap},
 };
+use large_map::{FIRST_POSTER, fill, picture, place, settings, walls};
 use reqwest::header::{AUTHORIZATION, HeaderMap};
 use serde::Serialize;
 use serde_json::{Value, json};
-use server::{
-    Server,
-    config::{Config, RawConfig},
-};
-use sha2::{Digest as _, Sha256};
-use sim::posters::poster_of_size;
-use sqlx::{Connection as _, SqliteConnection, sqlite::SqliteConnectOptions};
+use server::Server;
 use std::{
-    path::Path,
+    sync::atomic::{AtomicBool, Ordering},
     time::{Duration, Instant},
 };
-use vision::{frame::GrayImage, model::LandmarkModel, params::Params};
+use vision::frame::GrayImage;
 
 const MAP: &str = "large";
-/// Width of a taught poster, in pixels; latencies do not depend on it.
-const POSTER_PX: usize = 240;
-/// One poster in so many is on the map twice, so that the map has look-alikes.
-const LOOK_ALIKE_EVERY: usize = 20;
-/// Posters with a lesson of their own; the others use their thresholds.
-const TAUGHT: usize = 20;
-/// Number of the first poster.
-const FIRST_POSTER: u64 = 40_000;
-/// The server's database in its data directory.
-const DATABASE: &str = "waymark.sqlite";
-const LANDMARK: &str = "INSERT INTO landmarks (id, map_id, name, width_m, height_m, x_m, y_m, z_m, theta_rad, created_ms) \
-                        SELECT ?1, id, ?3, 0.6, 0.84, ?4, ?5, ?6, ?7, 0 FROM maps WHERE name = ?2";
-const MODEL: &str = "INSERT INTO models (landmark_id, sha256, params_hash, model, active, reasons, facts, views, \
-                     generated_views, learnt_ms) VALUES (?1, ?2, ?3, ?4, 1, '[]', '{}', 3, 0, 0)";
-/// Distance of landmarks along their wall, and of one wall from the next, metres.
-const SPACING_M: f64 = 2.0;
-const ROW_M: f64 = 4.0;
-const ROW_LANDMARKS: usize = 50;
+/// Maps on which landmarks are made.
+const ONE_BY_ONE: &str = "one-by-one";
+const AT_ONCE: &str = "at-once";
+/// Most landmarks of one request.
+const BULK: usize = 2000;
+const ROBOT: &str = "bench";
+/// Size of the robot's frames and time between them.
+const FRAME_PX: [usize; 2] = [640, 480];
+const FRAME_EVERY: Duration = Duration::from_millis(250);
+const ANSWER_WAIT: Duration = Duration::from_secs(10);
 /// Longest wait for a lesson.
 const LESSON_TIMEOUT: Duration = Duration::from_hours(1);
 
@@ -56,8 +45,8 @@ pub(super) struct Args {
     /// Wall segments of the map.
     #[arg(long, default_value_t = 20_000, value_parser = clap::value_parser!(u32).range(0..=100_000))]
     walls: u32,
-    /// Changes of each kind.
-    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(3..=1000))]
+    /// Changes of each kind; lessons are a 25th of it.
+    #[arg(long, default_value_t = 200, value_parser = clap::value_parser!(u32).range(3..=1000))]
     changes: u32,
     /// Print one JSON object instead of the table.
     #[arg(long)]
@@ -70,14 +59,16 @@ pub(super) struct Args {
 struct Cost {
     median_ms: f64,
     p90_ms: f64,
+    p99_ms: f64,
     worst_ms: f64,
 }
 
 impl Cost {
     fn of(ms: &mut [f64]) -> Self {
         let worst_ms = ms.iter().copied().fold(0.0, f64::max);
-        let [median_ms, p90_ms] = [0.5, 0.9].map(|share| quantile(ms, share).unwrap_or(worst_ms));
-        Self { median_ms, p90_ms, worst_ms }
+        let [median_ms, p90_ms, p99_ms] =
+            [0.5, 0.9, 0.99].map(|share| quantile(ms, share).unwrap_or(worst_ms));
+        Self { median_ms, p90_ms, p99_ms, worst_ms }
     }
 }
 
@@ -88,9 +79,44 @@ struct Large {
     http: reqwest::Client,
 }
 
+/// What was measured.
+#[derive(Debug, Serialize)]
+struct Measured {
+    landmarks: u32,
+    walls: u32,
+    filled_s: f64,
+    start_ms: f64,
+    /// Frames that were answered meanwhile, and until their answer.
+    frames: usize,
+    costs: Vec<(&'static str, Cost)>,
+    one_by_one_s: f64,
+    at_once_s: f64,
+}
+
 /// Runs the benchmark.
 pub(super) fn run(args: &Args) -> anyhow::Result<()> {
-    tokio::runtime::Builder::new_multi_thread().enable_all().build()?.block_on(measured(args))
+    let measured =
+        tokio::runtime::Builder::new_multi_thread().enable_all().build()?.block_on(measured(args))?;
+    if args.json {
+        screen::say(&serde_json::to_string(&measured)?);
+    } else {
+        show(&measured);
+    }
+    Ok(())
+}
+
+fn show(measured: &Measured) {
+    let Measured { landmarks, walls, filled_s, start_ms, frames, costs, one_by_one_s, at_once_s } = measured;
+    screen::say(&format!(
+        "{landmarks} landmarks, {walls} wall segments (made in {filled_s:.0} s, server ready after {start_ms:.0} ms), \
+         {frames} frames answered meanwhile"
+    ));
+    screen::say("| change | median | 90 % | 99 % | worst |\n|---|---|---|---|---|");
+    for (name, Cost { median_ms, p90_ms, p99_ms, worst_ms }) in costs {
+        screen::say(&format!("| {name} | {median_ms:.1} | {p90_ms:.1} | {p99_ms:.1} | {worst_ms:.1} |"));
+    }
+    screen::say(&format!("{landmarks} landmarks made one request at a time: {one_by_one_s:.1} s"));
+    screen::say(&format!("{landmarks} landmarks made in requests of {BULK}: {at_once_s:.2} s"));
 }
 
 /// A client for requests that the SDK does not make, with its token.
@@ -101,7 +127,7 @@ async fn with_token(maps: &MapClient) -> anyhow::Result<reqwest::Client> {
     Ok(reqwest::Client::builder().tls_certs_only([]).default_headers(headers).build()?)
 }
 
-async fn measured(args: &Args) -> anyhow::Result<()> {
+async fn measured(args: &Args) -> anyhow::Result<Measured> {
     let folder = scratch::Folder::new("edits")?;
     let started = Instant::now();
     fill(folder.path(), args).await?;
@@ -112,53 +138,52 @@ async fn measured(args: &Args) -> anyhow::Result<()> {
     let base = format!("http://{}", server.http_addr);
     let maps = MapClient::new(&base)?;
     let http = with_token(&maps).await?;
+    maps.put_robot(ROBOT, MAP).await?;
+    let robot = RobotClient::connect(&RobotOptions::new(&server.zenoh_endpoint, "default", ROBOT)).await?;
     let large = Large { maps, base, http };
-    let (mut moved, mut settled, mut trusted, mut lessons) = (vec![], vec![], vec![], vec![]);
-    let bar = screen::progress(args.changes as usize, "changing");
-    for i in 0..args.changes as usize {
-        let name = format!("l{}", i * 7 % args.landmarks as usize);
-        let started = Instant::now();
-        let place = json!(place(i * 7 % args.landmarks as usize, 0.3));
-        large.change(&name, &json!({ "place": place })).await?;
-        moved.push(ms(started));
-        large.visible(&name).await?;
-        settled.push(ms(started));
-        let started = Instant::now();
-        large.change(&name, &json!({ "health": if i % 2 == 0 { "quarantined" } else { "sound" } })).await?;
-        trusted.push(ms(started));
-        bar.inc(1);
-    }
-    for i in 0..(args.changes as usize).div_ceil(4) {
-        let name = format!("l{}", i * 11 % args.landmarks as usize);
-        let image = picture(1_000_000 + i);
-        large.maps.upload_view(MAP, &name, pictures::jpeg(&image)?, LandmarkRegion::WholeImage).await?;
-        let started = Instant::now();
-        let job = large.maps.learn(MAP, Some(&[name]), Some(4)).await?;
-        large.maps.wait_for_job(job, LESSON_TIMEOUT, |_| ()).await?;
-        lessons.push(ms(started));
-    }
-    bar.finish_and_clear();
+    let (is_done, mut answered) = (AtomicBool::new(false), Vec::new());
+    let (changed, sent) = tokio::join!(
+        async {
+            let changed = large.changes(args).await;
+            is_done.store(true, Ordering::Relaxed);
+            changed
+        },
+        send_frames(&robot, &is_done, &mut answered)
+    );
+    sent?;
+    let mut costs = changed?;
+    let frames = answered.len();
+    costs.push(("a frame answered meanwhile", Cost::of(&mut answered)));
+    let (one_by_one_s, at_once_s) = large.creations(args).await?;
+    robot.close().await?;
     server.stop().await;
-    let rows = [
-        ("landmark moved", Cost::of(&mut moved)),
-        ("moved, and its visibility area known", Cost::of(&mut settled)),
-        ("landmark quarantined", Cost::of(&mut trusted)),
-        ("lesson of one landmark", Cost::of(&mut lessons)),
-    ];
-    if args.json {
-        let costs: Value = rows.iter().map(|(name, cost)| ((*name).to_owned(), json!(cost))).collect();
-        let head = json!({ "landmarks": args.landmarks, "walls": args.walls, "filled_s": filled_s, "start_ms": start_ms, "costs": costs });
-        screen::say(&head.to_string());
-        return Ok(());
-    }
-    screen::say(&format!(
-        "{} landmarks, {} wall segments (made in {filled_s:.0} s, server ready after {start_ms:.0} ms)",
-        args.landmarks, args.walls
-    ));
-    screen::say("| change | median | 90 % | worst |\n|---|---|---|---|");
-    for (name, cost) in rows {
-        let Cost { median_ms, p90_ms, worst_ms } = cost;
-        screen::say(&format!("| {name} | {median_ms:.1} | {p90_ms:.1} | {worst_ms:.1} |"));
+    let (landmarks, walls) = (args.landmarks, args.walls);
+    Ok(Measured { landmarks, walls, filled_s, start_ms, frames, costs, one_by_one_s, at_once_s })
+}
+
+/// Sends frames until told to end; `answered` gets the time until each answer, ms.
+async fn send_frames(
+    robot: &RobotClient,
+    is_done: &AtomicBool,
+    answered: &mut Vec<f64>,
+) -> anyhow::Result<()> {
+    let [width, height] = FRAME_PX;
+    let poster = picture(FIRST_POSTER as usize);
+    let (left, top) = ((width - poster.width()) / 2, (height.saturating_sub(poster.height())) / 2);
+    let frame = GrayImage::from_fn(width, height, |u, v| match (u.checked_sub(left), v.checked_sub(top)) {
+        (Some(u), Some(v)) if u < poster.width() && v < poster.height() => {
+            poster.data()[v * poster.width() + u]
+        }
+        _ => 200,
+    });
+    let jpeg = pictures::jpeg(&frame)?;
+    let mut due = tokio::time::interval(FRAME_EVERY);
+    while !is_done.load(Ordering::Relaxed) {
+        due.tick().await;
+        let started = Instant::now();
+        let answer = robot.recognise("front", Capture::encoded(jpeg.clone())?, ANSWER_WAIT).await?;
+        anyhow::ensure!(answer.rejection.is_none(), "a frame was refused: {:?}", answer.rejection);
+        answered.push(ms(started));
     }
     Ok(())
 }
@@ -167,73 +192,68 @@ fn ms(started: Instant) -> f64 {
     started.elapsed().as_secs_f64() * 1e3
 }
 
-/// Settings of a server that takes maps of this size.
-fn settings(data: &Path, args: &Args) -> anyhow::Result<Config> {
-    let mut raw = RawConfig {
-        data: data.to_owned(),
-        http: "127.0.0.1:0".to_owned(),
-        zenoh: "tcp/127.0.0.1:0".to_owned(),
-        ..RawConfig::default()
-    };
-    raw.limits.landmarks = raw.limits.landmarks.max(args.landmarks as usize + 1);
-    raw.limits.laser_segments = raw.limits.laser_segments.max(args.walls as usize);
-    Ok(Config::try_from(raw)?)
-}
-
-/// Makes the map: through the server what is small, the models and places straight into its database.
-async fn fill(data: &Path, args: &Args) -> anyhow::Result<()> {
-    let server = Server::start(settings(data, args)?).await?;
-    let maps = MapClient::new(&format!("http://{}", server.http_addr))?;
-    maps.create_map(&NewMap::new(MAP)).await?;
-    maps.set_walls(MAP, &walls(args)).await?;
-    server.stop().await;
-    let (count, threads) = (args.landmarks as usize, std::thread::available_parallelism()?.get());
-    let params = Params::default();
-    let models = models(FIRST_POSTER, count, TAUGHT.min(count), threads, &params)?;
-    let options = SqliteConnectOptions::new().filename(data.join(DATABASE)).foreign_keys(true);
-    let mut db = SqliteConnection::connect_with(&options).await?;
-    let mut tx = db.begin().await?;
-    for (i, model) in models.iter().enumerate() {
-        // Of the posters taught twice, the second has the model of the first.
-        let original = if i % LOOK_ALIKE_EVERY == 1 { &models[i - 1] } else { model };
-        let bytes = LandmarkModel { id: model.id, ..LandmarkModel::clone(original) }.to_bytes();
-        let place = place(i, 0.0);
-        sqlx::query(LANDMARK)
-            .bind(model.id.0 as i64)
-            .bind(MAP)
-            .bind(format!("l{i}"))
-            .bind(place.x_m)
-            .bind(place.y_m)
-            .bind(place.z_m)
-            .bind(place.theta_rad)
-            .execute(&mut *tx)
-            .await?;
-        sqlx::query(MODEL)
-            .bind(model.id.0 as i64)
-            .bind(&Sha256::digest(&bytes)[..])
-            .bind(&params.distance_hash().to_le_bytes()[..])
-            .bind(bytes)
-            .execute(&mut *tx)
-            .await?;
-    }
-    tx.commit().await?;
-    Ok(db.close().await?)
-}
-
-/// A poster that the map does not have yet.
-fn picture(number: usize) -> GrayImage {
-    let texture = poster_of_size(number as u64, POSTER_PX, 1.4);
-    GrayImage::from_fn(texture.width(), texture.height(), |u, v| texture.data()[v * texture.width() + u])
-}
-
-/// Place of landmark `i`: rows of walls along x, all facing y.
-fn place(i: usize, shift_m: f64) -> Place {
-    let (row, column) = (i / ROW_LANDMARKS, i % ROW_LANDMARKS);
-    let (x_m, y_m) = (SPACING_M * column as f64 + shift_m, ROW_M * row as f64);
-    Place { x_m, y_m, z_m: 1.5, theta_rad: std::f64::consts::FRAC_PI_2, ..Place::default() }
-}
-
 impl Large {
+    /// Moves, quarantines and teaches landmarks.
+    async fn changes(&self, args: &Args) -> anyhow::Result<Vec<(&'static str, Cost)>> {
+        let (mut moved, mut settled, mut trusted, mut lessons) = (vec![], vec![], vec![], vec![]);
+        let bar = screen::progress(args.changes as usize, "changing");
+        for i in 0..args.changes as usize {
+            let name = format!("l{}", i * 7 % args.landmarks as usize);
+            let started = Instant::now();
+            let place = json!(place(i * 7 % args.landmarks as usize, 0.3));
+            self.change(&name, &json!({ "place": place })).await?;
+            moved.push(ms(started));
+            self.visible(&name).await?;
+            settled.push(ms(started));
+            let started = Instant::now();
+            self.change(&name, &json!({ "health": if i % 2 == 0 { "quarantined" } else { "sound" } }))
+                .await?;
+            trusted.push(ms(started));
+            bar.inc(1);
+        }
+        bar.finish_and_clear();
+        for i in 0..(args.changes as usize).div_ceil(25) {
+            let name = format!("l{}", i * 11 % args.landmarks as usize);
+            let image = picture(1_000_000 + i);
+            self.maps.upload_view(MAP, &name, pictures::jpeg(&image)?, LandmarkRegion::WholeImage).await?;
+            let started = Instant::now();
+            let job = self.maps.learn(MAP, Some(&[name]), Some(4)).await?;
+            self.maps.wait_for_job(job, LESSON_TIMEOUT, |_| ()).await?;
+            lessons.push(ms(started));
+        }
+        Ok(vec![
+            ("landmark moved", Cost::of(&mut moved)),
+            ("moved, and its visibility area known", Cost::of(&mut settled)),
+            ("landmark quarantined", Cost::of(&mut trusted)),
+            ("lesson of one landmark", Cost::of(&mut lessons)),
+        ])
+    }
+
+    /// Makes as many landmarks on new maps: seconds one by one, and seconds in large requests.
+    async fn creations(&self, args: &Args) -> anyhow::Result<(f64, f64)> {
+        let new = |i: usize| NewLandmark { name: format!("n{i}"), size: None, place: Some(place(i, 0.0)) };
+        let count = args.landmarks as usize;
+        for map in [ONE_BY_ONE, AT_ONCE] {
+            self.maps.create_map(&NewMap::new(map)).await?;
+            self.maps.set_walls(map, &walls(args)).await?;
+        }
+        let bar = screen::progress(count, "making landmarks");
+        let started = Instant::now();
+        for i in 0..count {
+            let NewLandmark { name, size, place } = new(i);
+            self.maps.add_landmark(ONE_BY_ONE, &name, size, place).await?;
+            bar.inc(1);
+        }
+        let one_by_one_s = started.elapsed().as_secs_f64();
+        bar.finish_and_clear();
+        let all: Vec<_> = (0..count).map(new).collect();
+        let started = Instant::now();
+        for part in all.chunks(BULK) {
+            self.maps.add_landmarks(AT_ONCE, part).await?;
+        }
+        Ok((one_by_one_s, started.elapsed().as_secs_f64()))
+    }
+
     async fn change(&self, landmark: &str, changes: &Value) -> anyhow::Result<()> {
         let url = format!("{}/api/v1/maps/{MAP}/landmarks/{landmark}", self.base);
         let answer = self.http.patch(&url).header("if-match", "*").json(changes).send().await?;
@@ -248,17 +268,4 @@ impl Large {
         anyhow::ensure!(answer.status().is_success(), "{url}: {}", answer.text().await.context("an answer")?);
         Ok(())
     }
-}
-
-/// Walls behind the landmarks, cut into as many segments.
-fn walls(args: &Args) -> WallsBody {
-    let rows = (args.landmarks as usize).div_ceil(ROW_LANDMARKS);
-    let pieces = (args.walls as usize).div_ceil(rows);
-    let piece_m = SPACING_M * ROW_LANDMARKS as f64 / pieces as f64;
-    let wall = |i: usize| {
-        let (row, x) = (i / pieces, piece_m * (i % pieces) as f64 - 1.0);
-        let y = ROW_M * row as f64 - 0.02;
-        [[x, y], [x + 0.98 * piece_m, y]]
-    };
-    (0..args.walls as usize).map(wall).collect()
 }

@@ -6,6 +6,7 @@ mod peers;
 pub(crate) use peers::Python;
 mod detect;
 mod edits;
+mod encrypted;
 mod recognise;
 
 /// `waymark-lab bench`.
@@ -36,12 +37,17 @@ enum What {
     /// (through python3, one thread, one index over 1000 landmarks, votes, a homography by RANSAC) gets the same
     /// pictures. Times are processor time.
     Recognise(recognise::Args),
-    /// One change of a large map over HTTP: a landmark moved or quarantined, a lesson.
+    /// One change of a large map over HTTP: a landmark moved or quarantined, a lesson; and many landmarks made.
     ///
     /// A server in this program is taught a map of posters (one in twenty of them twice) with many wall segments;
-    /// then single landmarks are changed and taught again. Times are of the clock, until the server has
-    /// acknowledged the change.
+    /// then single landmarks are changed and taught again, while a robot's frames are answered. Times are of the
+    /// clock, until the server has acknowledged the change.
     Edits(edits::Args),
+    /// A frame and its answer beside an echo of zenoh, and a GET beside a bare handler of axum, all over TLS.
+    ///
+    /// Server, robot and peers run in this program with certificates of one authority. Each frame is sent in turn with
+    /// an echo of the same bytes; times are of the clock, from send to answer. The client of HTTP shares the cores.
+    Encrypted(encrypted::Args),
 }
 
 pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
@@ -50,5 +56,6 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
         Some(What::Detect(args)) => detect::run(args),
         Some(What::Recognise(args)) => recognise::run(args),
         Some(What::Edits(args)) => edits::run(args),
+        Some(What::Encrypted(args)) => encrypted::run(args),
     }
 }

@@ -100,6 +100,7 @@ impl Guide {
         let (pose, mounting) = &self.poses[i];
         let nothing = FrameAnalysis { quads: Vec::new() };
         let view = FrameContext {
+            is_whole: true,
             analysis: &nothing,
             map: &self.map,
             extrinsics: Some(mounting),

@@ -163,6 +163,7 @@ impl Server {
         let extrinsics = wrong.extrinsics(&seen.step.robot_from_camera).ok();
         let image = &seen.frame.image;
         let frame = FrameContext {
+            is_whole: true,
             analysis,
             map,
             extrinsics: extrinsics.as_ref(),
