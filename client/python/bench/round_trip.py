@@ -27,7 +27,7 @@ sys.path.insert(0, str(HERE.parent / "tests"))
 import pictures  # noqa: E402
 
 from waymark import Answer, Capture, Image, MapClient, Robot  # noqa: E402
-from waymark._link import frame_bytes  # noqa: E402
+from waymark._messages import frame_bytes  # noqa: E402
 from waymark._values import from_message  # noqa: E402
 from waymark.v1 import waymark_pb2 as pb  # noqa: E402
 

@@ -136,8 +136,10 @@ def test_a_map_is_made_taught_and_followed(server: Server) -> None:
 def test_changes_of_a_map_arrive(server: Server) -> None:
     async def run() -> None:
         async with AsyncMapClient(server.http) as maps, await connect(server, "nobody") as robot:
-            await maps.create_map("async-changing")
+            present = (await maps.create_map("async-changing")).version
             changes = robot.map_changes("async-changing")
+            first = await changes.get(SOON_S)
+            assert first is not None and first.version == present
             await maps.add_landmark("async-changing", "new")
             changed = await changes.get(SOON_S)
             assert changed is not None and changed.version == await robot.map_version("async-changing")

@@ -104,6 +104,8 @@ def test_maps_are_stored_with_all_their_fields(server: Server) -> None:
     with server.maps() as maps:
         hall(maps, "ground")
         assert maps.walls("ground").segments[1] == WallBody((10.0, 8.0), (0.0, 8.0))
+        known = WallBody((0.0, 0.0), (10.0, 0.0), (1e-6, 0.0, 4e-4))
+        assert maps.set_walls("ground", [known]).segments == (known,) == maps.walls("ground").segments
         parent = Parent("ground", 1.0, 2.0, 0.0, level_m=3.0)
         attic = maps.create_map("attic", distance="hausdorff", parent=parent)
         assert attic.distance == "hausdorff" and attic.parent is not None

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Callable
 
 import numpy as np
 import pictures
@@ -23,6 +24,7 @@ from waymark import (
     NoAnswer,
     Pose2,
     Pose3,
+    Quads,
     Refused,
     Robot,
     RobotPose,
@@ -152,10 +154,73 @@ def test_changes_of_a_map_and_its_version_arrive(server: Server) -> None:
             assert robot.map_version("no-such-map", wait_s=2.0) is None
             with robot.on_map_changed("*", called.append):
                 maps.add_landmark("changing", "new")
+                assert changes.get(SOON_S) == MapChanged("changing", version)
                 changed = changes.get(SOON_S)
-                assert eventually(lambda: any(each.map == "changing" for each in called))
+                assert eventually(lambda: changed in called)
             assert changed is not None and changed.map == "changing" and changed.version > version
             assert robot.map_version("changing") == changed.version
+
+
+def test_who_starts_after_the_last_change_is_told_the_present_version(server: Server) -> None:
+    called: list[MapChanged] = []
+    with server.maps() as maps:
+        version = maps.create_map("late").version
+        maps.create_map("later")
+        maps.put_robot("late-watcher", "late")
+        with connect(server, "late-watcher") as robot, robot.map_changes("late") as changes:
+            assert changes.get(SOON_S) == MapChanged("late", version)
+            with robot.on_map_changed("*", called.append):
+                assert eventually(lambda: {each.map for each in called} >= {"late", "later"})
+                maps.add_landmark("late", "new")
+                newer = changes.get(SOON_S)
+                assert newer is not None and newer.version > version
+                assert eventually(lambda: newer in called)
+            assert changes.get(0.2) is None, "each version once"
+
+
+def test_quads_found_on_board_are_answered_as_the_frame_they_are_of(server: Server, taught: str) -> None:
+    pose = pictures.front(2.2)
+    rgb = pictures.seen_from(pose)
+    found = [pictures.corners_px(pose)]
+    quads = Quads.cut(Image.rgb(rgb), found, intrinsics=pictures.CAMERA, robot_from_camera=MOUNTING)
+    with connect(server, taught) as robot:
+        whole = robot.recognise("front", capture(Image.rgb(rgb)), wait_s=SOON_S)
+        answer = robot.recognise("front", quads, wait_s=SOON_S)
+        assert recognised(answer) == recognised(whole) != []
+        assert answer.map_from_robot is not None and whole.map_from_robot is not None
+        here, there = answer.map_from_robot.pose, whole.map_from_robot.pose
+        assert math.hypot(here.x_m - there.x_m, here.y_m - there.y_m) < 0.1
+        nothing = robot.recognise("front", Quads.cut(Image.rgb(rgb), []), wait_s=SOON_S)
+        assert nothing.status == "no_match" and nothing.quads == ()
+        crooked = Quads.cut(Image.rgb(rgb), [list(reversed(found[0]))])
+        with pytest.raises(Refused) as refused:
+            robot.recognise("front", crooked, wait_s=SOON_S).accepted()
+        assert (refused.value.code, refused.value.field) == ("out_of_range", "quads[0].border.corners")
+    with pytest.raises(InvalidInput, match="raw pixels"):
+        Quads.cut(Image.rgb(rgb).png(), found)
+
+
+def test_a_robot_asks_where_it_is(server: Server, taught: str) -> None:
+    pose = pictures.front(2.2)
+    frame = capture(Image.rgb(pictures.seen_from(pose)))
+    with connect(server, taught) as robot, server.maps() as maps:
+        found = robot.localise(frame, wait_s=SOON_S)
+        assert found.status == "located" and found.map_from_robot is not None and found.reason is None
+        here = found.map_from_robot.pose
+        assert math.hypot(here.x_m - pose.x_m, here.y_m - pose.y_m) < 0.2
+        by_http = maps.localise(found.map, frame.image, pictures.CAMERA, MOUNTING)
+        assert by_http.hypotheses == found.hypotheses
+        scan = Scan((1.0,) * 90, -0.785, 0.0175, 30.0, Pose2())
+        assert robot.localise(scan=scan, wait_s=SOON_S).reason == "few_points"
+        wrong: list[tuple[Callable[[], object], str, str]] = [
+            (lambda: robot.localise(), "missing", "frame"),
+            (lambda: robot.localise(Image.gray(bytes(12), (4, 3))), "missing", "frame.intrinsics"),
+            (lambda: robot.localise(frame, map="no-such-map"), "unknown_map", "map"),
+        ]
+        for asked, code, field in wrong:
+            with pytest.raises(Refused) as refused:
+                asked()
+            assert (refused.value.code, refused.value.field) == (code, field)
 
 
 def test_a_robot_is_alive_while_it_is_connected(server: Server) -> None:

@@ -1,7 +1,8 @@
 """Client of Waymark: landmarks and poses for robots, from their cameras.
 
-`Robot` and `AsyncRobot` are the robot's side, over zenoh: frames, odometry and scans go out, answers and poses come in.
-`MapClient` and `AsyncMapClient` are the teacher's side, over HTTP, with a method for every operation of the API.
+`Robot` and `AsyncRobot` are the robot's side, over zenoh: frames or quads, odometry and scans go out, answers and
+poses come in. `MapClient` and `AsyncMapClient` are the teacher's side, over HTTP, with a method for every operation of
+the API.
 `Image` takes files and NumPy or OpenCV arrays. `waymark.wire` has the messages, `waymark.api` the bodies of the API.
 """
 
@@ -34,6 +35,7 @@ from waymark.errors import (
 )
 from waymark.image import Capture, Image
 from waymark.named import NamedLandmark, named, named_landmarks, quad_corners
+from waymark.quads import FoundQuad, Quads
 from waymark.robot import Inbox, Robot
 from waymark.robot_file import RobotFile
 from waymark.wire import (
@@ -63,6 +65,7 @@ __all__ = [
     "CaptureMetadata",
     "CertificateExpired",
     "Delivery",
+    "FoundQuad",
     "Image",
     "Inbox",
     "Intrinsics",
@@ -83,6 +86,7 @@ __all__ = [
     "Pose2Covariance",
     "Pose3",
     "QuadAnswer",
+    "Quads",
     "Refused",
     "Region",
     "Revised",

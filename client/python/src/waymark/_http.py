@@ -50,6 +50,12 @@ OPERATIONS: dict[str, tuple[str, str]] = {
     "discard_track": ("DELETE", "/maps/{map}/gatherings/{gathering}/tracks/{track}"),
     "track_icon": ("GET", "/maps/{map}/gatherings/{gathering}/tracks/{track}/views/{view}/icon"),
     "accept_tracks": ("POST", "/maps/{map}/gatherings/{gathering}/accept"),
+    "begin_draft": ("POST", "/maps/{map}/drafts"),
+    "drafts": ("GET", "/maps/{map}/drafts"),
+    "discard_draft": ("DELETE", "/maps/{map}/drafts/{draft}"),
+    "draft_difference": ("GET", "/maps/{map}/drafts/{draft}/difference"),
+    "publish_draft": ("POST", "/maps/{map}/drafts/{draft}/publish"),
+    "replay_draft": ("POST", "/maps/{map}/drafts/{draft}/replay"),
     "commits": ("GET", "/maps/{map}/commits"),
     "commit": ("GET", "/maps/{map}/commits/{commit}"),
     "difference": ("GET", "/maps/{map}/difference"),
@@ -87,6 +93,7 @@ OPERATIONS: dict[str, tuple[str, str]] = {
     "cancel_mapping": ("DELETE", "/maps/{map}/mapping"),
     "finish_mapping": ("POST", "/maps/{map}/mapping/finish"),
     "create_map": ("POST", "/maps"),
+    "copy_map": ("POST", "/maps/{map}/copies"),
     "maps": ("GET", "/maps"),
     "map": ("GET", "/maps/{map}"),
     "locate_map": ("PATCH", "/maps/{map}"),
@@ -147,6 +154,8 @@ OPERATIONS: dict[str, tuple[str, str]] = {
 CREATIONS = frozenset(
     {
         "create_map",
+        "copy_map",
+        "begin_draft",
         "add_landmark",
         "add_landmarks",
         "upload_view",
@@ -171,6 +180,7 @@ CHANGES = frozenset(
         "delete_landmark",
         "roll_back",
         "undo_commit",
+        "publish_draft",
     }
 )
 # Pause before a repeat, where the server says none, and the longest, in seconds.

@@ -21,9 +21,12 @@ from typing import Any, Generic, Literal, TypeVar
 import zenoh
 from google.protobuf.message import DecodeError, Message
 
+from waymark._messages import frame_message, localise_request, localise_result
 from waymark._values import fill, from_message
+from waymark.api.localise import LocaliseResult
 from waymark.errors import InvalidInput, NoAnswer, NotAdmitted, TlsRefused, Unexpected, Unreachable
-from waymark.image import Capture, Encoding, Image, Picture, as_image
+from waymark.image import Capture, Picture
+from waymark.quads import Quads
 from waymark.robot_file import RobotFile
 from waymark.v1 import waymark_pb2 as pb
 from waymark.wire import Answer, CameraAnswer, GazeAdvice, GazeRequest, MapChanged, Pose2, RobotPose, Scan
@@ -42,16 +45,13 @@ _DROP_US = 50_000
 # Longest wait for one hello of the server, and time between two questions for it, in seconds.
 _HELLO_WAIT_S = 0.5
 _HELLO_EVERY_S = 0.05
+# A session that was not greeted for so long is opened anew, in seconds.
+_GREETED_S = 2.0
+# Longest wait for the present versions of maps, in seconds.
+_VERSION_WAIT_S = 10.0
 # Longest wait for a connection that only shows whether something listens, in seconds.
 _PROBE_S = 0.5
 _NAME = re.compile(r"[a-z0-9_-]{1,64}")
-_ENCODINGS: dict[Encoding, pb.ImageEncoding] = {
-    "jpeg": pb.IMAGE_ENCODING_JPEG,
-    "png": pb.IMAGE_ENCODING_PNG,
-    "gray8": pb.IMAGE_ENCODING_GRAY8,
-    "rgb8": pb.IMAGE_ENCODING_RGB8,
-    "bgr8": pb.IMAGE_ENCODING_BGR8,
-}
 _log = logging.getLogger("waymark")
 
 
@@ -137,7 +137,7 @@ class Link:
         self.poses: Listeners[RobotPose] = Listeners()
         self._session = _open(endpoint, delivery, timeout_s, file)
         if file is not None:
-            self._greet(timeout_s)
+            self._greet(file, delivery, timeout_s)
         try:
             # Held: dropping them ends subscriptions and token.
             self._held: list[Any] = [
@@ -164,15 +164,28 @@ class Link:
         file.check()
         return cls(file.robot, file.endpoint, file.fleet, delivery, timeout_s, epoch, file)
 
-    def _greet(self, timeout_s: float) -> None:
-        """Waits for the server's answer: with a certificate that gives no access, everything is dropped silently."""
+    def _greet(self, file: RobotFile, delivery: Delivery, timeout_s: float) -> None:
+        """Waits for the server's answer: with a certificate that gives no access, everything is dropped silently.
+
+        A session that is not greeted for two seconds is opened anew: one that met the server's listener as that closed
+        to open again may keep a dead link, or none, for ever."""
         until = time.monotonic() + timeout_s
-        while time.monotonic() < until:
-            for answer in self._session.get(f"{self._own}/rpc/hello", timeout=_HELLO_WAIT_S):
-                if answer.ok is not None:
-                    return
-            time.sleep(_HELLO_EVERY_S)
-        self._session.close()
+        while True:
+            end = min(until, time.monotonic() + _GREETED_S)
+            while time.monotonic() < end:
+                for answer in self._session.get(f"{self._own}/rpc/hello", timeout=_HELLO_WAIT_S):
+                    if answer.ok is not None:
+                        return
+                time.sleep(_HELLO_EVERY_S)
+            self._session.close()
+            left = until - time.monotonic()
+            if left < _HELLO_WAIT_S:
+                break
+            try:
+                self._session = _open(self.endpoint, delivery, left, file)
+            except (TlsRefused, Unreachable):
+                # The server was there and silent: that says more than that the rest was too short for one more link.
+                break
         raise NotAdmitted(
             f"the server at {self.endpoint} takes no messages of robot {self.robot} with this certificate"
         )
@@ -193,15 +206,27 @@ class Link:
             self.poses.call(pose)
 
     def on_map_changed(self, map: str, listener: Listener[MapChanged]) -> Subscription:
-        """Calls `listener` with every new version of a map; `*` stands for all maps."""
+        """Calls `listener` with the present version of a map, and with every new one; `*` stands for all maps."""
+        # A change that comes before the present version is newer.
+        heard: set[str] = set()
+        one_by_one = threading.Lock()
 
-        def call(sample: zenoh.Sample) -> None:
+        def tell(sample: zenoh.Sample, is_change: bool) -> None:
             changed = _decoded(MapChanged, pb.MapChanged(), sample)
-            if changed is not None:
-                listener(changed)
+            with one_by_one:
+                if changed is not None and (is_change or changed.map not in heard):
+                    heard.add(changed.map)
+                    listener(changed)
+
+        def present(reply: zenoh.Reply) -> None:
+            if reply.ok is not None:
+                tell(reply.ok, False)
 
         which = map if map == "*" else name("map", map)
-        subscriber = self._session.declare_subscriber(f"{self._maps}/{which}/changed", call)
+        # Before the question, so that no change is lost between.
+        key = f"{self._maps}/{which}"
+        subscriber = self._session.declare_subscriber(f"{key}/changed", lambda sample: tell(sample, True))
+        self._session.get(f"{key}/version", present, timeout=_VERSION_WAIT_S)
 
         def undeclare() -> None:
             if not self._session.is_closed():
@@ -213,10 +238,10 @@ class Link:
         """The number of the next message."""
         return next(self._seq)
 
-    def publish_frame(self, camera: str, frame: Capture | Picture, seq: int) -> None:
-        """Sends a frame."""
-        key = f"{self._own}/frame/{name('camera', camera)}"
-        self._put(key, frame_bytes(frame, self.epoch, seq), zenoh.Priority.DATA_LOW)
+    def publish_frame(self, camera: str, frame: Capture | Quads | Picture, seq: int) -> None:
+        """Sends a frame, or the quads of one."""
+        kind, message = frame_message(frame, self.epoch, seq)
+        self._put(f"{self._own}/{kind}/{name('camera', camera)}", message, zenoh.Priority.DATA_LOW)
 
     def publish_odometry(self, odom_from_robot: Pose2, captured_ns: int | None) -> int:
         """Sends odometry, read now or at `captured_ns`."""
@@ -248,6 +273,14 @@ class Link:
         if advice is None:
             raise NoAnswer(f"no gaze advice within {wait_s} s from {self.endpoint}")
         return from_message(GazeAdvice, advice)
+
+    def localise(self, frame: Capture | Picture | None, scan: Scan | None, map: str, wait_s: float) -> LocaliseResult:
+        """Asks where the robot is."""
+        request = localise_request(frame, scan, map, wait_s)
+        reply = self._ask(f"{self._own}/rpc/localise", request, pb.LocaliseReply(), wait_s)
+        if reply is None:
+            raise NoAnswer(f"no localisation within {wait_s} s from {self.endpoint}")
+        return localise_result(reply)
 
     def map_version(self, map: str, wait_s: float) -> int | None:
         """The present version of a map; `None` if the server has no such map."""
@@ -290,38 +323,6 @@ def _close_all() -> None:
     threading.main_thread().join()
     for link in list(_open_links):
         link.close()
-
-
-def frame_bytes(frame: Capture | Picture, epoch: int, seq: int) -> bytes:
-    """The `Frame` message of a frame. The image is copied once, into the message."""
-    capture = frame if isinstance(frame, Capture) else Capture(as_image(frame))
-    image: Image = capture.image
-    message = pb.Frame(
-        epoch=epoch,
-        seq=seq,
-        captured_ns=capture.captured_ns,
-        encoding=_ENCODINGS[image.encoding],
-        width_px=image.width_px,
-        height_px=image.height_px,
-        deadline_ms=capture.deadline_ms,
-        map=capture.map,
-    )
-    for field in ("intrinsics", "robot_from_camera", "odometry", "prior"):
-        value = getattr(capture, field)
-        if value is not None:
-            fill(getattr(message, field), value)
-    # Fields of a message may come in any order: `image` is appended, so that it need not go through the message.
-    tag = pb.Frame.IMAGE_FIELD_NUMBER << 3 | 2
-    return b"".join((message.SerializeToString(), bytes([tag]), _varint(len(image.data)), image.data))
-
-
-def _varint(number: int) -> bytes:
-    out = bytearray()
-    while number > 0x7F:
-        out.append(number & 0x7F | 0x80)
-        number >>= 7
-    out.append(number)
-    return bytes(out)
 
 
 def _decoded(kind: type[T], message: Message, sample: zenoh.Sample) -> T | None:

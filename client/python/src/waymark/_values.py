@@ -192,8 +192,8 @@ def _field_reader(hint: Any, wire: FieldDescriptor) -> _Read:
         kind = typing.get_args(hint)[0] if is_list else hint
         each = _message_reader(kind, wire.message_type.full_name)
     elif wire.enum_type is not None:
-        words = _words(wire.enum_type)
-        each = lambda number: words.get(number, "unspecified")  # noqa: E731
+        known = _words(wire.enum_type)
+        each = lambda number: known.get(number, "unspecified")  # noqa: E731
     if not is_list:
         return each or _same
     if each is None:

@@ -11,8 +11,10 @@ from typing import Any, Generic, TypeVar
 from weakref import WeakSet
 
 from waymark._link import INBOX, Delivery, Link, Listener, Subscription
+from waymark.api.localise import LocaliseResult
 from waymark.errors import NoAnswer
 from waymark.image import Capture, Picture
+from waymark.quads import Quads
 from waymark.robot import matching
 from waymark.robot_file import RobotFile
 from waymark.wire import Answer, CameraAnswer, GazeAdvice, GazeRequest, MapChanged, Pose2, RobotPose, Scan
@@ -128,14 +130,15 @@ class AsyncRobot:
         """Epoch of this start of the robot's software."""
         return self._link.epoch
 
-    async def publish_frame(self, camera: str, frame: Capture | Picture) -> int:
-        """Sends a frame and returns its number."""
+    async def publish_frame(self, camera: str, frame: Capture | Quads | Picture) -> int:
+        """Sends a frame, or the quads of one, and returns its number."""
         seq = self._link.next_seq()
         await asyncio.to_thread(self._link.publish_frame, camera, frame, seq)
         return seq
 
-    async def recognise(self, camera: str, frame: Capture | Picture, *, wait_s: float = 10.0) -> Answer:
-        """Sends a frame and waits for its answer. One at a time for each camera, or the older is `Superseded`."""
+    async def recognise(self, camera: str, frame: Capture | Quads | Picture, *, wait_s: float = 10.0) -> Answer:
+        """Sends a frame, or the quads of one, and waits for its answer. One at a time for each camera, or the older is
+        `Superseded`."""
         seq = self._link.next_seq()
         answers: AsyncInbox[CameraAnswer] = AsyncInbox()
         async with answers._attach(self._link.answers.add(answers._push)):
@@ -169,13 +172,14 @@ class AsyncRobot:
         return self._link.poses.add(call)
 
     def map_changes(self, map: str) -> AsyncInbox[MapChanged]:
-        """Every new version of a map from now on; `*` stands for all maps."""
+        """The present version of a map, then every new one; `*` stands for all maps."""
         inbox: AsyncInbox[MapChanged] = AsyncInbox()
         self._inboxes.add(inbox)
         return inbox._attach(self._link.on_map_changed(map, inbox._push))
 
     def on_map_changed(self, map: str, call: Listener[MapChanged]) -> Subscription:
-        """Calls a function with every new version of a map, on a thread of the session; it should be quick."""
+        """Calls a function with the present version of a map, then with every new one, on a thread of the session; it
+        should be quick."""
         return self._link.on_map_changed(map, call)
 
     async def publish_odometry(self, odom_from_robot: Pose2, captured_ns: int | None = None) -> int:
@@ -189,6 +193,19 @@ class AsyncRobot:
     async def gaze(self, request: GazeRequest, *, wait_s: float = 5.0) -> GazeAdvice:
         """Asks where to look, for a camera that turns."""
         return await asyncio.to_thread(self._link.gaze, request, wait_s)
+
+    async def localise(
+        self,
+        frame: Capture | Picture | None = None,
+        scan: Scan | None = None,
+        *,
+        map: str = "",
+        wait_s: float = 10.0,
+    ) -> LocaliseResult:
+        """Asks where the robot is by a frame with intrinsics and mounting, a scan from the same place, or both, without
+        its history; the server searches for at most 10 s. Raises `Refused` with code and field, of which `too_many`
+        says to ask again later."""
+        return await asyncio.to_thread(self._link.localise, frame, scan, map, wait_s)
 
     async def map_version(self, map: str, *, wait_s: float = 5.0) -> int | None:
         """The present version of a map; `None` if the server has no such map."""

@@ -182,6 +182,13 @@ class Capture:
     map: str = ""
 
 
+def bytes_per_px(image: Image) -> int:
+    """Bytes of a pixel; raises `InvalidInput` for an encoded image."""
+    if not image.is_raw:
+        raise InvalidInput("raw pixels are needed to cut patches out", code="wrong_encoding", field="image")
+    return _BYTES_PER_PX[image.encoding]
+
+
 def _packed(pixels: Any) -> bytes:
     # `tobytes` of NumPy is much faster than that of a view.
     data: bytes = pixels.tobytes() if hasattr(pixels, "tobytes") else memoryview(pixels).tobytes()

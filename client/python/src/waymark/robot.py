@@ -13,8 +13,10 @@ from typing import Any, Generic, TypeVar
 from weakref import WeakSet
 
 from waymark._link import INBOX, Delivery, Link, Listener, Subscription
+from waymark.api.localise import LocaliseResult
 from waymark.errors import NoAnswer, Superseded
 from waymark.image import Capture, Picture
+from waymark.quads import Quads
 from waymark.robot_file import RobotFile
 from waymark.wire import Answer, CameraAnswer, GazeAdvice, GazeRequest, MapChanged, Pose2, RobotPose, Scan
 
@@ -127,14 +129,15 @@ class Robot:
         """Epoch of this start of the robot's software."""
         return self._link.epoch
 
-    def publish_frame(self, camera: str, frame: Capture | Picture) -> int:
-        """Sends a frame and returns its number, at once."""
+    def publish_frame(self, camera: str, frame: Capture | Quads | Picture) -> int:
+        """Sends a frame, or the quads of one, and returns its number, at once."""
         seq = self._link.next_seq()
         self._link.publish_frame(camera, frame, seq)
         return seq
 
-    def recognise(self, camera: str, frame: Capture | Picture, *, wait_s: float = 10.0) -> Answer:
-        """Sends a frame and waits for its answer. One at a time for each camera, or the older is `Superseded`."""
+    def recognise(self, camera: str, frame: Capture | Quads | Picture, *, wait_s: float = 10.0) -> Answer:
+        """Sends a frame, or the quads of one, and waits for its answer. One at a time for each camera, or the older is
+        `Superseded`."""
         seq = self._link.next_seq()
         answers: Inbox[CameraAnswer] = Inbox()
         with answers._attach(self._link.answers.add(answers._push)):
@@ -168,13 +171,14 @@ class Robot:
         return self._link.poses.add(call)
 
     def map_changes(self, map: str) -> Inbox[MapChanged]:
-        """Every new version of a map from now on; `*` stands for all maps."""
+        """The present version of a map, then every new one; `*` stands for all maps."""
         inbox: Inbox[MapChanged] = Inbox()
         self._inboxes.add(inbox)
         return inbox._attach(self._link.on_map_changed(map, inbox._push))
 
     def on_map_changed(self, map: str, call: Listener[MapChanged]) -> Subscription:
-        """Calls a function with every new version of a map, on a thread of the session; it should be quick."""
+        """Calls a function with the present version of a map, then with every new one, on a thread of the session; it
+        should be quick."""
         return self._link.on_map_changed(map, call)
 
     def publish_odometry(self, odom_from_robot: Pose2, captured_ns: int | None = None) -> int:
@@ -188,6 +192,19 @@ class Robot:
     def gaze(self, request: GazeRequest, *, wait_s: float = 5.0) -> GazeAdvice:
         """Asks where to look, for a camera that turns."""
         return self._link.gaze(request, wait_s)
+
+    def localise(
+        self,
+        frame: Capture | Picture | None = None,
+        scan: Scan | None = None,
+        *,
+        map: str = "",
+        wait_s: float = 10.0,
+    ) -> LocaliseResult:
+        """Asks where the robot is by a frame with intrinsics and mounting, a scan from the same place, or both, without
+        its history; the server searches for at most 10 s. Raises `Refused` with code and field, of which `too_many`
+        says to ask again later."""
+        return self._link.localise(frame, scan, map, wait_s)
 
     def map_version(self, map: str, *, wait_s: float = 5.0) -> int | None:
         """The present version of a map; `None` if the server has no such map."""

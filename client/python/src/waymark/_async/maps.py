@@ -15,6 +15,8 @@ from waymark.api import (
     CoverageResponse,
     Difference,
     Distance,
+    Draft,
+    DraftDifference,
     GazeRankingBody,
     Health,
     LiveEvent,
@@ -23,6 +25,7 @@ from waymark.api import (
     Parent,
     PoseBody,
     Readiness,
+    Replay,
     RollbackOutcome,
     TransformResponse,
     Underlay,
@@ -121,6 +124,10 @@ class AsyncMaps(AsyncBase):
         body = given(site=site, building=building, floor=floor, parent=parent)
         return await self._send(Map, "locate_map", map, json=body)
 
+    async def copy_map(self, map: str, name: str) -> Map:
+        """Makes a new map of all that a map has."""
+        return await self._send(Map, "copy_map", map, json={"name": name})
+
     async def rename_map(self, map: str, new_name: str) -> Map:
         """Gives a map another name; no robot may be on it."""
         return await self._send(Map, "locate_map", map, json={"name": new_name})
@@ -150,6 +157,31 @@ class AsyncMaps(AsyncBase):
     async def undo_commit(self, map: str, commit: int) -> RollbackOutcome:
         """Takes one commit back; `Refused` with code `changed_since` if a later one has changed the same."""
         return await self._send(RollbackOutcome, "undo_commit", map, commit)
+
+    async def begin_draft(self, map: str, name: str) -> Draft:
+        """Begins a draft: a map of its own, of this name, that no robot sees."""
+        return await self._send(Draft, "begin_draft", map, json={"name": name})
+
+    async def drafts(self, map: str) -> tuple[Draft, ...]:
+        """The drafts of a map."""
+        return await self._all(Draft, "drafts", map)
+
+    async def discard_draft(self, map: str, draft: str) -> None:
+        """Deletes a draft. The map stays as it is."""
+        await self._done("discard_draft", map, draft)
+
+    async def draft_difference(self, map: str, draft: str, *, cursor: str | None = None) -> DraftDifference:
+        """What publishing a draft would change, and what is in the way."""
+        query = present(cursor=cursor)
+        return await self._send(DraftDifference, "draft_difference", map, draft, params=query)
+
+    async def replay_draft(self, map: str, draft: str, frames: int | None = None) -> Replay:
+        """Answers the last frames of the map's robots by map and draft, 40 unless given, and reports what differs."""
+        return await self._send(Replay, "replay_draft", map, draft, params=present(frames=frames))
+
+    async def publish_draft(self, map: str, draft: str) -> RollbackOutcome:
+        """Publishes a draft by one commit of its map; `Refused` with code `conflict` where both changed the same."""
+        return await self._send(RollbackOutcome, "publish_draft", map, draft)
 
     async def transform(self, map: str, to: str, pose: Pose2 | None = None) -> TransformResponse:
         """How a map lies in another one, and a pose converted by it."""

@@ -90,3 +90,70 @@ class Difference:
     summary: ChangeSummary
     walls: WallsDifference | None
     landmarks: LandmarkDifferencePage
+
+
+@dataclass(frozen=True, slots=True)
+class Draft:
+    """A map of its own, made of another one to be edited beside it, and published to it as one commit."""
+
+    name: str
+    from_commit: int
+    created_ms: int
+    revision: str
+    landmarks: int
+
+
+@dataclass(frozen=True, slots=True)
+class DraftDifference:
+    """What publishing a draft would change of its map. While `conflicts` has any, it cannot be published."""
+
+    from_commit: int
+    conflicts: tuple[str, ...]
+    summary: ChangeSummary
+    walls: WallsDifference | None
+    landmarks: LandmarkDifferencePage
+
+
+ReplayedPose = Literal["same", "gained", "lost", "moved"]
+
+
+@dataclass(frozen=True, slots=True)
+class RobotReplay:
+    """What a draft changes for one robot, in frames. `longest_move_m`: between the two poses of a frame."""
+
+    robot: str
+    frames: int
+    unchanged: int
+    lost: int
+    gained: int
+    pose_gained: int
+    pose_lost: int
+    pose_moved: int
+    longest_move_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class ReplayChange:
+    """A frame that map and draft answer otherwise.
+
+    `lost`: landmarks that the map names alone; `gained`: that the draft names alone.
+    `distance_m` and `angle_rad` (0 to pi) lie between the two poses, where `pose` is `moved`."""
+
+    robot: str
+    camera: str
+    captured_ms: int
+    lost: tuple[str, ...]
+    gained: tuple[str, ...]
+    pose: ReplayedPose
+    distance_m: float | None
+    angle_rad: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Replay:
+    """The last frames of a map's robots, answered by the map and by a draft of it."""
+
+    frames: int
+    unchanged: int
+    robots: tuple[RobotReplay, ...]
+    changes: tuple[ReplayChange, ...]

@@ -37,6 +37,7 @@ class Map:
     revision: str
     landmarks: int
     distance: Distance
+    draft_of: str | None = None
     site: str | None = None
     building: str | None = None
     floor: str | None = None
@@ -65,10 +66,13 @@ class TransformResponse:
 
 @dataclass(frozen=True, slots=True)
 class WallBody:
-    """A straight piece of wall from a to b, the free side on its left."""
+    """A straight piece of wall from a to b, the free side on its left. `covariance` says how well it is known, about
+    its middle: variance of its direction (rad^2), of direction and offset (rad m), of the offset to the free side
+    (m^2)."""
 
     a: Point2
     b: Point2
+    covariance: tuple[float, float, float] | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -82,6 +82,13 @@ class GazeAction(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     GAZE_ACTION_LANDMARK: _ClassVar[GazeAction]
     GAZE_ACTION_AHEAD: _ClassVar[GazeAction]
     GAZE_ACTION_SWEEP: _ClassVar[GazeAction]
+
+class LocaliseStatus(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+    __slots__ = ()
+    LOCALISE_STATUS_UNSPECIFIED: _ClassVar[LocaliseStatus]
+    LOCALISE_STATUS_LOCATED: _ClassVar[LocaliseStatus]
+    LOCALISE_STATUS_AMBIGUOUS: _ClassVar[LocaliseStatus]
+    LOCALISE_STATUS_NO_MATCH: _ClassVar[LocaliseStatus]
 IMAGE_ENCODING_UNSPECIFIED: ImageEncoding
 IMAGE_ENCODING_JPEG: ImageEncoding
 IMAGE_ENCODING_PNG: ImageEncoding
@@ -128,6 +135,10 @@ GAZE_ACTION_UNSPECIFIED: GazeAction
 GAZE_ACTION_LANDMARK: GazeAction
 GAZE_ACTION_AHEAD: GazeAction
 GAZE_ACTION_SWEEP: GazeAction
+LOCALISE_STATUS_UNSPECIFIED: LocaliseStatus
+LOCALISE_STATUS_LOCATED: LocaliseStatus
+LOCALISE_STATUS_AMBIGUOUS: LocaliseStatus
+LOCALISE_STATUS_NO_MATCH: LocaliseStatus
 
 class Pose3(_message.Message):
     __slots__ = ("qx", "qy", "qz", "qw", "x_m", "y_m", "z_m")
@@ -234,6 +245,72 @@ class Point(_message.Message):
     u_px: float
     v_px: float
     def __init__(self, u_px: _Optional[float] = ..., v_px: _Optional[float] = ...) -> None: ...
+
+class Border(_message.Message):
+    __slots__ = ("corners",)
+    CORNERS_FIELD_NUMBER: _ClassVar[int]
+    corners: _containers.RepeatedCompositeFieldContainer[Point]
+    def __init__(self, corners: _Optional[_Iterable[_Union[Point, _Mapping]]] = ...) -> None: ...
+
+class Patch(_message.Message):
+    __slots__ = ("left_px", "top_px", "width_px", "height_px", "encoding", "image")
+    LEFT_PX_FIELD_NUMBER: _ClassVar[int]
+    TOP_PX_FIELD_NUMBER: _ClassVar[int]
+    WIDTH_PX_FIELD_NUMBER: _ClassVar[int]
+    HEIGHT_PX_FIELD_NUMBER: _ClassVar[int]
+    ENCODING_FIELD_NUMBER: _ClassVar[int]
+    IMAGE_FIELD_NUMBER: _ClassVar[int]
+    left_px: int
+    top_px: int
+    width_px: int
+    height_px: int
+    encoding: ImageEncoding
+    image: bytes
+    def __init__(self, left_px: _Optional[int] = ..., top_px: _Optional[int] = ..., width_px: _Optional[int] = ..., height_px: _Optional[int] = ..., encoding: _Optional[_Union[ImageEncoding, str]] = ..., image: _Optional[bytes] = ...) -> None: ...
+
+class FoundQuad(_message.Message):
+    __slots__ = ("border", "corner_covariance_px2", "alternates", "score", "upright_ambiguous", "patch")
+    BORDER_FIELD_NUMBER: _ClassVar[int]
+    CORNER_COVARIANCE_PX2_FIELD_NUMBER: _ClassVar[int]
+    ALTERNATES_FIELD_NUMBER: _ClassVar[int]
+    SCORE_FIELD_NUMBER: _ClassVar[int]
+    UPRIGHT_AMBIGUOUS_FIELD_NUMBER: _ClassVar[int]
+    PATCH_FIELD_NUMBER: _ClassVar[int]
+    border: Border
+    corner_covariance_px2: _containers.RepeatedScalarFieldContainer[float]
+    alternates: _containers.RepeatedCompositeFieldContainer[Border]
+    score: float
+    upright_ambiguous: bool
+    patch: Patch
+    def __init__(self, border: _Optional[_Union[Border, _Mapping]] = ..., corner_covariance_px2: _Optional[_Iterable[float]] = ..., alternates: _Optional[_Iterable[_Union[Border, _Mapping]]] = ..., score: _Optional[float] = ..., upright_ambiguous: bool = ..., patch: _Optional[_Union[Patch, _Mapping]] = ...) -> None: ...
+
+class Quads(_message.Message):
+    __slots__ = ("epoch", "seq", "captured_ns", "width_px", "height_px", "quads", "intrinsics", "robot_from_camera", "odometry", "prior", "deadline_ms", "map")
+    EPOCH_FIELD_NUMBER: _ClassVar[int]
+    SEQ_FIELD_NUMBER: _ClassVar[int]
+    CAPTURED_NS_FIELD_NUMBER: _ClassVar[int]
+    WIDTH_PX_FIELD_NUMBER: _ClassVar[int]
+    HEIGHT_PX_FIELD_NUMBER: _ClassVar[int]
+    QUADS_FIELD_NUMBER: _ClassVar[int]
+    INTRINSICS_FIELD_NUMBER: _ClassVar[int]
+    ROBOT_FROM_CAMERA_FIELD_NUMBER: _ClassVar[int]
+    ODOMETRY_FIELD_NUMBER: _ClassVar[int]
+    PRIOR_FIELD_NUMBER: _ClassVar[int]
+    DEADLINE_MS_FIELD_NUMBER: _ClassVar[int]
+    MAP_FIELD_NUMBER: _ClassVar[int]
+    epoch: int
+    seq: int
+    captured_ns: int
+    width_px: int
+    height_px: int
+    quads: _containers.RepeatedCompositeFieldContainer[FoundQuad]
+    intrinsics: Intrinsics
+    robot_from_camera: Pose3
+    odometry: Pose2
+    prior: Pose2Covariance
+    deadline_ms: int
+    map: str
+    def __init__(self, epoch: _Optional[int] = ..., seq: _Optional[int] = ..., captured_ns: _Optional[int] = ..., width_px: _Optional[int] = ..., height_px: _Optional[int] = ..., quads: _Optional[_Iterable[_Union[FoundQuad, _Mapping]]] = ..., intrinsics: _Optional[_Union[Intrinsics, _Mapping]] = ..., robot_from_camera: _Optional[_Union[Pose3, _Mapping]] = ..., odometry: _Optional[_Union[Pose2, _Mapping]] = ..., prior: _Optional[_Union[Pose2Covariance, _Mapping]] = ..., deadline_ms: _Optional[int] = ..., map: _Optional[str] = ...) -> None: ...
 
 class Candidate(_message.Message):
     __slots__ = ("landmark", "correlation", "hausdorff", "distance", "threshold", "ratio", "probability", "refusal", "gradient_similarity")
@@ -544,3 +621,47 @@ class GazeAdvice(_message.Message):
     range_m: float
     incidence_rad: float
     def __init__(self, map: _Optional[str] = ..., map_version: _Optional[int] = ..., rejection: _Optional[_Union[Rejection, _Mapping]] = ..., action: _Optional[_Union[GazeAction, str]] = ..., landmark: _Optional[str] = ..., pan_rad: _Optional[float] = ..., tilt_rad: _Optional[float] = ..., utility: _Optional[float] = ..., probability: _Optional[float] = ..., margin_m: _Optional[float] = ..., gain_nats: _Optional[float] = ..., range_m: _Optional[float] = ..., incidence_rad: _Optional[float] = ...) -> None: ...
+
+class LocaliseRequest(_message.Message):
+    __slots__ = ("frame", "scan", "map", "deadline_ms")
+    FRAME_FIELD_NUMBER: _ClassVar[int]
+    SCAN_FIELD_NUMBER: _ClassVar[int]
+    MAP_FIELD_NUMBER: _ClassVar[int]
+    DEADLINE_MS_FIELD_NUMBER: _ClassVar[int]
+    frame: Frame
+    scan: Scan
+    map: str
+    deadline_ms: int
+    def __init__(self, frame: _Optional[_Union[Frame, _Mapping]] = ..., scan: _Optional[_Union[Scan, _Mapping]] = ..., map: _Optional[str] = ..., deadline_ms: _Optional[int] = ...) -> None: ...
+
+class LocaliseHypothesis(_message.Message):
+    __slots__ = ("map_from_robot", "probability", "landmarks", "matched")
+    MAP_FROM_ROBOT_FIELD_NUMBER: _ClassVar[int]
+    PROBABILITY_FIELD_NUMBER: _ClassVar[int]
+    LANDMARKS_FIELD_NUMBER: _ClassVar[int]
+    MATCHED_FIELD_NUMBER: _ClassVar[int]
+    map_from_robot: Pose2Covariance
+    probability: float
+    landmarks: _containers.RepeatedScalarFieldContainer[str]
+    matched: float
+    def __init__(self, map_from_robot: _Optional[_Union[Pose2Covariance, _Mapping]] = ..., probability: _Optional[float] = ..., landmarks: _Optional[_Iterable[str]] = ..., matched: _Optional[float] = ...) -> None: ...
+
+class LocaliseReply(_message.Message):
+    __slots__ = ("rejection", "map", "map_version", "status", "reason", "map_from_robot", "hypotheses", "answer")
+    REJECTION_FIELD_NUMBER: _ClassVar[int]
+    MAP_FIELD_NUMBER: _ClassVar[int]
+    MAP_VERSION_FIELD_NUMBER: _ClassVar[int]
+    STATUS_FIELD_NUMBER: _ClassVar[int]
+    REASON_FIELD_NUMBER: _ClassVar[int]
+    MAP_FROM_ROBOT_FIELD_NUMBER: _ClassVar[int]
+    HYPOTHESES_FIELD_NUMBER: _ClassVar[int]
+    ANSWER_FIELD_NUMBER: _ClassVar[int]
+    rejection: Rejection
+    map: str
+    map_version: int
+    status: LocaliseStatus
+    reason: str
+    map_from_robot: Pose2Covariance
+    hypotheses: _containers.RepeatedCompositeFieldContainer[LocaliseHypothesis]
+    answer: Answer
+    def __init__(self, rejection: _Optional[_Union[Rejection, _Mapping]] = ..., map: _Optional[str] = ..., map_version: _Optional[int] = ..., status: _Optional[_Union[LocaliseStatus, str]] = ..., reason: _Optional[str] = ..., map_from_robot: _Optional[_Union[Pose2Covariance, _Mapping]] = ..., hypotheses: _Optional[_Iterable[_Union[LocaliseHypothesis, _Mapping]]] = ..., answer: _Optional[_Union[Answer, _Mapping]] = ...) -> None: ...
