@@ -50,6 +50,8 @@ pub(crate) async fn explained(failure: Failure, maps: Option<&MapClient>, map: O
         "unknown_view" => failure.advised("waymark view list LANDMARK shows the numbers."),
         "unknown_reference_run" => failure.advised("waymark run list shows the numbers."),
         "unknown_commit" => failure.advised("waymark version list shows the commits that are kept."),
+        "unknown_draft" => failure.advised("waymark version drafts shows the drafts of the map."),
+        "conflict" => failure.advised("waymark version drafts DRAFT shows it, before anything is published."),
         "changed_since" => failure
             .advised("waymark version list shows what came later; rollback goes back behind all of it."),
         "unknown_token" => failure.advised("waymark token list shows the numbers."),

@@ -97,7 +97,7 @@ enum Command {
     Map(map::Args),
     /// Landmarks: teach, list, show, place, size, rename, delete, accept.
     Landmark(landmark::Args),
-    /// What was changed of a map, by whom and why: list, diff; and the way back: rollback, undo
+    /// Changes of a map, by whom and why: list, diff; the way back: rollback, undo; drafts: draft, publish
     ///
     /// Every change of a map is a commit. For example:
     ///   waymark version list

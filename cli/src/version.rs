@@ -1,12 +1,18 @@
 //! `waymark version`: what was changed of a map, and the way back.
 
+mod drafts;
+
 use super::{
+    names::name,
     screen::{Table, counted},
     session::{Consent, MapArgs, Session},
 };
 use client::{
     MapClient,
-    api::{ChangeKind, ChangeSummary, Commit, Difference, DifferenceQuery, LandmarkDifference, PageQuery},
+    api::{
+        ChangeKind, ChangeSummary, Commit, Difference, DifferenceQuery, LandmarkDifference, PageQuery,
+        WallsDifference,
+    },
 };
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
@@ -54,6 +60,53 @@ enum Verb {
         commit: u64,
         #[command(flatten)]
         reason: Reason,
+        #[command(flatten)]
+        consent: Consent,
+    },
+    /// Begin a draft: a map of its own, with all that the map has, that no robot sees
+    ///
+    /// Teach and edit it as any map, with --map NAME; then publish it. For example:
+    ///   waymark version draft office-draft
+    ///   waymark landmark teach poster poster3.jpg --map office-draft
+    ///   waymark version publish office-draft
+    #[command(verbatim_doc_comment)]
+    Draft {
+        /// Its name: lower-case letters, digits, `-` and `_`.
+        #[arg(value_parser = name)]
+        name: String,
+    },
+    /// List the drafts of the map, or show what publishing one would change.
+    Drafts {
+        /// The draft to compare with the map.
+        draft: Option<String>,
+    },
+    /// Try a draft: what the map's robots would be told otherwise in their last frames
+    ///
+    /// Nothing is changed. The server keeps the frames of stored answers in memory: let robots drive first.
+    #[command(verbatim_doc_comment)]
+    Replay {
+        /// The draft.
+        draft: String,
+        /// Most frames.
+        #[arg(long, value_name = "N", default_value_t = 40, value_parser = clap::value_parser!(u8).range(1..=100))]
+        frames: u8,
+    },
+    /// Publish a draft: what it has changed, by one commit of the map. The draft is gone then
+    ///
+    /// What both have changed since the draft began is named, and nothing is changed (status 4).
+    #[command(verbatim_doc_comment)]
+    Publish {
+        /// The draft.
+        draft: String,
+        #[command(flatten)]
+        reason: Reason,
+        #[command(flatten)]
+        consent: Consent,
+    },
+    /// Delete a draft. The map stays as it is; what was done on the draft is lost.
+    Discard {
+        /// The draft.
+        draft: String,
         #[command(flatten)]
         consent: Consent,
     },
@@ -105,7 +158,9 @@ async fn on_map(session: &Session, verb: &Verb) -> anyhow::Result<()> {
         }
         Verb::Diff { from, to } => {
             let (difference, landmarks) = difference(maps, map, *from, *to).await?;
-            let text = difference_text(&difference, &landmarks);
+            let Difference { from_commit, to_commit, summary, walls, .. } = &difference;
+            let head = format!("from commit {from_commit} to {to_commit}");
+            let text = difference_text(&head, summary, walls.as_ref(), &landmarks);
             let mut whole = difference;
             whole.landmarks.items = landmarks;
             whole.landmarks.next = None;
@@ -132,6 +187,14 @@ async fn on_map(session: &Session, verb: &Verb) -> anyhow::Result<()> {
             }
             Ok(())
         }
+        Verb::Draft { name } => drafts::begin(session, map, name).await,
+        Verb::Drafts { draft: None } => drafts::list(session, map).await,
+        Verb::Drafts { draft: Some(draft) } => drafts::show(session, map, draft).await,
+        Verb::Replay { draft, frames } => drafts::replay(session, map, draft, usize::from(*frames)).await,
+        Verb::Publish { draft, reason, consent } => {
+            drafts::publish(session, &reason.on(maps), (map, draft), consent).await
+        }
+        Verb::Discard { draft, consent } => drafts::discard(session, map, draft, consent).await,
         Verb::Undo { commit, reason, consent } => {
             let meant = maps.commit(map, *commit).await?;
             consent.ask(&format!("Take commit {commit} of {map} back ({})?", what(&meant)))?;
@@ -233,9 +296,13 @@ fn summary_text(s: &ChangeSummary) -> String {
     if parts.is_empty() { NOTHING.to_owned() } else { parts.join(", ") }
 }
 
-fn difference_text(difference: &Difference, landmarks: &[LandmarkDifference]) -> String {
-    let Difference { from_commit, to_commit, summary, walls, .. } = difference;
-    let mut lines = vec![format!("from commit {from_commit} to {to_commit}: {}", summary_text(summary))];
+fn difference_text(
+    head: &str,
+    summary: &ChangeSummary,
+    walls: Option<&WallsDifference>,
+    landmarks: &[LandmarkDifference],
+) -> String {
+    let mut lines = vec![format!("{head}: {}", summary_text(summary))];
     if let Some(walls) = walls {
         let at = walls
             .bounds_m

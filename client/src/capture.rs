@@ -5,20 +5,33 @@ use map::pose2::{Pose2, Pose2Covariance};
 use nalgebra::Isometry3;
 use protos::{
     convert::{
+        frame::MAX_FRAME_PX,
         geometry::{intrinsics_wire, pose2_covariance_wire, pose2_wire, pose3_wire},
         image_header,
+        quads::MAX_FOUND_QUADS,
+        result,
     },
-    prost::bytes::Bytes,
+    prost::{Message, bytes::Bytes},
     v1,
 };
 use std::time::{SystemTime, UNIX_EPOCH};
-use vision::frame::{GrayImage, Intrinsics};
+use vision::{
+    detect::quad::{Quad, QuadKind},
+    frame::{GrayImage, Intrinsics},
+    geometry::Corners,
+};
 
-/// One image with its capture data. Built from an image, then completed with `with_...`.
+/// One image, or the quads of one, with its capture data. Built from an image, then completed with `with_...`.
 #[derive(Debug, Clone)]
 pub struct Capture {
+    /// Without an image where there are quads.
     frame: v1::Frame,
+    quads: Option<Vec<v1::FoundQuad>>,
 }
+
+/// What is sent around a quad, as a share of its width and height on each side: the learnt border may lie outside of the found
+/// one.
+const PATCH_MARGIN: f64 = 0.4;
 
 impl Capture {
     /// An encoded photograph; its size is read from its header. The capture time is now.
@@ -60,9 +73,31 @@ impl Capture {
         Ok(Self::new(encoding, width_px, height_px, pixels))
     }
 
+    /// The quads that the robot's own detector found in an image, best first, with the pixels around them in place of the image.
+    /// Those with four sides are sent, at most [`MAX_FOUND_QUADS`], and as many as have together no more pixels than the largest
+    /// frame. The capture time is now.
+    pub fn quads(image: &GrayImage, quads: &[Quad]) -> Self {
+        let mut spare_px = MAX_FRAME_PX;
+        let is_room = |found: &v1::FoundQuad| {
+            let area = found.patch.as_ref().map_or(0, |patch| patch.width_px * patch.height_px);
+            let left = spare_px.checked_sub(area);
+            spare_px = left.unwrap_or(spare_px);
+            left.is_some()
+        };
+        let full = quads.iter().filter(|quad| quad.kind == QuadKind::Full);
+        let cut = full.filter_map(|quad| found(image, quad)).filter(is_room);
+        Self::found((image.width() as u32, image.height() as u32), cut.take(MAX_FOUND_QUADS).collect())
+    }
+
+    /// The same of quads whose patches are cut out and encoded already; `size_px` is that of the image.
+    pub fn found((width_px, height_px): (u32, u32), quads: Vec<v1::FoundQuad>) -> Self {
+        let of = Self::new(v1::ImageEncoding::Unspecified, width_px, height_px, Bytes::new());
+        Self { quads: Some(quads), ..of }
+    }
+
     /// A frame that was recorded. Epoch and number are set when it is sent; all else stays.
     pub fn recorded(frame: v1::Frame) -> Self {
-        Self { frame }
+        Self { frame, quads: None }
     }
 
     fn new(encoding: v1::ImageEncoding, width_px: u32, height_px: u32, image: Bytes) -> Self {
@@ -70,6 +105,7 @@ impl Capture {
         let encoding = encoding.into();
         Self {
             frame: v1::Frame { encoding, width_px, height_px, image, captured_ns, ..v1::Frame::default() },
+            quads: None,
         }
     }
 
@@ -127,10 +163,68 @@ impl Capture {
         (self.frame.width_px, self.frame.height_px)
     }
 
-    /// The message with epoch and sequence number.
-    pub(crate) fn numbered(self, epoch: u64, seq: u64) -> v1::Frame {
-        v1::Frame { epoch, seq, ..self.frame }
+    /// Whether it is quads in place of the image.
+    pub fn is_quads(&self) -> bool {
+        self.quads.is_some()
     }
+
+    /// The message of the image.
+    pub(crate) fn into_frame(self) -> v1::Frame {
+        self.frame
+    }
+
+    /// The message with epoch and sequence number.
+    pub(crate) fn numbered(self, epoch: u64, seq: u64) -> Vec<u8> {
+        let frame = v1::Frame { epoch, seq, ..self.frame };
+        let Some(quads) = self.quads else { return frame.encode_to_vec() };
+        let message = v1::Quads {
+            epoch,
+            seq,
+            captured_ns: frame.captured_ns,
+            width_px: frame.width_px,
+            height_px: frame.height_px,
+            quads,
+            intrinsics: frame.intrinsics,
+            robot_from_camera: frame.robot_from_camera,
+            odometry: frame.odometry,
+            prior: frame.prior,
+            deadline_ms: frame.deadline_ms,
+            map: frame.map,
+        };
+        message.encode_to_vec()
+    }
+}
+
+/// A quad with the pixels around it; `None` if nothing of it lies in the image.
+fn found(image: &GrayImage, quad: &Quad) -> Option<v1::FoundQuad> {
+    let [columns, rows] = [(0, image.width()), (1, image.height())].map(|(axis, length)| {
+        let along = quad.corners_px.points().iter().map(|corner| corner[axis]);
+        let (low, high) =
+            along.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), c| (low.min(c), high.max(c)));
+        let margin = PATCH_MARGIN * (high - low);
+        let (from, to) = ((low - margin).floor().max(0.0), (high + margin).ceil().min(length as f64 - 1.0));
+        (from <= to).then_some((from as usize, to as usize))
+    });
+    let ((left, right), (top, bottom)) = (columns?, rows?);
+    let line = |row| &image.data()[row * image.width() + left..=row * image.width() + right];
+    let pixels: Vec<u8> = (top..=bottom).flat_map(line).copied().collect();
+    let border = |corners: &Corners| v1::Border { corners: result::corners(corners) };
+    let covariances = quad.corner_covariance_px2.iter();
+    Some(v1::FoundQuad {
+        border: Some(border(&quad.corners_px)),
+        corner_covariance_px2: covariances.flat_map(|c| [c[(0, 0)], c[(0, 1)], c[(1, 1)]]).collect(),
+        alternates: quad.alternates.iter().map(border).collect(),
+        score: quad.score,
+        upright_ambiguous: quad.upright_ambiguous,
+        patch: Some(v1::Patch {
+            left_px: left as u32,
+            top_px: top as u32,
+            width_px: (right - left + 1) as u32,
+            height_px: (bottom - top + 1) as u32,
+            encoding: v1::ImageEncoding::Gray8.into(),
+            image: pixels.into(),
+        }),
+    })
 }
 
 /// The system clock, ns since the Unix epoch.
@@ -181,6 +275,47 @@ mod tests {
         assert!(Capture::raw(Rgb8, (0, 3), Vec::new()).is_err());
         assert!(Capture::raw(Jpeg, (4, 3), vec![0; 12]).is_err());
         assert!(Capture::raw(Rgb8, (u32::MAX, u32::MAX), vec![0; 12]).is_err());
+    }
+
+    fn quad(corners: [[f64; 2]; 4], kind: QuadKind) -> Quad {
+        Quad {
+            corners_px: Corners::try_from(corners).unwrap(),
+            corner_covariance_px2: [nalgebra::Matrix2::identity(); 4],
+            side_support: [1.0; 4],
+            side_clipped: [false; 4],
+            score: 0.5,
+            kind,
+            upright_ambiguous: false,
+            alternates: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn patches_hold_the_pixels_around_their_quads() {
+        let image = GrayImage::from_fn(64, 48, |u, v| (u + 4 * v) as u8);
+        let inside = quad([[20.0, 10.0], [30.0, 10.0], [30.0, 20.0], [20.0, 20.0]], QuadKind::Full);
+        let at_border = quad([[-3.0, 40.0], [7.0, 40.0], [7.0, 50.0], [-3.0, 50.0]], QuadKind::Full);
+        let open = quad([[1.0, 1.0], [9.0, 1.0], [9.0, 9.0], [1.0, 9.0]], QuadKind::ThreeSided);
+        let message = Capture::quads(&image, &[open, inside, at_border]).with_deadline_ms(9).numbered(1, 2);
+        let message = v1::Quads::decode(message.as_slice()).unwrap();
+        assert_eq!((message.epoch, message.seq, message.width_px, message.deadline_ms), (1, 2, 64, 9));
+        let patches: Vec<_> = message.quads.iter().map(|found| found.patch.as_ref().unwrap()).collect();
+        let rectangle = |p: &v1::Patch| [p.left_px, p.top_px, p.width_px, p.height_px];
+        let rectangles: Vec<_> = patches.iter().map(|patch| rectangle(patch)).collect();
+        assert_eq!(rectangles, [[16, 6, 19, 19], [0, 36, 12, 12]]);
+        assert_eq!((patches[0].image[0], patches[0].image[19 + 1]), (16 + 24, 17 + 28));
+        assert!(protos::CheckedFrame::try_from(message).is_ok());
+    }
+
+    #[test]
+    fn quads_that_do_not_fit_are_left_out() {
+        let image = GrayImage::from_fn(1920, 1200, |_, _| 7);
+        let small = quad([[20.0, 10.0], [30.0, 10.0], [30.0, 20.0], [20.0, 20.0]], QuadKind::Full);
+        let large = quad([[0.0, 0.0], [1900.0, 0.0], [1900.0, 1100.0], [0.0, 1100.0]], QuadKind::Full);
+        let sent = |quads: &[Quad]| Capture::quads(&image, quads).quads.unwrap().len();
+        assert_eq!(sent(&[large.clone(), large.clone(), small.clone()]), 1);
+        assert_eq!(sent(&[small.clone(), large, small.clone()]), 2);
+        assert_eq!(sent(&vec![small; MAX_FOUND_QUADS + 1]), MAX_FOUND_QUADS);
     }
 
     #[test]

@@ -74,6 +74,16 @@ pub enum ClientError {
         /// The transport's message.
         detail: String,
     },
+    /// The server refused what this robot asked or sent.
+    #[error("{code}{}{detail}", if field.is_empty() { ": ".to_owned() } else { format!(" in {field}: ") })]
+    Rejected {
+        /// Stable code, of [`protos::Code`].
+        code: String,
+        /// Field at fault, or empty.
+        field: String,
+        /// A sentence.
+        detail: String,
+    },
     /// No answer came in time.
     #[error(
         "no answer to frame {seq} within {waited:?}: the frame or its answer was dropped, the server is not reachable at {endpoint}, or its work takes longer; send again or wait longer"

@@ -9,6 +9,7 @@ pub mod capture;
 pub mod error;
 pub mod http;
 pub mod listener;
+pub mod questions;
 pub mod robot;
 pub mod robot_file;
 mod transport;
@@ -22,5 +23,6 @@ pub use protos::{
     named::{NamedLandmark, named, named_landmarks, quad_corners},
     v1,
 };
-pub use robot::{Delivery, MapVersions, RobotClient, RobotOptions};
+pub use questions::{LocaliseQuery, MapVersions};
+pub use robot::{Delivery, RobotClient, RobotOptions};
 pub use robot_file::{ROBOT_FILE_VARIABLE, RobotFile, RobotTls};

@@ -131,6 +131,12 @@ fn is_wanted(key: &Key, robots: &[Name]) -> bool {
         | Key::Scan(robot)
         | Key::Pose(robot) => robots.is_empty() || robots.contains(robot),
         Key::MapChanged(_) => true,
-        Key::Alive(..) | Key::Gaze(_) | Key::Hello(_) | Key::MapVersion(_) => false,
+        // Recordings hold images; of quads none can be replayed against another detector.
+        Key::Quads(..)
+        | Key::Localise(_)
+        | Key::Alive(..)
+        | Key::Gaze(_)
+        | Key::Hello(_)
+        | Key::MapVersion(_) => false,
     }
 }

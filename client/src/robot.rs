@@ -9,7 +9,7 @@ use std::{
     sync::atomic::{AtomicU64, Ordering},
     time::{Duration, Instant},
 };
-use tokio::sync::{broadcast, watch};
+use tokio::sync::broadcast;
 use zenoh::{
     Wait,
     liveliness::LivelinessToken,
@@ -24,6 +24,8 @@ pub const INBOX: usize = 64;
 const HELLO_WAIT: Duration = Duration::from_millis(500);
 /// Time between two questions for it.
 const HELLO_EVERY: Duration = Duration::from_millis(50);
+/// A session that was not greeted for so long is opened anew.
+const GREETED: Duration = Duration::from_secs(2);
 
 /// Behaviour when the link is full.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -71,22 +73,50 @@ impl RobotOptions {
     }
 }
 
-/// Whether the server answers a hello: with a certificate that gives no access, everything is dropped without a word.
-async fn admitted(
-    session: &zenoh::Session,
-    keys: &Keys,
-    robot: &Name,
-    options: &RobotOptions,
-) -> Result<(), ClientError> {
+/// Opens an encrypted session and waits until the server answers a hello: with a certificate that gives no access, everything
+/// is dropped without a word.
+///
+/// A session that is not greeted within [`GREETED`] is opened anew. One that meets the server's gate in the moment in which that
+/// closes, to open again with other rights, may keep a link to what was closed, or none at all, for ever: zenoh connects again
+/// only after a link that it has seen to begin and to end.
+async fn admitted(keys: &Keys, robot: &Name, options: &RobotOptions) -> Result<zenoh::Session, ClientError> {
     let (key, until) = (keys.build(&Key::Hello(robot.clone())), Instant::now() + options.timeout);
+    let endpoint = || options.endpoint.clone();
+    let silent = || ClientError::NotAdmitted { robot: robot.to_string(), endpoint: endpoint() };
+    let (mut left, mut was_linked) = (options.timeout, false);
+    loop {
+        let session = match transport::open(&RobotOptions { timeout: left, ..options.clone() }).await {
+            Ok(session) => session,
+            // The server was there and silent: that says more than that the rest of the time was too short for one more link.
+            Err(ClientError::Unreachable { .. } | ClientError::TlsRefused { .. }) if was_linked => {
+                return Err(silent());
+            }
+            Err(error) => return Err(error),
+        };
+        if is_greeted(&session, &key, until.min(Instant::now() + GREETED)).await? {
+            return Ok(session);
+        }
+        was_linked |= session.info().routers_zid().await.next().is_some();
+        session.close().await.map_err(fault("close the session"))?;
+        left = until.saturating_duration_since(Instant::now());
+        if left < HELLO_WAIT {
+            let detail = "the connection was closed, and there is no other".to_owned();
+            let lost = || ClientError::Unreachable { endpoint: endpoint(), detail };
+            return Err(if was_linked { silent() } else { lost() });
+        }
+    }
+}
+
+/// Whether the server answers a hello before `until`.
+async fn is_greeted(session: &zenoh::Session, key: &str, until: Instant) -> Result<bool, ClientError> {
     while Instant::now() < until {
-        let replies = session.get(&key).timeout(HELLO_WAIT).await.map_err(fault("ask for the server"))?;
+        let replies = session.get(key).timeout(HELLO_WAIT).await.map_err(fault("ask for the server"))?;
         if replies.recv_async().await.is_ok_and(|reply| reply.result().is_ok()) {
-            return Ok(());
+            return Ok(true);
         }
         tokio::time::sleep(HELLO_EVERY).await;
     }
-    Err(ClientError::NotAdmitted { robot: robot.to_string(), endpoint: options.endpoint.clone() })
+    Ok(false)
 }
 
 /// An answer and the camera it is for.
@@ -100,9 +130,9 @@ pub struct CameraAnswer {
 
 /// A robot's connection. Dropping it ends the session and the robot's presence.
 pub struct RobotClient {
-    session: zenoh::Session,
-    keys: Keys,
-    robot: Name,
+    pub(crate) session: zenoh::Session,
+    pub(crate) keys: Keys,
+    pub(crate) robot: Name,
     endpoint: String,
     delivery: Delivery,
     epoch: u64,
@@ -114,31 +144,16 @@ pub struct RobotClient {
     _alive: LivelinessToken,
 }
 
-/// The versions of a map. A reader that is slow gets the newest only.
-#[derive(Debug)]
-pub struct MapVersions {
-    newest: watch::Receiver<Option<u64>>,
-    _subscriber: Subscriber<()>,
-}
-
-impl MapVersions {
-    /// The next version; waits for it. `None` once the session is closed.
-    pub async fn next(&mut self) -> Option<u64> {
-        self.newest.changed().await.ok()?;
-        *self.newest.borrow_and_update()
-    }
-}
-
 impl RobotClient {
     /// Connects, subscribes to the robot's answers and poses, and declares its liveliness token.
     pub async fn connect(options: &RobotOptions) -> Result<Self, ClientError> {
         let fleet = name("fleet", &options.fleet)?;
         let robot = name("robot", &options.robot)?;
         let keys = Keys::new(&fleet);
-        let session = transport::open(options).await?;
-        if options.tls.is_some() {
-            admitted(&session, &keys, &robot, options).await?;
-        }
+        let session = match options.tls {
+            Some(_) => admitted(&keys, &robot, options).await?,
+            None => transport::open(options).await?,
+        };
         let (answers, _) = broadcast::channel(INBOX);
         let (poses, _) = broadcast::channel(INBOX);
         let to_answers = {
@@ -197,16 +212,16 @@ impl RobotClient {
         self.epoch
     }
 
-    /// Sends a frame and returns its number, at once.
+    /// Sends a frame, or the quads of one, and returns its number, at once.
     pub async fn publish_frame(&self, camera: &str, capture: Capture) -> Result<u64, ClientError> {
         let seq = self.next_seq.fetch_add(1, Ordering::Relaxed);
-        let frame = capture.numbered(self.epoch, seq);
-        let key = Key::Frame(self.robot.clone(), name("camera", camera)?);
-        self.put(&key, frame.encode_to_vec(), Priority::DataLow).await?;
+        let (robot, camera) = (self.robot.clone(), name("camera", camera)?);
+        let key = if capture.is_quads() { Key::Quads(robot, camera) } else { Key::Frame(robot, camera) };
+        self.put(&key, capture.numbered(self.epoch, seq), Priority::DataLow).await?;
         Ok(seq)
     }
 
-    /// Sends a frame and waits for its answer. One at a time per camera, or the older is superseded.
+    /// Sends a frame, or the quads of one, and waits for its answer. One at a time per camera, or the older is superseded.
     pub async fn recognise(
         &self,
         camera: &str,
@@ -285,63 +300,6 @@ impl RobotClient {
         self.put(&key, bytes, Priority::DataLow).await
     }
 
-    /// Requests gaze advice and waits for it.
-    pub async fn gaze(
-        &self,
-        request: &v1::GazeRequest,
-        wait: Duration,
-    ) -> Result<v1::GazeAdvice, ClientError> {
-        let key = self.keys.build(&Key::Gaze(self.robot.clone()));
-        let asked = self.session.get(key).payload(request.encode_to_vec()).timeout(wait);
-        let replies = asked.await.map_err(fault("ask for gaze advice"))?;
-        let reply = replies.recv_async().await.map_err(|e| fault("receive gaze advice")(e))?;
-        let sample = reply
-            .result()
-            .map_err(|e| ClientError::Transport { action: "receive gaze advice", detail: e.to_string() })?;
-        v1::GazeAdvice::decode(&*sample.payload().to_bytes())
-            .map_err(|e| ClientError::Transport { action: "read gaze advice", detail: e.to_string() })
-    }
-
-    /// The present version of a map; `None` if the server has no such map. For programs that store data derived
-    /// from a map: `MapChanged` events may be lost on a full link.
-    pub async fn map_version(&self, map: &str, wait: Duration) -> Result<Option<u64>, ClientError> {
-        let key = self.keys.build(&Key::MapVersion(name("map", map)?));
-        let replies = self.session.get(key).timeout(wait).await.map_err(fault("ask for a map's version"))?;
-        let Ok(reply) = replies.recv_async().await else { return Ok(None) };
-        let hear = "receive a map's version";
-        let sample =
-            reply.result().map_err(|e| ClientError::Transport { action: hear, detail: e.to_string() })?;
-        v1::MapChanged::decode(&*sample.payload().to_bytes())
-            .map(|message| Some(message.version))
-            .map_err(|e| ClientError::Transport { action: hear, detail: e.to_string() })
-    }
-
-    /// The versions of a map: the present one at once, then each new one. For programs that store data derived from a map, also
-    /// those that start after its last change.
-    pub async fn map_versions(&self, map: &str, wait: Duration) -> Result<MapVersions, ClientError> {
-        let (sender, newest) = watch::channel(None);
-        let changed = {
-            let sender = sender.clone();
-            move |sample: Sample| {
-                if let Ok(message) = v1::MapChanged::decode(&*sample.payload().to_bytes()) {
-                    sender.send_replace(Some(message.version));
-                }
-            }
-        };
-        let key = self.keys.build(&Key::MapChanged(name("map", map)?));
-        // Before the question, so that no change is lost between.
-        let subscriber = self.session.declare_subscriber(key).callback(changed).await;
-        let subscriber = subscriber.map_err(fault("subscribe"))?;
-        let present = self.map_version(map, wait).await?;
-        // A change that has come meanwhile is newer.
-        sender.send_if_modified(|newest| {
-            let is_first = newest.is_none() && present.is_some();
-            *newest = newest.or(present);
-            is_first
-        });
-        Ok(MapVersions { newest, _subscriber: subscriber })
-    }
-
     /// Ends the session in order.
     pub async fn close(self) -> Result<(), ClientError> {
         self.session.close().await.map_err(fault("close the session"))
@@ -362,11 +320,11 @@ impl RobotClient {
     }
 }
 
-fn name(field: &'static str, text: &str) -> Result<Name, ClientError> {
+pub(crate) fn name(field: &'static str, text: &str) -> Result<Name, ClientError> {
     Name::new(text).map_err(|error| ClientError::Name { field, text: text.to_owned(), error })
 }
 
-fn fault(action: &'static str) -> impl Fn(zenoh::Error) -> ClientError + Copy {
+pub(crate) fn fault(action: &'static str) -> impl Fn(zenoh::Error) -> ClientError + Copy {
     move |error| ClientError::Transport { action, detail: error.to_string() }
 }
 

@@ -2,8 +2,14 @@
 //! decoders: the size is read from the header and checked before any pixel is unpacked, and metadata is ignored. JPEG gives
 //! luma directly; the colours of PNG and of raw pixels are weighted as JPEG weights them, so that all give the same grey.
 
+pub mod mosaic;
+
 use image::{ColorType, ImageDecoder, Limits, codecs::png::PngDecoder};
-use protos::{CheckedFrame, Code, Rejection, convert::Encoding};
+use mosaic::mosaic;
+use protos::{
+    CheckedFrame, Code, Rejection,
+    convert::{EncodedImage, Encoding, Pixels},
+};
 use std::io::Cursor;
 use vision::frame::{GrayImage, MAX_SIDE_PX};
 use zune_jpeg::{
@@ -37,17 +43,33 @@ impl ImageLimits {
     pub const UPLOAD: Self = Self { bytes: 16 << 20, pixels: vision::frame::MAX_AREA_PX };
 }
 
-/// The grey image of a frame. Errors: over the limits, not of the claimed encoding and size, or not decodable.
+/// The grey image of a frame; of quads, their [`mosaic()`]. Errors: over the limits, not of the claimed encoding and size, or
+/// not decodable.
 pub fn decode_frame(frame: &CheckedFrame, limits: ImageLimits) -> Result<GrayImage, Rejection> {
     let claimed = (frame.width_px as usize, frame.height_px as usize);
-    check_bytes(&frame.image, limits)?;
+    match &frame.pixels {
+        Pixels::Image(image) => decode_image(image, claimed, limits),
+        Pixels::Quads(quads) => {
+            check_size(claimed, limits)?;
+            mosaic(quads, claimed, limits)
+        }
+    }
+}
+
+/// A grey image of a claimed size. Errors: those of [`decode_frame`].
+pub(super) fn decode_image(
+    EncodedImage { encoding, bytes }: &EncodedImage,
+    claimed: (usize, usize),
+    limits: ImageLimits,
+) -> Result<GrayImage, Rejection> {
+    check_bytes(bytes, limits)?;
     check_size(claimed, limits)?;
-    match frame.encoding {
-        Encoding::Gray8 => gray(claimed, frame.image.to_vec()),
-        Encoding::Rgb8 => gray(claimed, from_rgb(&frame.image)),
-        Encoding::Bgr8 => gray(claimed, from_bgr(&frame.image)),
-        Encoding::Jpeg => jpeg(&frame.image, Some(claimed), limits),
-        Encoding::Png => png(&frame.image, Some(claimed), limits),
+    match encoding {
+        Encoding::Gray8 => gray(claimed, bytes.to_vec()),
+        Encoding::Rgb8 => gray(claimed, from_rgb(bytes)),
+        Encoding::Bgr8 => gray(claimed, from_bgr(bytes)),
+        Encoding::Jpeg => jpeg(bytes, Some(claimed), limits),
+        Encoding::Png => png(bytes, Some(claimed), limits),
     }
 }
 
@@ -158,7 +180,8 @@ fn luma(r: u8, g: u8, b: u8) -> u8 {
     ((19_595 * u32::from(r) + 38_470 * u32::from(g) + 7_471 * u32::from(b) + 32_768) >> 16) as u8
 }
 
-fn gray((width, height): (usize, usize), data: Vec<u8>) -> Result<GrayImage, Rejection> {
+/// An image of pixels. Error: not as many as the size says.
+pub(super) fn gray((width, height): (usize, usize), data: Vec<u8>) -> Result<GrayImage, Rejection> {
     GrayImage::new(width, height, data).map_err(|e| Rejection::new(Code::BadImage, "image", e.to_string()))
 }
 

@@ -2,11 +2,15 @@
 //! quads with verdicts and landmark poses.
 
 use super::snapshot::MapSnapshot;
-use protos::v1;
+use protos::{
+    CheckedFrame,
+    convert::{CheckedQuad, Pixels},
+    v1,
+};
 use std::{cell::RefCell, time::Instant};
 use vision::{
     frame::{GrayImage, Intrinsics},
-    pipeline::{FrameAnalysis, LandmarkDatabase, Pipeline},
+    pipeline::{FrameAnalysis, LandmarkDatabase, Pipeline, analyse_quads},
     trace::{Stage, Trace},
 };
 
@@ -43,6 +47,19 @@ impl Trace for StageTimes {
     }
 }
 
+/// Recognises a frame: what its detector finds, or the quads that the robot found, from there on alike.
+pub fn analyse_checked(
+    frame: &CheckedFrame,
+    image: &GrayImage,
+    map: &MapSnapshot,
+    times: &mut StageTimes,
+) -> FrameAnalysis {
+    let camera = frame.intrinsics.as_ref();
+    let Pixels::Quads(found) = &frame.pixels else { return analyse_frame(image, camera, map, times) };
+    let quads = found.iter().map(|CheckedQuad { quad, .. }| quad.clone()).collect();
+    analyse_quads(image, quads, camera, database(map), &map.params, times)
+}
+
 /// Recognises an image against one version of a map: the whole pipeline.
 pub fn analyse_frame(
     image: &GrayImage,
@@ -50,12 +67,15 @@ pub fn analyse_frame(
     map: &MapSnapshot,
     times: &mut StageTimes,
 ) -> FrameAnalysis {
-    let landmarks = LandmarkDatabase { models: &map.models, sizes: &map.sizes, kind: map.distance };
     // Taken out while in use: a panic leaves no half-written pipeline behind.
     let mut pipeline = PIPELINE.take();
-    let analysis = pipeline.analyse(image, camera, landmarks, &map.params, times);
+    let analysis = pipeline.analyse(image, camera, database(map), &map.params, times);
     PIPELINE.set(pipeline);
     analysis
+}
+
+fn database(map: &MapSnapshot) -> LandmarkDatabase<'_> {
+    LandmarkDatabase { models: &map.models, sizes: &map.sizes, kind: map.distance }
 }
 
 thread_local! {

@@ -18,6 +18,8 @@ pub struct FrameContext<'a> {
     pub camera: Option<&'a Intrinsics>,
     /// Width and height of the image, px.
     pub image_px: [f64; 2],
+    /// Whether the whole image is there. If not, a landmark that was not found is not missing.
+    pub is_whole: bool,
     /// `map_from_robot` as the robot states it.
     pub prior: Option<&'a Pose2Covariance>,
 }
@@ -31,6 +33,7 @@ impl<'a> FrameContext<'a> {
             extrinsics: frame.mounting.as_ref(),
             camera: frame.intrinsics.as_ref(),
             image_px: [f64::from(frame.width_px), f64::from(frame.height_px)],
+            is_whole: frame.is_whole(),
             prior: frame.prior.as_ref(),
         }
     }

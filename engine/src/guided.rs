@@ -124,7 +124,11 @@ pub fn recognise_guided(
     };
     let is_missed = |e: &Expected| {
         let is_observed = assigned.unique().any(|(_, id)| id == e.landmark);
-        e.is_sure && e.side_px >= SURELY_FOUND_PX && is_distinct(map, e.landmark) && !is_observed
+        frame.is_whole
+            && e.is_sure
+            && e.side_px >= SURELY_FOUND_PX
+            && is_distinct(map, e.landmark)
+            && !is_observed
     };
     let missed = expected.searchable().any(is_missed);
     let report = GuidedReport { contradictions: assigned.contradictions(), missed };
@@ -161,8 +165,8 @@ fn quad_matches(image: &GrayImage, frame: &FrameContext<'_>, expected: &Expectat
     for new in all {
         add(&mut chosen, new);
     }
-    let mut open: Vec<&Expected> =
-        expected.searchable().filter(|e| chosen.iter().all(|m| !is_found(m, e))).collect();
+    let is_open = |e: &&Expected| frame.is_whole && chosen.iter().all(|m| !is_found(m, e));
+    let mut open: Vec<&Expected> = expected.searchable().filter(is_open).collect();
     open.sort_by(|a, b| b.side_px.total_cmp(&a.side_px).then(a.landmark.cmp(&b.landmark)));
     for new in open.into_iter().take(MAX_EXPECTED_SEARCHES).filter_map(|e| search(image, e, frame)) {
         add(&mut chosen, new);

@@ -2,9 +2,12 @@
 //! to publish at once. It checks everything but the pixels, and never waits: it runs on the transport's threads.
 
 use super::slots::{SlotKey, Slots};
-use super::{motion::MotionTracker, snapshot::Snapshots};
+use super::{
+    motion::MotionTracker,
+    snapshot::{MapSnapshot, Snapshots},
+};
 use protos::{
-    CheckedFrame, Code, Rejection,
+    CheckedFrame, Code, Name, Rejection,
     prost::{Message, bytes::Bytes},
     v1,
 };
@@ -53,11 +56,23 @@ pub struct Intake {
 }
 
 impl Intake {
-    /// Puts the frame in its slot, or counts its refusal and gives the answer that says why.
+    /// Puts the `Frame` in its slot, or counts its refusal and gives the answer that says why.
     pub fn receive(&self, key: SlotKey, message: Bytes) -> Result<(), Box<v1::Answer>> {
+        self.take(FrameKind::Image, key, message)
+    }
+
+    /// The same for either kind. Quads have the slot of their camera's frames, and one numbering with them.
+    pub fn take(&self, kind: FrameKind, key: SlotKey, message: Bytes) -> Result<(), Box<v1::Answer>> {
+        match kind {
+            FrameKind::Image => self.take_message::<v1::Frame>(key, message),
+            FrameKind::Quads => self.take_message::<v1::Quads>(key, message),
+        }
+    }
+
+    fn take_message<M: FrameMessage>(&self, key: SlotKey, message: Bytes) -> Result<(), Box<v1::Answer>> {
         let received = Instant::now();
         let mut echo = v1::Answer { status: v1::Status::Rejected.into(), ..v1::Answer::default() };
-        let job = match self.check(&key, message, received, &mut echo) {
+        let job = match self.check::<M>(&key, message, received, &mut echo) {
             Ok(job) => job,
             Err(refusal) => {
                 self.slots.refuse(refusal.code);
@@ -69,7 +84,7 @@ impl Intake {
         self.slots.offer(key, order, job, received).map_err(|refusal| refused(echo, &refusal))
     }
 
-    fn check(
+    fn check<M: FrameMessage>(
         &self,
         key: &SlotKey,
         message: Bytes,
@@ -78,30 +93,87 @@ impl Intake {
     ) -> Result<FrameJob, Rejection> {
         if message.len() > self.frame_bytes {
             let detail = format!("{} bytes are more than {}", message.len(), self.frame_bytes);
-            return Err(Rejection::new(Code::TooLarge, "frame", detail));
+            return Err(Rejection::new(Code::TooLarge, M::FIELD, detail));
         }
-        let frame = v1::Frame::decode(message)
-            .map_err(|e| Rejection::new(Code::BadMessage, "frame", format!("no Frame message: {e}")))?;
-        (echo.epoch, echo.seq, echo.captured_ns) = (frame.epoch, frame.seq, frame.captured_ns);
-        let Some(robot_map) = self.snapshots.robot_map(key.robot.as_str()) else {
-            let detail = format!("robot {} is not registered: PUT /api/v1/robots/{}", key.robot, key.robot);
-            return Err(Rejection::new(Code::UnknownRobot, "robot", detail));
-        };
-        let frame = CheckedFrame::try_from(frame)?;
+        let frame = M::decode(message).map_err(|e| {
+            Rejection::new(Code::BadMessage, M::FIELD, format!("no {} message: {e}", M::NAME))
+        })?;
+        (echo.epoch, echo.seq, echo.captured_ns) = frame.numbers();
+        let robot_map = self.robot_map(&key.robot)?;
+        let frame: CheckedFrame = frame.try_into()?;
         self.motion.epochs().admit(&key.robot, frame.epoch, received)?;
         let map = frame.map.as_ref().map_or_else(|| robot_map.clone(), ToString::to_string);
         echo.map.clone_from(&map);
-        let is_open = || {
-            !self.linked_maps_only || map == robot_map || self.snapshots.relation(&robot_map, &map).is_some()
-        };
-        if self.snapshots.get(&map).is_none() || !is_open() {
-            return Err(unknown_map(&map));
-        }
+        self.open_map(&robot_map, &map)?;
         let wait = frame.deadline_ms.map_or(self.deadline, |ms| Duration::from_millis(u64::from(ms)));
         let stamp = self.motion.frame_stamp((&key.robot, &key.camera), &map, &frame, received);
         let stamp_instead_ns = stamp.err();
         let clock_suspect = clock_suspect(frame.captured_ns) || stamp_instead_ns.is_some();
         Ok(FrameJob { frame, map, received, deadline: received + wait, clock_suspect, stamp_instead_ns })
+    }
+
+    /// The map of a robot, by its registration.
+    pub fn robot_map(&self, robot: &Name) -> Result<String, Rejection> {
+        self.snapshots.robot_map(robot.as_str()).ok_or_else(|| {
+            let detail = format!("robot {robot} is not registered: PUT /api/v1/robots/{robot}");
+            Rejection::new(Code::UnknownRobot, "robot", detail)
+        })
+    }
+
+    /// A map that a robot of `robot_map` may name.
+    pub fn open_map(&self, robot_map: &str, map: &str) -> Result<Arc<MapSnapshot>, Rejection> {
+        let is_open =
+            !self.linked_maps_only || map == robot_map || self.snapshots.relation(robot_map, map).is_some();
+        self.snapshots.for_robots(map).filter(|_| is_open).ok_or_else(|| unknown_map(map))
+    }
+}
+
+/// What a robot sends of one camera image.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FrameKind {
+    /// `Frame`: the image.
+    Image,
+    /// `Quads`: what the robot's own detector found in it.
+    Quads,
+}
+
+impl FrameKind {
+    /// An answer with the numbers of a message, as far as it can be read.
+    pub fn echo(self, message: Bytes) -> v1::Answer {
+        fn read<M: FrameMessage>(message: Bytes) -> (u64, u64, i64) {
+            M::decode(message).unwrap_or_default().numbers()
+        }
+        let (epoch, seq, captured_ns) = match self {
+            Self::Image => read::<v1::Frame>(message),
+            Self::Quads => read::<v1::Quads>(message),
+        };
+        v1::Answer { epoch, seq, captured_ns, status: v1::Status::Rejected.into(), ..v1::Answer::default() }
+    }
+}
+
+/// A message of a camera image.
+trait FrameMessage: Message + Default + TryInto<CheckedFrame, Error = Rejection> {
+    /// Its name in the .proto.
+    const NAME: &'static str;
+    /// The message as a whole in refusals.
+    const FIELD: &'static str;
+    /// Epoch, sequence number and capture time, ns.
+    fn numbers(&self) -> (u64, u64, i64);
+}
+
+impl FrameMessage for v1::Frame {
+    const NAME: &'static str = "Frame";
+    const FIELD: &'static str = "frame";
+    fn numbers(&self) -> (u64, u64, i64) {
+        (self.epoch, self.seq, self.captured_ns)
+    }
+}
+
+impl FrameMessage for v1::Quads {
+    const NAME: &'static str = "Quads";
+    const FIELD: &'static str = "quads";
+    fn numbers(&self) -> (u64, u64, i64) {
+        (self.epoch, self.seq, self.captured_ns)
     }
 }
 
@@ -128,7 +200,6 @@ mod tests {
         map_links::MapLink,
         pose2::{Pose2, Pose2Covariance},
     };
-    use protos::Name;
 
     fn intake() -> Intake {
         let snapshots = Arc::new(Snapshots::default());
@@ -190,6 +261,28 @@ mod tests {
         let missing = asks(&intake, "nowhere").unwrap_err().rejection.unwrap();
         assert_eq!((foreign.code, foreign.field), (missing.code, missing.field));
         assert_eq!(foreign.detail.replace("yard", "nowhere"), missing.detail);
+    }
+
+    #[test]
+    fn a_draft_is_no_map_to_robots() {
+        let intake = intake();
+        let draft = crate::snapshot::MapSnapshot {
+            is_draft: true,
+            ..crate::snapshot::MapSnapshot::empty("draft", 1)
+        };
+        intake.snapshots.publish(Arc::new(draft));
+        let ask = |map: &str| {
+            let asked = v1::Frame { map: map.into(), ..frame(1) };
+            intake.receive(key("r1"), asked.encode_to_vec().into()).unwrap_err().rejection.unwrap()
+        };
+        let (named, missing) = (ask("draft"), ask("nowhere"));
+        assert_eq!(
+            (named.code.as_str(), named.detail.replace("draft", "nowhere")),
+            ("unknown_map", missing.detail)
+        );
+        let mut changes = intake.snapshots.changes();
+        intake.snapshots.remove_map("draft");
+        assert!(changes.try_recv().unwrap().is_draft, "nobody tells robots that it is gone");
     }
 
     #[test]

@@ -188,8 +188,8 @@ fn landmark_checks(
         Some(ExpectedLandmark { landmark: model.id, place, visible })
     });
     let camera = MountedCamera { mounting: extrinsics, camera, image_px };
-    // Only a pose that rests on several other landmarks shows that one is missing.
-    let missed = if prior.supporting_landmarks.len() >= p.supporters {
+    // Only a pose that rests on several other landmarks shows that one is missing, and only in a whole image.
+    let missed = if frame.is_whole && prior.supporting_landmarks.len() >= p.supporters {
         expected(&prior.pose, &camera, &candidates.collect::<Vec<_>>(), &p)
     } else {
         Vec::new()

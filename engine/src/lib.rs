@@ -26,6 +26,8 @@ pub mod epochs;
 pub mod gaze;
 pub mod findings;
 pub mod answer_records;
+pub mod kept_frames;
+pub mod replay;
 pub mod fixes;
 pub mod localise;
 pub mod frame_analysis;

@@ -6,7 +6,7 @@ use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 use map::pose2::{Pose2, Pose2Covariance};
 use protos::{
     Name,
-    convert::{Encoding, geometry::pose2_wire},
+    convert::{EncodedImage, Encoding, Pixels, geometry::pose2_wire},
     prost::bytes::Bytes,
     v1,
 };
@@ -17,7 +17,11 @@ use std::{
 };
 use tokio::sync::broadcast;
 
-use super::{cameras::CameraRegistry, slots::SlotKey};
+use super::{
+    cameras::CameraRegistry,
+    decode::{ImageLimits, mosaic::mosaic},
+    slots::SlotKey,
+};
 use crate::limits::MAX_ROBOTS;
 
 /// Cameras whose last frame is stored; a further one replaces the one with the oldest frame.
@@ -32,28 +36,36 @@ pub const MAX_EVENTS: usize = 512;
 /// The last frame of a camera, as it came.
 #[derive(Debug, Clone)]
 pub struct LiveFrame {
-    /// Encoding of `image`.
-    pub encoding: Encoding,
     /// Width, px.
     pub width_px: u32,
     /// Height, px.
     pub height_px: u32,
-    /// Encoded image.
-    pub image: Bytes,
+    /// The image, or the quads that were sent of it.
+    pub pixels: Pixels,
     /// The answer to it.
     pub answer: Arc<v1::Answer>,
 }
 
 impl LiveFrame {
-    /// The image in a form that browsers show: its media type and bytes. Raw pixels become PNG.
+    /// The image in a form that browsers show: its media type and bytes. Raw pixels become PNG, and so do patches, each at its
+    /// place in the image.
     pub fn for_browsers(&self) -> Result<(&'static str, Bytes), image::ImageError> {
-        match self.encoding {
-            Encoding::Jpeg => Ok(("image/jpeg", self.image.clone())),
-            Encoding::Png => Ok(("image/png", self.image.clone())),
-            Encoding::Gray8 => self.png(&self.image, ExtendedColorType::L8),
-            Encoding::Rgb8 => self.png(&self.image, ExtendedColorType::Rgb8),
+        let EncodedImage { encoding, bytes } = match &self.pixels {
+            Pixels::Image(image) => image,
+            Pixels::Quads(quads) => {
+                let size = (self.width_px as usize, self.height_px as usize);
+                let image = mosaic(quads, size, ImageLimits::FRAME)
+                    .map_err(|refusal| image::ImageError::IoError(std::io::Error::other(refusal)))?;
+                return self.png(image.data(), ExtendedColorType::L8);
+            }
+        };
+        match encoding {
+            Encoding::Jpeg => Ok(("image/jpeg", bytes.clone())),
+            Encoding::Png => Ok(("image/png", bytes.clone())),
+            Encoding::Gray8 => self.png(bytes, ExtendedColorType::L8),
+            Encoding::Rgb8 => self.png(bytes, ExtendedColorType::Rgb8),
             Encoding::Bgr8 => {
-                let rgb: Vec<u8> = self.image.chunks_exact(3).flat_map(|p| [p[2], p[1], p[0]]).collect();
+                let rgb: Vec<u8> = bytes.chunks_exact(3).flat_map(|p| [p[2], p[1], p[0]]).collect();
                 self.png(&rgb, ExtendedColorType::Rgb8)
             }
         }

@@ -25,8 +25,8 @@ pub const MAX_MAPPINGS: usize = 4;
 /// Maps with a stored mapping; a further one replaces the first by name that is over.
 pub const MAX_SESSIONS: usize = 64;
 
-/// Walls: ends a.x, a.y, b.x, b.y (map frame, m), free side on the left.
-pub type Walls = Vec<[f64; 4]>;
+/// Walls in the map frame, with their covariance relative to the map's first pose.
+pub type Walls = Vec<map::segments::LaserSegment>;
 
 /// Stage of a mapping.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -3,6 +3,7 @@
 use super::{
     answer_records::answer_records,
     findings::findings,
+    kept_frames::KeptFrames,
     live::LiveHub,
     motion::MotionTracker,
     slots::Slots,
@@ -110,6 +111,7 @@ pub fn engine(maps: &[Arc<MapSnapshot>]) -> Engine {
         vitals: Arc::default(),
         findings: findings().0,
         records: answer_records().0,
+        kept_frames: Arc::new(KeptFrames::new(1 << 20)),
         relocalisers: Arc::default(),
         frame_tap: Arc::new(crate::frame_tap::NoTap),
         search_every_frame: true,

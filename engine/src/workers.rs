@@ -8,10 +8,11 @@ use super::{
     cameras::CameraSample,
     decode::{ImageLimits, decode_frame},
     findings::{FindingSender, LandmarkFinding},
-    frame_analysis::{StageTimes, analyse_frame},
+    frame_analysis::{StageTimes, analyse_checked},
     frame_context::FrameContext,
     guided::{GuidedResult, recognise_guided},
     intake::{FrameJob, unknown_map},
+    kept_frames::KeptFrames,
     landmark_checks::{FrameEvaluation, LandmarkChecks, evaluate_expected_only, evaluate_frame},
     live::{LiveFrame, LiveHub},
     motion::{FrameStamp, MotionTracker, PriorPose},
@@ -54,6 +55,8 @@ pub struct Engine {
     pub findings: FindingSender,
     /// Where answers that are worth storing go.
     pub records: AnswerRecorder,
+    /// Where the frames of those answers are kept.
+    pub kept_frames: Arc<KeptFrames>,
     /// Relocalisations of robots without a pose.
     pub relocalisers: Arc<Relocalisers>,
     /// Takes frames of robots that gather views.
@@ -220,7 +223,7 @@ impl Engine {
             let icons = self.records.take(key, &answer, (&image, &map));
             return Ok(AnsweredFrame { answer, icons, map, evaluation: Some(evaluation), relocalised: None });
         }
-        let analysis = analyse_frame(&image, frame.intrinsics.as_ref(), &map, &mut times);
+        let analysis = analyse_checked(frame, &image, &map, &mut times);
         let mut answer = crate::frame_answer::answer(&analysis, &map);
         let context = FrameContext::new(frame, &analysis, &map);
         // The guide is the fused pose while nothing contradicts it; without one, the robot's own prior.
@@ -239,7 +242,7 @@ impl Engine {
             if let Some(captured_ns) = job.stamp_instead_ns.filter(|_| on_own_map && is_live) {
                 let frame = CheckedFrame { captured_ns, ..frame.clone() };
                 let (quads, map_from_robot) = (analysis.quads, frame.prior);
-                if self.frame_tap.is_wanted(key) {
+                if self.is_gathered(key, &frame) {
                     self.frame_tap.offer(
                         key,
                         &frame,
@@ -267,7 +270,7 @@ impl Engine {
         times.ended("localise");
         answer.timings = times.finish();
         let icons = self.records.take(key, &answer, (&image, &map));
-        if self.frame_tap.is_wanted(key) {
+        if self.is_gathered(key, frame) {
             let map_from_robot = frame.prior.or(evaluation.prior);
             let analysed = AnalysedFrame { image, quads: analysis.quads, map: map.clone(), map_from_robot };
             self.frame_tap.offer(key, frame, analysed);
@@ -287,7 +290,8 @@ impl Engine {
         times: &mut StageTimes,
     ) -> Option<(v1::Answer, FrameEvaluation)> {
         let is_spared = |p: &&PriorPose| p.plan.guided && p.plan.global.is_none();
-        let prior = prior.filter(is_spared).filter(|_| !self.search_every_frame)?;
+        let may_spare = !self.search_every_frame && frame.is_whole();
+        let prior = prior.filter(is_spared).filter(|_| may_spare)?;
         if self.frame_tap.is_wanted(key) {
             return None;
         }
@@ -305,6 +309,11 @@ impl Engine {
         times.ended("localise");
         answer.timings = times.finish();
         Some((answer, evaluation))
+    }
+
+    /// Whether a frame is wanted by a gathering. Of quads, no photograph is there to learn from.
+    fn is_gathered(&self, key: &SlotKey, frame: &CheckedFrame) -> bool {
+        frame.is_whole() && self.frame_tap.is_wanted(key)
     }
 
     /// Continues the relocalisation of a robot without a pose; ends it for a robot with one.
@@ -348,14 +357,12 @@ impl Engine {
         publish.answer(key, &answer);
         let answer = Arc::new(answer);
         if let Some(icons) = icons {
+            self.kept_frames.keep_answered(key, &answer, frame);
             self.records.send(AnswerRecord { key: key.clone(), answer: answer.clone(), icons });
         }
         if answer.rejection.is_none() {
-            let (encoding, width_px, height_px) = (frame.encoding, frame.width_px, frame.height_px);
-            self.live.publish_answer(
-                key,
-                LiveFrame { encoding, width_px, height_px, image: frame.image.clone(), answer },
-            );
+            let (width_px, height_px, pixels) = (frame.width_px, frame.height_px, frame.pixels.clone());
+            self.live.publish_answer(key, LiveFrame { width_px, height_px, pixels, answer });
         } else {
             self.live.publish_refusal(key, answer);
         }

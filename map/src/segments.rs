@@ -48,6 +48,41 @@ impl LaserSegment {
         Ok(Self { a, b, alpha_rad: normal.y.atan2(normal.x), rho_m, covariance, hits: 1 })
     }
 
+    /// From its ends and the covariance of its direction and its offset to the free side, about its middle: rad^2,
+    /// rad m, m^2. That form does not depend on the map's origin. Bounds as those of [`Self::from_ends`].
+    pub fn about_middle(
+        a: Point2<f64>,
+        b: Point2<f64>,
+        covariance: &Matrix2<f64>,
+    ) -> Result<Self, OutOfRange> {
+        check::covariance("covariance", covariance)?;
+        let plain = Self::from_ends(a, b, Matrix2::zeros())?;
+        let (sign, along_m) = plain.line_by_middle();
+        // Inverse of that of `covariance_about_middle`.
+        let j = Matrix2::new(1.0, 0.0, sign * along_m, sign);
+        let covariance = j * covariance * j.transpose();
+        let covariance = 0.5 * (covariance + covariance.transpose());
+        check::covariance("covariance", &covariance)?;
+        Ok(Self { covariance, ..plain })
+    }
+
+    /// Covariance of its direction and its offset to the free side, about its middle: rad^2, rad m, m^2.
+    pub fn covariance_about_middle(&self) -> Matrix2<f64> {
+        let (sign, along_m) = self.line_by_middle();
+        let j = Matrix2::new(1.0, 0.0, -along_m, sign);
+        let covariance = j * self.covariance * j.transpose();
+        0.5 * (covariance + covariance.transpose())
+    }
+
+    /// Whether rho grows to the free side (1, or -1), and how far the middle lies along the wall from the foot of the
+    /// origin, metres.
+    fn line_by_middle(&self) -> (f64, f64) {
+        let n = self.facing();
+        let is_same = n.dot(&Vector2::new(self.alpha_rad.cos(), self.alpha_rad.sin())) >= 0.0;
+        let middle = nalgebra::center(&self.a, &self.b);
+        (if is_same { 1.0 } else { -1.0 }, Vector2::new(-n.y, n.x).dot(&middle.coords))
+    }
+
     /// From ends `[ax, ay, bx, by]` (metres) measured by hand, each known to 1 cm across the wall.
     pub fn by_hand(&[ax, ay, bx, by]: &[f64; 4]) -> Result<Self, OutOfRange> {
         let (a, b) = (Point2::new(ax, ay), Point2::new(bx, by));
@@ -170,6 +205,44 @@ mod tests {
             let got = wall().transformed(&Pose2Covariance { pose, covariance: pose_covariance }).covariance;
             assert!((got - expected).norm() < 1e-8, "{got} {expected}");
         }
+    }
+
+    #[test]
+    fn the_covariance_about_the_middle_is_that_of_the_wall_in_every_frame() {
+        // Oracle: a wall drawn by its covariance about the middle, and the line that goes through it.
+        let about = Matrix2::new(4e-6, -1.2e-5, -1.2e-5, 1e-4);
+        for (a, b) in [([40.0, -1.0], [43.0, 1.0]), ([43.0, 1.0], [40.0, -1.0]), ([-2.0, 0.0], [4.0, 0.0])] {
+            let wall = LaserSegment::about_middle(Point2::from(a), Point2::from(b), &about).unwrap();
+            assert!((wall.covariance_about_middle() - about).norm() < 1e-12, "{wall:?}");
+            let (middle, n) = (nalgebra::center(&wall.a, &wall.b), wall.facing());
+            let line = |turn: f64, offset: f64| {
+                let turned = nalgebra::Rotation2::new(turn);
+                let end = |p: &Point2<f64>| middle + turned * (p - middle + n * offset);
+                let s = LaserSegment::from_ends(end(&wall.a), end(&wall.b), Matrix2::zeros()).unwrap();
+                // Near the origin the sign of the normal is a convention.
+                let same = (s.alpha_rad - wall.alpha_rad).cos() > 0.0;
+                let (alpha, rho) = if same { (s.alpha_rad, s.rho_m) } else { (s.alpha_rad + PI, -s.rho_m) };
+                Vector2::new(wrap_rad(alpha), rho)
+            };
+            let by = |up: Vector2<f64>, down: Vector2<f64>| {
+                Vector2::new(wrap_rad(up.x - down.x), up.y - down.y) / 2e-6
+            };
+            let j = Matrix2::from_columns(&[
+                by(line(1e-6, 0.0), line(-1e-6, 0.0)),
+                by(line(0.0, 1e-6), line(0.0, -1e-6)),
+            ]);
+            let expected = j * about * j.transpose();
+            assert!(
+                (wall.covariance - expected).norm() < 1e-7 * (1.0 + expected.norm()),
+                "{wall:?} {expected}"
+            );
+            let pose = Pose2::new(-300.0, 70.0, 2.0);
+            let moved = wall.transformed(&Pose2Covariance { pose, covariance: Matrix3::zeros() });
+            assert!((moved.covariance_about_middle() - about).norm() < 1e-10, "{moved:?}");
+        }
+        let (a, b) = (Point2::origin(), Point2::new(1.0, 0.0));
+        let bad = Matrix2::new(1e-4, 1.0, 1.0, 1e-4);
+        assert_eq!(LaserSegment::about_middle(a, b, &bad).unwrap_err().field, "covariance");
     }
 
     #[test]

@@ -23,9 +23,11 @@ mod area;
 mod chance;
 mod coverage;
 mod geojson;
+mod bytes;
 pub mod pointwise;
 
 pub use area::{MAX_OBSTACLES, VisibilityMap, visibility, within_reach};
+pub use bytes::{COMPUTATION, NotAnArea, inputs};
 pub use chance::{DRAWS, PoseDraws};
 pub use coverage::{Coverage, CoverageGap, CoverageSample, MAX_STEPS, coverage};
 pub use geojson::{Feature, Geometry, Properties};

@@ -134,6 +134,85 @@ pub struct Point {
     #[prost(double, tag = "2")]
     pub v_px: f64,
 }
+/// Four corners of a border in the image: TL, TR, BR, BL, clockwise on screen, strictly convex.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct Border {
+    #[prost(message, repeated, tag = "1")]
+    pub corners: ::prost::alloc::vec::Vec<Point>,
+}
+/// Pixels of the image, cut out along its rows and columns.
+#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct Patch {
+    /// Its top-left pixel in the image, and its size; it lies within the image.
+    #[prost(uint32, tag = "1")]
+    pub left_px: u32,
+    #[prost(uint32, tag = "2")]
+    pub top_px: u32,
+    #[prost(uint32, tag = "3")]
+    pub width_px: u32,
+    #[prost(uint32, tag = "4")]
+    pub height_px: u32,
+    #[prost(enumeration = "ImageEncoding", tag = "5")]
+    pub encoding: i32,
+    #[prost(bytes = "bytes", tag = "6")]
+    pub image: ::prost::bytes::Bytes,
+}
+/// A flat four-sided object that the robot's own detector found.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct FoundQuad {
+    /// TL, TR, BR, BL, px of the image, at most one width and height outside of it.
+    #[prost(message, optional, tag = "1")]
+    pub border: ::core::option::Option<Border>,
+    /// Of each corner uu, uv, vv; 12 numbers. Absent: 1 px^2.
+    #[prost(double, repeated, tag = "2")]
+    pub corner_covariance_px2: ::prost::alloc::vec::Vec<f64>,
+    /// Other borders of the same object, nested in `border`, outermost first; at most 8.
+    #[prost(message, repeated, tag = "3")]
+    pub alternates: ::prost::alloc::vec::Vec<Border>,
+    /// Detection score, 0 to 1.
+    #[prost(double, tag = "4")]
+    pub score: f64,
+    /// Another corner may as well be the top-left one: all four turns are compared.
+    #[prost(bool, tag = "5")]
+    pub upright_ambiguous: bool,
+    /// The pixels of the quad, as far as it lies in the image, advised with two fifths of its width and height around: the
+    /// learnt border may lie outside of the found one.
+    #[prost(message, optional, tag = "6")]
+    pub patch: ::core::option::Option<Patch>,
+}
+/// robot/{robot}/quads/{camera}: what the robot's own detector found in an image, in place of the image. Answered as a frame
+/// of that camera, and numbered with its frames. What is outside of the patches is unknown: nothing is searched for there,
+/// and no landmark counts as missing.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct Quads {
+    #[prost(uint64, tag = "1")]
+    pub epoch: u64,
+    #[prost(uint64, tag = "2")]
+    pub seq: u64,
+    #[prost(int64, tag = "3")]
+    pub captured_ns: i64,
+    /// Size of the image.
+    #[prost(uint32, tag = "4")]
+    pub width_px: u32,
+    #[prost(uint32, tag = "5")]
+    pub height_px: u32,
+    /// Best first, at most 24. None is an answer, too: nothing was found.
+    #[prost(message, repeated, tag = "6")]
+    pub quads: ::prost::alloc::vec::Vec<FoundQuad>,
+    /// As those of a frame.
+    #[prost(message, optional, tag = "7")]
+    pub intrinsics: ::core::option::Option<Intrinsics>,
+    #[prost(message, optional, tag = "8")]
+    pub robot_from_camera: ::core::option::Option<Pose3>,
+    #[prost(message, optional, tag = "9")]
+    pub odometry: ::core::option::Option<Pose2>,
+    #[prost(message, optional, tag = "10")]
+    pub prior: ::core::option::Option<Pose2Covariance>,
+    #[prost(uint32, tag = "11")]
+    pub deadline_ms: u32,
+    #[prost(string, tag = "12")]
+    pub map: ::prost::alloc::string::String,
+}
 #[derive(::serde::Serialize, ::serde::Deserialize)]
 #[serde(default)]
 #[derive(Clone, PartialEq, ::prost::Message)]
@@ -554,6 +633,62 @@ pub struct GazeAdvice {
     #[prost(double, tag = "13")]
     pub incidence_rad: f64,
 }
+/// robot/{robot}/rpc/localise, a query: where the robot is by what it senses at one place, without its history. Changes no
+/// fused pose. At least a frame or a scan is needed.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct LocaliseRequest {
+    /// Needs intrinsics and robot_from_camera. Epoch, number, time, odometry, prior, deadline and map are not used.
+    #[prost(message, optional, tag = "1")]
+    pub frame: ::core::option::Option<Frame>,
+    /// From the same place. Epoch, number, time and odometry are not used.
+    #[prost(message, optional, tag = "2")]
+    pub scan: ::core::option::Option<Scan>,
+    /// The map to localise in; empty = the robot's map.
+    #[prost(string, tag = "3")]
+    pub map: ::prost::alloc::string::String,
+    /// How long after receipt the server may search; 0 and more than 10 000 stand for 10 000.
+    #[prost(uint32, tag = "4")]
+    pub deadline_ms: u32,
+}
+/// A pose that the robot may be at.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct LocaliseHypothesis {
+    #[prost(message, optional, tag = "1")]
+    pub map_from_robot: ::core::option::Option<Pose2Covariance>,
+    /// All hypotheses sum to 1.
+    #[prost(double, tag = "2")]
+    pub probability: f64,
+    /// The landmarks that it rests on.
+    #[prost(string, repeated, tag = "3")]
+    pub landmarks: ::prost::alloc::vec::Vec<::prost::alloc::string::String>,
+    /// Share of the scan's points with a wall, 0 to 1; absent where the scan was not used.
+    #[prost(double, optional, tag = "4")]
+    pub matched: ::core::option::Option<f64>,
+}
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct LocaliseReply {
+    /// Present if the request was refused; nothing else is set then.
+    #[prost(message, optional, tag = "1")]
+    pub rejection: ::core::option::Option<Rejection>,
+    #[prost(string, tag = "2")]
+    pub map: ::prost::alloc::string::String,
+    #[prost(uint64, tag = "3")]
+    pub map_version: u64,
+    #[prost(enumeration = "LocaliseStatus", tag = "4")]
+    pub status: i32,
+    /// Why there is not exactly one pose, empty with LOCATED: a word of HTTP's localise.
+    #[prost(string, tag = "5")]
+    pub reason: ::prost::alloc::string::String,
+    /// Present with LOCATED.
+    #[prost(message, optional, tag = "6")]
+    pub map_from_robot: ::core::option::Option<Pose2Covariance>,
+    /// Most probable first, at most 16.
+    #[prost(message, repeated, tag = "7")]
+    pub hypotheses: ::prost::alloc::vec::Vec<LocaliseHypothesis>,
+    /// The answer to the frame.
+    #[prost(message, optional, tag = "8")]
+    pub answer: ::core::option::Option<Answer>,
+}
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, ::prost::Enumeration)]
 #[repr(i32)]
 pub enum ImageEncoding {
@@ -917,6 +1052,41 @@ impl GazeAction {
             "GAZE_ACTION_LANDMARK" => Some(Self::Landmark),
             "GAZE_ACTION_AHEAD" => Some(Self::Ahead),
             "GAZE_ACTION_SWEEP" => Some(Self::Sweep),
+            _ => None,
+        }
+    }
+}
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, ::prost::Enumeration)]
+#[repr(i32)]
+pub enum LocaliseStatus {
+    Unspecified = 0,
+    /// There is one pose.
+    Located = 1,
+    /// There are hypotheses, and nothing tells which is right.
+    Ambiguous = 2,
+    /// Nothing matches.
+    NoMatch = 3,
+}
+impl LocaliseStatus {
+    /// String value of the enum field names used in the ProtoBuf definition.
+    ///
+    /// The values are not transformed in any way and thus are considered stable
+    /// (if the ProtoBuf definition does not change) and safe for programmatic use.
+    pub fn as_str_name(&self) -> &'static str {
+        match self {
+            Self::Unspecified => "LOCALISE_STATUS_UNSPECIFIED",
+            Self::Located => "LOCALISE_STATUS_LOCATED",
+            Self::Ambiguous => "LOCALISE_STATUS_AMBIGUOUS",
+            Self::NoMatch => "LOCALISE_STATUS_NO_MATCH",
+        }
+    }
+    /// Creates an enum from field names used in the ProtoBuf definition.
+    pub fn from_str_name(value: &str) -> ::core::option::Option<Self> {
+        match value {
+            "LOCALISE_STATUS_UNSPECIFIED" => Some(Self::Unspecified),
+            "LOCALISE_STATUS_LOCATED" => Some(Self::Located),
+            "LOCALISE_STATUS_AMBIGUOUS" => Some(Self::Ambiguous),
+            "LOCALISE_STATUS_NO_MATCH" => Some(Self::NoMatch),
             _ => None,
         }
     }

@@ -88,6 +88,8 @@ impl From<Name> for String {
 pub enum Key {
     /// `robot/{robot}/frame/{camera}`: robot to server, `Frame`.
     Frame(Name, Name),
+    /// `robot/{robot}/quads/{camera}`: robot to server, `Quads`.
+    Quads(Name, Name),
     /// `robot/{robot}/answer/{camera}`: server to robot, `Answer`.
     Answer(Name, Name),
     /// `robot/{robot}/odometry`: robot to server, `Odometry`.
@@ -103,6 +105,8 @@ pub enum Key {
     Gaze(Name),
     /// `robot/{robot}/rpc/hello`: a query of the robot, answered with nothing: its messages arrive.
     Hello(Name),
+    /// `robot/{robot}/rpc/localise`: a query of the robot, `LocaliseRequest` in, `LocaliseReply` out.
+    Localise(Name),
     /// `map/{map}/changed`: server to all, `MapChanged`.
     MapChanged(Name),
     /// `map/{map}/version`: a query of anyone, `MapChanged` out with the present version.
@@ -145,6 +149,7 @@ impl Keys {
         let p = &self.prefix;
         match key {
             Key::Frame(robot, camera) => format!("{p}robot/{robot}/frame/{camera}"),
+            Key::Quads(robot, camera) => format!("{p}robot/{robot}/quads/{camera}"),
             Key::Answer(robot, camera) => format!("{p}robot/{robot}/answer/{camera}"),
             Key::Odometry(robot) => format!("{p}robot/{robot}/odometry"),
             Key::Scan(robot) => format!("{p}robot/{robot}/scan"),
@@ -153,6 +158,7 @@ impl Keys {
             Key::Alive(robot, Some(epoch)) => format!("{p}robot/{robot}/alive/{epoch}"),
             Key::Gaze(robot) => format!("{p}robot/{robot}/rpc/gaze"),
             Key::Hello(robot) => format!("{p}robot/{robot}/rpc/hello"),
+            Key::Localise(robot) => format!("{p}robot/{robot}/rpc/localise"),
             Key::MapChanged(map) => format!("{p}map/{map}/changed"),
             Key::MapVersion(map) => format!("{p}map/{map}/version"),
         }
@@ -161,6 +167,11 @@ impl Keys {
     /// Key expression of the frames of all robots.
     pub fn all_frames(&self) -> String {
         format!("{}robot/*/frame/*", self.prefix)
+    }
+
+    /// Key expression of the quads of all robots.
+    pub fn all_quads(&self) -> String {
+        format!("{}robot/*/quads/*", self.prefix)
     }
 
     /// Key expression of the odometry of all robots.
@@ -176,6 +187,11 @@ impl Keys {
     /// Key expression of the gaze requests of all robots.
     pub fn all_gaze(&self) -> String {
         format!("{}robot/*/rpc/gaze", self.prefix)
+    }
+
+    /// Key expression of the localisations of all robots.
+    pub fn all_localisations(&self) -> String {
+        format!("{}robot/*/rpc/localise", self.prefix)
     }
 
     /// Key expression of the greetings of all robots.
@@ -213,6 +229,11 @@ impl Keys {
         format!("{}robot/{robot}/frame/*", self.prefix)
     }
 
+    /// Key expression of the quads of one robot.
+    pub fn quads_of(&self, robot: &Name) -> String {
+        format!("{}robot/{robot}/quads/*", self.prefix)
+    }
+
     /// Key expression of the liveliness tokens of one robot.
     pub fn tokens_of(&self, robot: &Name) -> String {
         format!("{}robot/{robot}/alive/**", self.prefix)
@@ -236,11 +257,15 @@ impl Keys {
             [Some("robot"), Some(r), Some("frame"), Some(c), None] => {
                 Ok(Key::Frame(robot(r)?, named("camera", c)?))
             }
+            [Some("robot"), Some(r), Some("quads"), Some(c), None] => {
+                Ok(Key::Quads(robot(r)?, named("camera", c)?))
+            }
             [Some("robot"), Some(r), Some("answer"), Some(c), None] => {
                 Ok(Key::Answer(robot(r)?, named("camera", c)?))
             }
             [Some("robot"), Some(r), Some("rpc"), Some("gaze"), None] => Ok(Key::Gaze(robot(r)?)),
             [Some("robot"), Some(r), Some("rpc"), Some("hello"), None] => Ok(Key::Hello(robot(r)?)),
+            [Some("robot"), Some(r), Some("rpc"), Some("localise"), None] => Ok(Key::Localise(robot(r)?)),
             [Some("robot"), Some(r), Some("odometry"), None, _] => Ok(Key::Odometry(robot(r)?)),
             [Some("robot"), Some(r), Some("scan"), None, _] => Ok(Key::Scan(robot(r)?)),
             [Some("robot"), Some(r), Some("pose"), None, _] => Ok(Key::Pose(robot(r)?)),
@@ -326,6 +351,7 @@ mod tests {
             let keys = Keys::new(&fleet);
             for key in [
                 Key::Frame(a.clone(), b.clone()),
+                Key::Quads(a.clone(), b.clone()),
                 Key::Answer(a.clone(), b.clone()),
                 Key::Odometry(a.clone()),
                 Key::Scan(a.clone()),
@@ -336,6 +362,7 @@ mod tests {
                 Key::MapVersion(a.clone()),
                 Key::Gaze(a.clone()),
                 Key::Hello(a.clone()),
+                Key::Localise(a.clone()),
             ] {
                 prop_assert_eq!(keys.parse(&keys.build(&key)), Ok(key));
             }

@@ -38,7 +38,7 @@ pub enum Code {
     ClockBehind,
     /// The deadline passed before work began.
     Expired,
-    /// More cameras or robots than the server serves.
+    /// More cameras, robots, elements or questions at a time than the server serves.
     TooMany,
     /// The server failed on this input; reported, counted, and the server goes on.
     Internal,

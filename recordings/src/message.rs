@@ -34,7 +34,12 @@ impl Body {
             Key::Scan(_) => Self::Scan(v1::Scan::decode(bytes)?),
             Key::Pose(_) => Self::Pose(v1::RobotPose::decode(bytes)?),
             Key::MapChanged(_) => Self::MapChanged(v1::MapChanged::decode(bytes)?),
-            Key::Alive(..) | Key::Gaze(_) | Key::Hello(_) | Key::MapVersion(_) => return Ok(None),
+            Key::Quads(..)
+            | Key::Alive(..)
+            | Key::Gaze(_)
+            | Key::Hello(_)
+            | Key::Localise(_)
+            | Key::MapVersion(_) => return Ok(None),
         }))
     }
 

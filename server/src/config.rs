@@ -173,6 +173,8 @@ pub struct Limits {
     pub jobs_kept: usize,
     /// Answers to frames that are stored; the oldest go.
     pub stored_answers: usize,
+    /// Bytes of frames that are kept in memory to try drafts with; the oldest go.
+    pub replay_bytes: usize,
     /// Answers to creations that are kept for repeats, for a day at most; the oldest go.
     pub kept_answers: usize,
     /// Commits of each map that are kept; the oldest go.
@@ -210,6 +212,7 @@ impl Default for Limits {
             jobs: 64,
             jobs_kept: 1_000,
             stored_answers: 2_000,
+            replay_bytes: 64 << 20,
             kept_answers: 10_000,
             kept_commits: 1_000,
             history_bytes: 4 << 30,
@@ -220,7 +223,7 @@ impl Default for Limits {
 
 impl Limits {
     /// Name and value of every bound that must not be 0.
-    fn counts(&self) -> [(&'static str, usize); 26] {
+    fn counts(&self) -> [(&'static str, usize); 27] {
         [
             ("limits.frame_bytes", self.frame_bytes),
             ("limits.frame_pixels", self.frame_pixels),
@@ -244,6 +247,7 @@ impl Limits {
             ("limits.write_queue", self.write_queue),
             ("limits.jobs", self.jobs),
             ("limits.stored_answers", self.stored_answers),
+            ("limits.replay_bytes", self.replay_bytes),
             ("limits.kept_answers", self.kept_answers),
             ("limits.kept_commits", self.kept_commits),
             ("limits.history_bytes", self.history_bytes),

@@ -4,6 +4,7 @@
 use protos::api::{FailedGate, GateBody, LookAlikeBody};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
+use std::collections::BTreeMap;
 use vision::model::{Gate, GateFailure, LandmarkId, ThresholdError};
 
 /// A look-alike as it is stored. Its name is that of the time of learning; the number is what holds.
@@ -30,6 +31,25 @@ impl StoredLookAlike {
         };
         Some(LookAlikeBody { landmark, gradient_similarity: self.gradient_similarity })
     }
+}
+
+/// A stored text with the numbers that landmarks have in another map: of a refusal, or of facts that name look-alikes. A
+/// landmark that is not among them is gone there: it gets 0, which is the number of none.
+pub(crate) fn renumbered(text: &str, numbers: &BTreeMap<LandmarkId, LandmarkId>) -> String {
+    let Ok(mut value) = serde_json::from_str::<Value>(text) else { return text.to_owned() };
+    let mut changed = false;
+    let mut change = |of: &mut Value| {
+        if let Some(id) = of.get_mut("id")
+            && let Some(old) = id.as_u64()
+        {
+            *id = numbers.get(&LandmarkId(old)).map_or(0, |new| new.0).into();
+            changed = true;
+        }
+    };
+    change(&mut value);
+    value.get_mut("look_alikes").and_then(Value::as_array_mut).into_iter().flatten().for_each(change);
+    // A text without numbers stays as it is, byte for byte.
+    if changed { value.to_string() } else { text.to_owned() }
 }
 
 /// A failed gate as it is stored.

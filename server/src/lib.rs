@@ -14,6 +14,7 @@ mod store;
 mod publication;
 mod failed_gates;
 mod recording_answers;
+mod localise_body;
 mod jobs;
 pub mod gather;
 pub mod calibrating;

@@ -246,7 +246,7 @@ async fn place(desk: &Desk) {
     assert_eq!(desk.done("map walls office").lines().count(), 2, "nothing was changed");
     desk.done(&format!("{import} --yes"));
     let walls = desk.server.maps().walls("office").await.expect("walls");
-    assert_eq!(walls.segments, [WallBody { a: [0.0, 0.0], b: [6.0, 0.0] }]);
+    assert_eq!(walls.segments, [WallBody::between([0.0, 0.0], [6.0, 0.0])]);
     let beyond = desk.failed("landmark place first --wall 1 --at 7 --height 1.5", 2, "usage");
     assert!(beyond.contains("6.00 m long"), "{beyond}");
     assert!(

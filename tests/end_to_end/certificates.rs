@@ -2,6 +2,7 @@
 //! anything; a revoked certificate gives nothing any more, at once; and private keys are nobody else's.
 
 mod keys;
+mod lifetimes;
 mod refusals;
 mod revocation;
 
@@ -54,8 +55,10 @@ impl Fleet {
         self.folders.path().join(robot)
     }
 
+    /// For a robot that is to be admitted, however busy the machine is.
     fn options(&self, robot: &str) -> RobotOptions {
-        RobotOptions::from_file(self.folder(robot).join("robot.json")).expect("the robot's file")
+        let options = RobotOptions::from_file(self.folder(robot).join("robot.json"));
+        RobotOptions { timeout: SOON, ..options.expect("the robot's file") }
     }
 
     /// A session that shows the certificate of a robot, without the SDK.

@@ -269,6 +269,9 @@ async fn limits_accept_their_bound_and_refuse_more() {
     assert_eq!(put("/maps/hall/walls", segments(3)).await.expect("answer").status(), StatusCode::OK);
     let four = refusal(put("/maps/hall/walls", segments(4)).await.expect("answer")).await;
     assert_eq!(four, (422, "too_many".into(), "segments".into()));
+    let wall = json!({ "a": [0.0, 0.0], "b": [1.0, 0.0], "covariance": [1e-4, 1.0, 1e-4] });
+    let impossible = put("/maps/hall/walls", json!({ "segments": [wall] })).await.expect("answer");
+    assert_eq!(refusal(impossible).await, (422, "out_of_range".into(), "segments[0].covariance".into()));
 
     for seed in [1, 2, 2] {
         // The third is a duplicate of the second: no new view.

@@ -1,7 +1,10 @@
 //! Claim: a driving robot that sends scans over zenoh makes the walls of a map, the same as `waymark map build`
 //! from a scan log of them; they are stored when the mapping is finished, not before.
 
-use client::{Delivery, RobotClient, RobotOptions, api::NewMap};
+use client::{
+    Delivery, RobotClient, RobotOptions,
+    api::{NewMap, WallBody, WallsBody},
+};
 use reqwest::{Method, StatusCode};
 use serde_json::{Value, json};
 use server::config::Limits;
@@ -205,6 +208,18 @@ async fn a_mapping_continues_after_the_server_is_killed() {
     let off =
         live.iter().flatten().zip(file.iter().flatten()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     assert!(off < 1e-6, "{off} m");
+    let walls: WallsBody =
+        serde_json::from_value(ask(&server, Method::GET, "walls", None).await).expect("walls");
+    // Of scans of 1 cm, relative to the first pose of the drive.
+    let offset_m = |w: &WallBody| w.covariance.expect("a wall of scans is known so well")[2].sqrt();
+    assert!(walls.segments.iter().map(offset_m).all(|m| (1e-4..0.5).contains(&m)), "{walls:?}");
+    // They are taken as they are given.
+    let again = server.maps();
+    let stored = again.walls_revised(MAP).await.expect("walls");
+    again.if_match(&stored.revision).set_walls(MAP, &stored.value).await.expect("set");
+    let taken = server.maps().walls(MAP).await.expect("walls");
+    let off = |(a, b): (&WallBody, &WallBody)| (offset_m(a) - offset_m(b)).abs();
+    assert!(taken.segments.iter().zip(&walls.segments).map(off).all(|m| m < 1e-9), "{taken:?}");
     let left = std::fs::read_dir(data.path().join("mapping")).expect("the folder").count();
     assert_eq!(left, 0, "the journal of a stored map is deleted");
     client.close().await.expect("closed");

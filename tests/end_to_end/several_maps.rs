@@ -207,7 +207,7 @@ async fn a_plan_becomes_the_walls_of_a_map_on_a_server() {
     run(&["map", "import", "hall", plan, "--server", &server.url]);
     let walls = server.maps().walls("hall").await.expect("walls");
     assert_eq!(walls.segments.len(), 9, "{walls:?}");
-    assert_eq!(walls.segments[0], WallBody { a: [0.0, 0.0], b: [12.0, 0.0] }, "{walls:?}");
+    assert_eq!(walls.segments[0], WallBody::between([0.0, 0.0], [12.0, 0.0]), "{walls:?}");
     // A landmark on a wall of the plan is visible from inside the hall, not through the column.
     let (_, made) = call(
         &server.url,

@@ -58,6 +58,8 @@ impl Inside {
             ..settings
         };
         let config = Config::try_from(raw).expect("a valid configuration");
+        // Where it must be built, that is done now: it would starve a server at work.
+        child::program();
         let server = Server::start(config).await.expect("the server starts");
         Self { server, data }
     }

@@ -199,7 +199,7 @@ mod tests {
     #[test]
     fn metres_run_from_the_left_end_as_one_stands_before_the_wall() {
         // The wall runs along x with the free side at y above it: whoever stands there has b, at x = 5, to the left.
-        let wall = WallBody { a: [1.0, 2.0], b: [5.0, 2.0] };
+        let wall = WallBody::between([1.0, 2.0], [5.0, 2.0]);
         let (x, y, theta) = on_wall(&wall, 1.0).unwrap();
         assert!((x - 4.0).abs() < 1e-12 && (y - 2.0).abs() < 1e-12);
         assert!((theta - std::f64::consts::FRAC_PI_2).abs() < 1e-12, "{theta}");
@@ -208,7 +208,7 @@ mod tests {
                 && on_wall(&wall, -0.1).is_err()
                 && on_wall(&wall, f64::NAN).is_err()
         );
-        let (_, _, theta) = on_wall(&WallBody { a: [0.0, 0.0], b: [0.0, 3.0] }, 1.0).unwrap();
+        let (_, _, theta) = on_wall(&WallBody::between([0.0, 0.0], [0.0, 3.0]), 1.0).unwrap();
         assert!((theta.abs() - std::f64::consts::PI).abs() < 1e-12, "{theta}");
     }
 }

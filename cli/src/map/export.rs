@@ -2,7 +2,7 @@
 
 use crate::{screen::counted, session::ServerArgs};
 use anyhow::Context as _;
-use formats::walls::{self, MapFile};
+use formats::walls::{self, MapFile, Wall};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -44,8 +44,9 @@ impl TargetArgs {
 pub(super) async fn run(args: &ExportArgs) -> anyhow::Result<()> {
     let session = args.server.session()?;
     let stored = session.explained(session.maps().walls(&args.map).await.map_err(Into::into)).await?;
-    let map: MapFile =
-        serde_json::from_value(serde_json::to_value(stored)?).context("the walls of the server")?;
+    let segments: Result<_, _> =
+        stored.segments.iter().map(|w| Wall::about_middle(w.a, w.b, w.covariance)).collect();
+    let map = MapFile { segments: segments.context("the walls of the server")?, ..MapFile::default() };
     args.target.write(&map)?;
     let (count, name) = (map.segments.len(), args.target.name());
     let text = format!("{} in {name}", counted(count as u64, "segment"));

@@ -10,10 +10,13 @@ use crate::{
     session::{Consent, ServerArgs, Session},
 };
 use anyhow::Context as _;
-use client::{Revised, api::WallsBody};
+use client::{
+    Revised,
+    api::{WallBody, WallsBody},
+};
 use formats::{
     map_svg,
-    walls::{self, GridReport, ImportOptions, ImportReport, Imported, MapFile, Underlay},
+    walls::{self, GridReport, ImportOptions, ImportReport, Imported, MapFile, Underlay, Wall},
 };
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -107,7 +110,8 @@ pub(super) fn sentence(report: &ImportReport) -> String {
 
 /// The walls of a file as they are sent.
 pub(super) fn body(map: &MapFile) -> WallsBody {
-    map.segments.iter().map(|s| [s.a, s.b]).collect()
+    let wall = |s: &Wall| WallBody { a: s.a, b: s.b, covariance: s.covariance_about_middle() };
+    WallsBody { segments: map.segments.iter().map(wall).collect() }
 }
 
 pub(super) async fn run(args: &ImportArgs) -> anyhow::Result<()> {

@@ -93,6 +93,20 @@ enum Verb {
         #[command(flatten)]
         server: ServerArgs,
     },
+    /// Make a new map of all that a map has: landmarks with views and models, walls, floor plan, runs, settings
+    ///
+    /// Robots stay on the first one. For example:
+    ///   waymark map duplicate office office-trial
+    #[command(verbatim_doc_comment)]
+    Duplicate {
+        /// The map.
+        map: String,
+        /// Name of the new one: lower-case letters, digits, `-` and `_`.
+        #[arg(value_parser = name)]
+        new_name: String,
+        #[command(flatten)]
+        server: ServerArgs,
+    },
     /// Delete a map with its landmarks, walls and runs. This cannot be undone.
     Delete {
         /// The map.
@@ -174,6 +188,7 @@ pub(crate) async fn run(args: &Args) -> anyhow::Result<()> {
         | Verb::Locate { server, .. }
         | Verb::Visibility { server, .. }
         | Verb::Rename { server, .. }
+        | Verb::Duplicate { server, .. }
         | Verb::Delete { server, .. } => {
             let session = server.session()?;
             session.explained(on_server(&session, &args.verb).await).await
@@ -203,6 +218,11 @@ async fn on_server(session: &Session, verb: &Verb) -> anyhow::Result<()> {
         Verb::Rename { map, new_name, .. } => {
             let renamed = maps.rename_map(map, new_name).await?;
             session.show(&renamed, &format!("map {map} is {new_name} now"))
+        }
+        Verb::Duplicate { map, new_name, .. } => {
+            let made = maps.copy_map(map, new_name).await?;
+            let landmarks = counted(made.landmarks, "landmark");
+            session.show(&made, &format!("map {new_name} is a copy of {map}, with {landmarks}"))
         }
         Verb::Delete { map, consent, .. } => {
             let found = maps.map(map).await?;

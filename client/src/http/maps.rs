@@ -2,7 +2,7 @@
 
 use super::{map_client::MapClient, operation::operations};
 use crate::ClientError;
-use protos::api::{ListQuery, Map, MapPatch, NewMap, Page, TransformQuery, TransformResponse};
+use protos::api::{ListQuery, Map, MapPatch, NewCopy, NewMap, Page, TransformQuery, TransformResponse};
 
 operations! {
     CREATE: POST "/maps" => create_map,
@@ -10,6 +10,7 @@ operations! {
     GET: GET "/maps/{map}" => map,
     LOCATE: PATCH "/maps/{map}" => locate_map,
     DELETE: DELETE "/maps/{map}" => delete_map,
+    COPY: POST "/maps/{map}/copies" => copy_map,
     TRANSFORM: GET "/maps/{map}/transform" => transform,
 }
 
@@ -47,6 +48,11 @@ impl MapClient {
     /// Deletes a map and all that is in it.
     pub async fn delete_map(&self, map: &str) -> Result<(), ClientError> {
         self.done(self.ask(&DELETE, &[&map])?).await
+    }
+
+    /// Makes a new map of all that a map has. Refused with `exists`.
+    pub async fn copy_map(&self, map: &str, name: &str) -> Result<Map, ClientError> {
+        self.send(self.ask(&COPY, &[&map])?.json(&NewCopy { name: name.to_owned() })).await
     }
 
     /// The transform from a map to another one, and a pose converted by it.

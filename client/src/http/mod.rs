@@ -9,6 +9,7 @@ mod events;
 mod form;
 mod gathering;
 mod health;
+mod drafts;
 mod history;
 mod landmark_models;
 mod landmarks;
@@ -53,6 +54,7 @@ pub fn operations() -> impl Iterator<Item = &'static Operation> {
         cameras::OPERATIONS,
         gathering::OPERATIONS,
         health::OPERATIONS,
+        drafts::OPERATIONS,
         history::OPERATIONS,
         landmark_models::OPERATIONS,
         landmarks::OPERATIONS,

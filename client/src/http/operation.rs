@@ -20,9 +20,11 @@ pub struct Operation {
 }
 
 /// Operations that create, and take a key.
-const CREATIONS: [&str; 9] = [
+const CREATIONS: [&str; 11] = [
     "/maps/{map}/bulk/create-landmarks",
     "/maps",
+    "/maps/{map}/copies",
+    "/maps/{map}/drafts",
     "/maps/{map}/landmarks",
     "/maps/{map}/landmarks/{landmark}/views",
     "/maps/{map}/landmarks/{landmark}/learn",
@@ -33,7 +35,7 @@ const CREATIONS: [&str; 9] = [
 ];
 
 /// Paths of what has a revision: their changes say which one they are meant for.
-const REVISED: [&str; 8] = [
+const REVISED: [&str; 9] = [
     "/maps/{map}",
     "/maps/{map}/walls",
     "/maps/{map}/underlay",
@@ -42,6 +44,7 @@ const REVISED: [&str; 8] = [
     "/maps/{map}/landmarks/{landmark}",
     "/maps/{map}/rollback",
     "/maps/{map}/commits/{commit}/undo",
+    "/maps/{map}/drafts/{draft}/publish",
 ];
 
 impl Operation {

@@ -48,6 +48,18 @@ impl Stop {
         map: &MapSnapshot,
         pose: Pose2,
     ) -> GuidedResult {
+        self.guided_in(image, analysis, map, pose, true)
+    }
+
+    /// The same; the image is whole, or patches of it alone are there.
+    fn guided_in(
+        &self,
+        image: &GrayImage,
+        analysis: &FrameAnalysis,
+        map: &MapSnapshot,
+        pose: Pose2,
+        is_whole: bool,
+    ) -> GuidedResult {
         let extrinsics = CameraExtrinsics::new(self.readings.step.robot_from_camera).unwrap();
         let image_px = [image.width() as f64, image.height() as f64];
         let camera = self.scene.intrinsics();
@@ -56,6 +68,7 @@ impl Stop {
             map,
             extrinsics: Some(&extrinsics),
             camera: Some(&camera),
+            is_whole,
             image_px,
             prior: None,
         };
@@ -140,6 +153,14 @@ fn a_landmark_that_was_not_detected_is_found_where_it_is_expected() {
     let made = stop.guided(&stop.readings.frame.image, &nothing, &map, beside);
     let found = made.observations.iter().find(|s| s.landmark == POSTER).expect("found");
     assert!(off_px(&found.corners_px, &truth.corners_px) < 3.0, "{found:?}, truth {truth:?}");
+}
+
+/// Outside of its patches the image of quads is unknown.
+#[test]
+fn without_the_whole_image_nothing_is_searched_for_and_nothing_is_missed() {
+    let (stop, map) = Stop::new();
+    let (image, nothing) = (&stop.readings.frame.image, FrameAnalysis { quads: Vec::new() });
+    assert_eq!(stop.guided_in(image, &nothing, &map, stop.truth(), false), GuidedResult::default());
 }
 
 #[test]

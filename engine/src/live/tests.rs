@@ -10,8 +10,9 @@ fn key(camera: usize) -> SlotKey {
 
 fn frame(seq: u64) -> LiveFrame {
     let answer = Arc::new(v1::Answer { seq, map: "hall".into(), ..v1::Answer::default() });
-    let image = Bytes::from_static(&[0, 50, 100, 150, 200, 250]);
-    LiveFrame { encoding: Encoding::Gray8, width_px: 3, height_px: 2, image, answer }
+    let bytes = Bytes::from_static(&[0, 50, 100, 150, 200, 250]);
+    let pixels = Pixels::Image(EncodedImage { encoding: Encoding::Gray8, bytes });
+    LiveFrame { width_px: 3, height_px: 2, pixels, answer }
 }
 
 #[test]
@@ -55,9 +56,9 @@ fn raw_grey_becomes_png() {
 #[test]
 fn raw_colour_becomes_png_of_the_same_colours() {
     for (encoding, image) in [(Encoding::Rgb8, [200, 100, 50]), (Encoding::Bgr8, [50, 100, 200])] {
-        let image = Bytes::copy_from_slice(&image);
+        let pixels = Pixels::Image(EncodedImage { encoding, bytes: Bytes::copy_from_slice(&image) });
         let (media, bytes) =
-            LiveFrame { encoding, width_px: 1, height_px: 1, image, ..frame(1) }.for_browsers().unwrap();
+            LiveFrame { width_px: 1, height_px: 1, pixels, ..frame(1) }.for_browsers().unwrap();
         assert_eq!(media, "image/png");
         let back = image::load_from_memory(&bytes).unwrap().into_rgb8();
         assert_eq!(back.get_pixel(0, 0).0, [200, 100, 50], "{encoding:?}");

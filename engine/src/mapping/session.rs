@@ -9,9 +9,10 @@ use crate::{
     scan_job::ScanJob,
 };
 use map::{
-    pose2::Pose2,
+    pose2::{Pose2, Pose2Covariance},
     slam::{Slam, SlamMap, SlamParams},
 };
+use nalgebra::Matrix3;
 use protos::Name;
 use std::{
     io,
@@ -243,11 +244,9 @@ impl Mapper {
 
 /// The walls in the map frame, for a map whose first pose is `origin`.
 fn walls(map: &SlamMap, origin: &Pose2) -> Walls {
-    let ends = |wall: &map::segments::LaserSegment| {
-        let (a, b) = (origin.apply(&wall.a), origin.apply(&wall.b));
-        [a.x, a.y, b.x, b.y]
-    };
-    map.walls.iter().map(ends).collect()
+    // Where the first pose lies in the map is a definition: it adds no error.
+    let origin = Pose2Covariance { pose: *origin, covariance: Matrix3::zeros() };
+    map.walls.iter().map(|wall| wall.transformed(&origin)).collect()
 }
 
 fn fail(progress: &Shared, reason: &str) {

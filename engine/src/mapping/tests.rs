@@ -54,9 +54,10 @@ async fn scans_become_the_walls_that_mapping_them_gives() {
     let expected: Vec<_> = slam.finish().unwrap().walls;
     assert_eq!(walls.len(), expected.len());
     for (got, wall) in walls.iter().zip(&expected) {
-        let (a, b) = (origin.apply(&wall.a), origin.apply(&wall.b));
-        let off = [got[0] - a.x, got[1] - a.y, got[2] - b.x, got[3] - b.y];
-        assert!(off.iter().all(|d| d.abs() < 1e-12), "{off:?}");
+        let off = (got.a - origin.apply(&wall.a)).norm() + (got.b - origin.apply(&wall.b)).norm();
+        assert!(off < 1e-11, "{off}");
+        let (was, is) = (wall.covariance_about_middle(), got.covariance_about_middle());
+        assert!(was[(1, 1)] > 0.0 && (was - is).norm() < 1e-9 * (1.0 + was.norm()), "{was} {is}");
     }
     mappings.stored("hall", Ok(walls.len()));
     assert_eq!(mappings.progress("hall").unwrap().stage, MappingStage::Done);
@@ -145,10 +146,8 @@ async fn a_mapping_resumes_after_a_restart_as_if_there_had_been_none() {
     let expected = slam.finish().unwrap().walls;
     assert_eq!(walls.len(), expected.len());
     for (got, wall) in walls.iter().zip(&expected) {
-        let (a, b) = (origin.apply(&wall.a), origin.apply(&wall.b));
-        assert!(
-            (got[0] - a.x).abs() + (got[1] - a.y).abs() + (got[2] - b.x).abs() + (got[3] - b.y).abs() < 1e-9
-        );
+        let off = (got.a - origin.apply(&wall.a)).norm() + (got.b - origin.apply(&wall.b)).norm();
+        assert!(off < 1e-9, "{off}");
     }
     mappings.stored("hall", Ok(walls.len()));
     let again = MappingSessions::default();

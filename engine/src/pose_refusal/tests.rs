@@ -36,6 +36,7 @@ fn answered(
         map,
         extrinsics: Some(&extrinsics),
         camera: Some(&camera),
+        is_whole: true,
         image_px: [640.0, 480.0],
         prior: prior.as_ref(),
     };

@@ -24,6 +24,8 @@ pub struct MapSnapshot {
     pub name: String,
     /// Counts up with every change of the map.
     pub version: u64,
+    /// A draft of another map: people work on it, and robots never see it.
+    pub is_draft: bool,
     /// Every landmark of the map by number, learnt or not.
     pub landmarks: BTreeMap<LandmarkId, LandmarkInfo>,
     /// The sizes of those of them that have one.
@@ -64,6 +66,7 @@ impl MapSnapshot {
         Self {
             name: name.into(),
             version,
+            is_draft: false,
             landmarks: BTreeMap::new(),
             sizes: BTreeMap::new(),
             models: ModelSet::default(),
@@ -111,6 +114,9 @@ pub struct LandmarkInfo {
     pub place: Option<LandmarkPlace>,
     /// How far its place is trusted: a quarantined landmark corrects no pose.
     pub health: LandmarkHealth,
+    /// Revision of the stored row and time of its last edit, ms since the Unix epoch: an equal pair and an equal health mean
+    /// an equal row.
+    pub stored: (i64, i64),
 }
 
 impl LandmarkInfo {

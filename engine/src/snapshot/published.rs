@@ -20,6 +20,8 @@ pub struct MapChange {
     pub map: String,
     /// The new version; `None` when the map was deleted.
     pub version: Option<u64>,
+    /// It is a draft, of which robots are not told.
+    pub is_draft: bool,
 }
 
 #[derive(Debug, Default, Clone)]
@@ -54,6 +56,11 @@ impl Snapshots {
         self.world.load().maps.get(map).cloned()
     }
 
+    /// The current version of `map`, as robots may name it: none of a draft.
+    pub fn for_robots(&self, map: &str) -> Option<Arc<MapSnapshot>> {
+        self.get(map).filter(|map| !map.is_draft)
+    }
+
     /// The current version of every map, by name.
     pub fn all(&self) -> Vec<Arc<MapSnapshot>> {
         self.world.load().maps.values().cloned().collect()
@@ -77,7 +84,7 @@ impl Snapshots {
     /// Makes `map` the current version of its name. For the publication, after the commit.
     #[expect(clippy::needless_pass_by_value, reason = "the map is given away: nobody may change it any more")]
     pub fn publish(&self, map: Arc<MapSnapshot>) {
-        let change = MapChange { map: map.name.clone(), version: Some(map.version) };
+        let change = MapChange { map: map.name.clone(), version: Some(map.version), is_draft: map.is_draft };
         self.world.rcu(|world| {
             let mut world = World::clone(world);
             world.maps.insert(map.name.clone(), map.clone());
@@ -103,12 +110,13 @@ impl Snapshots {
 
     /// Forgets a map. For the publication, after the commit.
     pub fn remove_map(&self, map: &str) {
+        let is_draft = self.get(map).is_some_and(|map| map.is_draft);
         self.world.rcu(|world| {
             let mut world = World::clone(world);
             world.maps.remove(map);
             world
         });
-        self.announce(MapChange { map: map.to_owned(), version: None });
+        self.announce(MapChange { map: map.to_owned(), version: None, is_draft });
     }
 
     /// Registers a robot on a map, or takes it off with `None`. For the publication, after the commit.

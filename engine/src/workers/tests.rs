@@ -2,7 +2,10 @@
 
 use super::*;
 use crate::{intake::Intake, scene};
-use protos::prost::Message;
+use protos::{
+    convert::{EncodedImage, Encoding, Pixels},
+    prost::Message,
+};
 use std::{sync::Mutex, time::Duration};
 
 /// The analysis of frames of this camera panics.
@@ -194,10 +197,12 @@ impl RestingRobot {
             epoch: 1,
             seq: self.seq,
             captured_ns: self.seq as i64 * 200_000_000,
-            encoding: protos::convert::Encoding::Gray8,
             width_px: 640,
             height_px: 480,
-            image: readings.frame.image.data().to_vec().into(),
+            pixels: Pixels::Image(EncodedImage {
+                encoding: Encoding::Gray8,
+                bytes: readings.frame.image.data().to_vec().into(),
+            }),
             intrinsics: Some(self.intrinsics),
             mounting: Some(map::extrinsics::CameraExtrinsics::new(readings.step.robot_from_camera).unwrap()),
             odometry: Some(odometry),

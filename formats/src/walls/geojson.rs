@@ -1,9 +1,11 @@
 //! Walls from and to a GeoJSON file in map metres: lines are walls as drawn, polygons are rooms, whose walls face
 //! inwards, and their holes (columns, blocks), whose walls face outwards. Points, and properties of any kind, are
-//! passed over.
+//! passed over, but for the covariance of a wall.
 
 use super::map_file::{MAX_WALLS, Wall};
 use geojson::{Feature, FeatureCollection, GeoJson, Geometry, GeometryValue, JsonObject, Position};
+use serde::Deserialize as _;
+use serde_json::Value;
 
 /// Largest file.
 pub(super) const MAX_BYTES: u64 = 64 << 20;
@@ -11,6 +13,8 @@ pub(super) const MAX_BYTES: u64 = 64 << 20;
 const MAX_DEPTH: usize = 8;
 /// The member that says in which frame the coordinates of a written file are.
 const FRAME: (&str, &str) = ("waymark:frame", "map metres");
+/// The property of a wall with the covariance of its direction and offset about its middle: rad^2, rad m, m^2.
+const COVARIANCE: &str = "waymark:covariance";
 
 /// Why a file has no walls.
 #[derive(Debug, thiserror::Error, PartialEq)]
@@ -32,6 +36,12 @@ pub enum GeoJsonError {
         /// Which, from 0.
         line: usize,
     },
+    /// The covariance of a wall.
+    #[error("line {line}: `{COVARIANCE}` is a covariance of a line of two points, as three numbers")]
+    Covariance {
+        /// Which line, from 0.
+        line: usize,
+    },
     /// Longitudes and latitudes are no metres.
     #[error("a coordinate reference system other than map metres (`crs`) is not understood")]
     Crs,
@@ -48,27 +58,40 @@ struct Line {
     points: Vec<Position>,
     /// Ring: with the free side inside, or outside.
     free_inside: Option<bool>,
+    /// The property of its feature.
+    covariance: Option<Value>,
 }
 
 /// The walls of a file's text.
 pub(super) fn walls(text: &str) -> Result<Vec<Wall>, GeoJsonError> {
     let file: GeoJson = text.parse().map_err(|e: geojson::Error| GeoJsonError::Format(e.to_string()))?;
-    let (geometries, members): (Vec<Geometry>, Option<JsonObject>) = match file {
+    let own = |f: Feature| {
+        let mut properties = f.properties.unwrap_or_default();
+        Some((f.geometry?, properties.remove(COVARIANCE)))
+    };
+    let (geometries, members): (Vec<(Geometry, Option<Value>)>, Option<JsonObject>) = match file {
         GeoJson::FeatureCollection(all) => {
-            (all.features.into_iter().filter_map(|f| f.geometry).collect(), all.foreign_members)
+            (all.features.into_iter().filter_map(own).collect(), all.foreign_members)
         }
-        GeoJson::Feature(one) => (one.geometry.into_iter().collect(), one.foreign_members),
+        GeoJson::Feature(mut one) => {
+            let members = one.foreign_members.take();
+            (own(one).into_iter().collect(), members)
+        }
         GeoJson::Geometry(geometry) => {
             let members = geometry.foreign_members.clone();
-            (vec![geometry], members)
+            (vec![(geometry, None)], members)
         }
     };
     if members.is_some_and(|m| m.get("crs").is_some_and(|crs| !crs.is_null())) {
         return Err(GeoJsonError::Crs);
     }
     let mut lines = vec![];
-    for geometry in geometries {
+    for (geometry, covariance) in geometries {
+        let first = lines.len();
         add_lines(&mut lines, geometry.value, 0)?;
+        for line in lines.iter_mut().skip(first) {
+            line.covariance.clone_from(&covariance);
+        }
     }
     let mut walls = vec![];
     for (number, line) in lines.iter().enumerate() {
@@ -81,6 +104,9 @@ pub(super) fn walls(text: &str) -> Result<Vec<Wall>, GeoJsonError> {
 pub(super) fn text(walls: &[Wall]) -> String {
     let feature = |wall: &Wall| Feature {
         geometry: Some(GeometryValue::new_line_string([wall.a, wall.b]).into()),
+        properties: wall
+            .covariance_about_middle()
+            .map(|known| [(COVARIANCE.to_owned(), known.to_vec().into())].into_iter().collect()),
         ..Feature::default()
     };
     let members = [(FRAME.0.to_owned(), FRAME.1.into())].into_iter().collect();
@@ -89,9 +115,13 @@ pub(super) fn text(walls: &[Wall]) -> String {
 }
 
 fn add_lines(lines: &mut Vec<Line>, geometry: GeometryValue, depth: usize) -> Result<(), GeoJsonError> {
-    let open = |points| Line { points, free_inside: None };
+    let open = |points| Line { points, free_inside: None, covariance: None };
     let room = |rings: Vec<Vec<Position>>| {
-        rings.into_iter().enumerate().map(|(i, points)| Line { points, free_inside: Some(i == 0) })
+        rings.into_iter().enumerate().map(|(i, points)| Line {
+            points,
+            free_inside: Some(i == 0),
+            covariance: None,
+        })
     };
     match geometry {
         GeometryValue::Point { .. } | GeometryValue::MultiPoint { .. } => {}
@@ -126,6 +156,16 @@ fn add(walls: &mut Vec<Wall>, number: usize, line: &Line) -> Result<(), GeoJsonE
         if (area > 0.0) != free_inside {
             points.reverse();
         }
+    }
+    if let Some(covariance) = &line.covariance {
+        let bad = || GeoJsonError::Covariance { line: number };
+        let &[a, b] = points.as_slice() else { return Err(bad()) };
+        let known = <[f64; 3]>::deserialize(covariance).map_err(|_unnamed| bad())?;
+        if walls.len() >= MAX_WALLS {
+            return Err(GeoJsonError::TooMany);
+        }
+        walls.push(Wall::about_middle(a, b, Some(known)).map_err(|_unnamed| bad())?);
+        return Ok(());
     }
     for pair in points.windows(2) {
         let (a, b) = (pair[0], pair[1]);
@@ -216,6 +256,27 @@ mod tests {
             // An answer, whichever.
             walls(std::str::from_utf8(&bytes).expect("ASCII")).ok();
         }
+    }
+
+    #[test]
+    fn a_wall_keeps_its_covariance() {
+        let known = Wall::about_middle([40.0, 1.0], [44.0, 1.5], Some([4e-6, 1e-6, 1e-4])).unwrap();
+        let by_hand = Wall::between([0.0, 0.0], [1.0, 2.0]);
+        let again = walls(&text(&[known, by_hand])).unwrap();
+        let (was, is) = (known.covariance.unwrap(), again[0].covariance.unwrap());
+        assert!(was.iter().zip(is).all(|(a, b)| (a - b).abs() < 1e-12 + 1e-9 * a.abs()), "{was:?} {is:?}");
+        assert_eq!((again[0].a, again[1]), (known.a, by_hand));
+        let with = |points: &str, covariance: &str| {
+            let line = format!(r#"{{"type":"LineString","coordinates":[{points}]}}"#);
+            let properties = format!(r#"{{"{COVARIANCE}":{covariance}}}"#);
+            walls(&format!(r#"{{"type":"Feature","geometry":{line},"properties":{properties}}}"#))
+        };
+        assert_eq!(with("[0,0],[1,0]", "[1e-6,0,1e-4]").unwrap().len(), 1);
+        let bad = Err(GeoJsonError::Covariance { line: 0 });
+        for covariance in ["[1e-6,0]", "[1e-6,1,1e-6]", "[-1,0,1]", "7", "null"] {
+            assert_eq!(with("[0,0],[1,0]", covariance), bad, "{covariance}");
+        }
+        assert_eq!(with("[0,0],[1,0],[2,0]", "[1e-6,0,1e-4]"), bad);
     }
 
     #[test]

@@ -53,6 +53,25 @@ impl Wall {
         Self { a, b, covariance: None, hits: None }
     }
 
+    /// A wall with the covariance of its direction and offset about its middle (rad^2, rad m, m^2), if known.
+    pub fn about_middle(
+        a: [f64; 2],
+        b: [f64; 2],
+        covariance: Option<[f64; 3]>,
+    ) -> Result<Self, map::check::OutOfRange> {
+        let Some([dd, dr, rr]) = covariance else { return Ok(Self::between(a, b)) };
+        let covariance = Matrix2::new(dd, dr, dr, rr);
+        let made = LaserSegment::about_middle(Point2::from(a), Point2::from(b), &covariance)?;
+        Ok(Self { hits: None, ..Self::of(&made) })
+    }
+
+    /// The covariance of its direction and offset about its middle: rad^2, rad m, m^2. `None` if unknown.
+    pub fn covariance_about_middle(&self) -> Option<[f64; 3]> {
+        self.covariance?;
+        let c = self.segment().ok()?.covariance_about_middle();
+        Some([c[(0, 0)], c[(0, 1)], c[(1, 1)]])
+    }
+
     /// Length, metres.
     pub fn length_m(&self) -> f64 {
         (self.b[0] - self.a[0]).hypot(self.b[1] - self.a[1])

@@ -7,9 +7,10 @@ use crate::{
         search::laser_fix,
     },
     pose2::{Pose2, Pose2Covariance},
+    segments::LaserSegment,
     slam::world::{Walls, rectangle, ring, scan, segments},
 };
-use nalgebra::{Matrix3, Vector2, Vector3};
+use nalgebra::{Matrix2, Matrix3, Point2, Rotation2, Vector2, Vector3};
 use vision::random::Random;
 
 fn prior(at: &Pose2, sigma_m: f64, sigma_rad: f64, random: &mut Random) -> Pose2Covariance {
@@ -58,6 +59,46 @@ fn the_covariance_of_the_pose_is_consistent() {
     assert!(worst < 0.05, "{worst}");
     let mean = sum / f64::from(n);
     assert!((0.5..3.3).contains(&mean), "mean NEES {mean}, 3 expected");
+}
+
+#[test]
+fn walls_with_wide_covariances_widen_the_fix() {
+    // Oracle: in each draw every wall of the map is off by its covariance about its middle, 3 cm and 3 mrad.
+    let sigmas = Vector2::new(0.003, 0.03);
+    let about = Matrix2::from_diagonal(&sigmas.component_mul(&sigmas));
+    let (mut sum, mut as_by_hand, mut n) = (0.0, 0.0, 0);
+    for seed in 0..300 {
+        let mut random = Random::new(1000 + seed);
+        let at = Pose2::new(random.range(0.7, 1.4), random.range(3.0, 13.0), random.range(-3.0, 3.0));
+        let off = |w: &[f64; 4], random: &mut Random| {
+            let (a, b) = (Vector2::new(w[0], w[1]), Vector2::new(w[2], w[3]));
+            let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
+            let turn = Rotation2::new(sigmas.x * random.normal());
+            let across = Vector2::new(-half.y, half.x).normalize() * (sigmas.y * random.normal());
+            let (a, b) = (middle + across - turn * half, middle + across + turn * half);
+            [a.x, a.y, b.x, b.y]
+        };
+        let map: Walls = ring().iter().map(|w| off(w, &mut random)).collect();
+        let known = |[ax, ay, bx, by]: &[f64; 4]| {
+            LaserSegment::about_middle(Point2::new(*ax, *ay), Point2::new(*bx, *by), &about).unwrap()
+        };
+        let wide: Vec<LaserSegment> = map.iter().map(known).collect();
+        let by_hand: Vec<_> = map.iter().map(|w| LaserSegment::by_hand(w).unwrap()).collect();
+        let prior = prior(&at, 0.1, 0.03, &mut random);
+        let scan = scan(&ring(), &at, 0.01, 12.0, &mut random);
+        let fixed = |walls: &[LaserSegment]| {
+            laser_fix(&WallIndex::new(walls), &scan, &prior, &LaserFixParams::default()).unwrap()
+        };
+        let (Ok(found), Ok(narrow)) = (fixed(&wide), fixed(&by_hand)) else { continue };
+        let nees = |fix: &LaserFix| {
+            let e = fix.pose.pose.minus(&at);
+            e.dot(&fix.pose.covariance.cholesky().unwrap().solve(&e))
+        };
+        (sum, as_by_hand, n) = (sum + nees(&found), as_by_hand + nees(&narrow), n + 1);
+    }
+    let (mean, as_by_hand) = (sum / f64::from(n), as_by_hand / f64::from(n));
+    assert!(n > 270, "{n}");
+    assert!((1.5..4.5).contains(&mean) && as_by_hand > 1.5 * mean, "mean NEES {mean}, {as_by_hand} by hand");
 }
 
 #[test]

@@ -26,12 +26,12 @@ pub struct VisibilityMap {
     /// Pan range of the camera, radians.
     pub(super) pan_rad: [f64; 2],
     /// Bounds of the area over direction.
-    quarters: [Quarter; 4],
-    polygons: Vec<Polygon>,
-    area_m2: f64,
-    centroid: Option<Point2<f64>>,
+    pub(super) quarters: [Quarter; 4],
+    pub(super) polygons: Vec<Polygon>,
+    pub(super) area_m2: f64,
+    pub(super) centroid: Option<Point2<f64>>,
     pub(super) reach_m: f64,
-    obstacles: Vec<Obstacle>,
+    pub(super) obstacles: Vec<Obstacle>,
 }
 
 // Departs from method 12: no polygon Booleans, see the module `visibility`; the area is the same. Free space is not an

@@ -32,6 +32,16 @@ impl Piece {
         (wide && rise.is_finite()).then_some(Self { from, to, anchor, rise })
     }
 
+    /// All that it consists of.
+    pub(super) fn numbers(&self) -> [f64; 5] {
+        [self.from, self.to, self.anchor.0, self.anchor.1, self.rise]
+    }
+
+    /// The piece that consists of these.
+    pub(super) fn of_numbers([from, to, slope, inverse, rise]: [f64; 5]) -> Self {
+        Self { from, to, anchor: (slope, inverse), rise }
+    }
+
     /// Its value at a slope.
     pub(super) fn at(&self, slope: f64) -> f64 {
         self.anchor.1 + self.rise * (slope - self.anchor.0)
@@ -83,6 +93,11 @@ impl Envelope {
             made.0.extend(inside.map(|p| p.cut(p.from.max(*from), p.to.min(*to))));
         }
         made
+    }
+
+    /// Of the pieces of an envelope.
+    pub(super) fn of_pieces(pieces: Vec<Piece>) -> Self {
+        Self(pieces)
     }
 
     /// The pieces, by slope.

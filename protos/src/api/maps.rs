@@ -53,6 +53,9 @@ pub struct Map {
     pub landmarks: u64,
     /// Which distance decides.
     pub distance: Distance,
+    /// The map that it is a draft of.
+    #[serde(default)]
+    pub draft_of: Option<String>,
     /// The site it belongs to, in words.
     pub site: Option<String>,
     /// The building it belongs to, in words.
@@ -122,6 +125,15 @@ impl NewMap {
     pub fn new(name: impl Into<String>) -> Self {
         Self { name: name.into(), ..Self::default() }
     }
+}
+
+/// A copy of a map to be.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+#[serde(deny_unknown_fields)]
+pub struct NewCopy {
+    /// Its name: `[a-z0-9_-]{1,64}`, unique.
+    pub name: String,
 }
 
 /// What changes of a map. A field that is absent stays, one that is null is forgotten.

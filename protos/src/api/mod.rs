@@ -10,7 +10,8 @@
 pub mod audit;
 pub mod backups;
 pub mod cameras;
-pub mod events;
+pub mod drafts;
+mod events;
 pub mod failed_gates;
 pub mod gathering;
 pub mod health;
@@ -44,6 +45,7 @@ pub mod walls;
 pub use audit::*;
 pub use backups::*;
 pub use cameras::*;
+pub use drafts::*;
 pub use events::*;
 pub use failed_gates::*;
 pub use gathering::*;

@@ -11,6 +11,18 @@ pub struct WallBody {
     pub a: [f64; 2],
     /// Second end: x, y in metres.
     pub b: [f64; 2],
+    /// How well it is known, about its middle: variance of its direction (rad^2), covariance of direction and offset to its
+    /// free side (rad m), variance of the offset (m^2), relative to the map frame. A map made of scans has it. Absent: measured
+    /// by hand, to 1 cm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub covariance: Option<[f64; 3]>,
+}
+
+impl WallBody {
+    /// A wall between two points (metres) that is measured by hand.
+    pub fn between(a: [f64; 2], b: [f64; 2]) -> Self {
+        Self { a, b, covariance: None }
+    }
 }
 
 /// The walls of a map.
@@ -24,6 +36,6 @@ pub struct WallsBody {
 
 impl FromIterator<[[f64; 2]; 2]> for WallsBody {
     fn from_iter<I: IntoIterator<Item = [[f64; 2]; 2]>>(ends_m: I) -> Self {
-        Self { segments: ends_m.into_iter().map(|[a, b]| WallBody { a, b }).collect() }
+        Self { segments: ends_m.into_iter().map(|[a, b]| WallBody::between(a, b)).collect() }
     }
 }

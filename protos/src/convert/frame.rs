@@ -1,5 +1,7 @@
 //! A camera frame on arrival: everything but the pixels is checked.
 
+pub mod quads;
+
 use super::geometry;
 use crate::{Code, Name, Rejection, v1};
 use map::{
@@ -7,6 +9,7 @@ use map::{
     pose2::{Pose2, Pose2Covariance},
 };
 use prost::bytes::Bytes;
+use quads::CheckedQuad;
 use vision::frame::Intrinsics;
 
 /// Largest JPEG or PNG image of a frame, in bytes.
@@ -46,6 +49,24 @@ impl Encoding {
     }
 }
 
+/// An encoded image, or a part of one.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct EncodedImage {
+    /// How.
+    pub encoding: Encoding,
+    /// At most [`MAX_ENCODED_IMAGE_BYTES`], or exactly the bytes of its pixels.
+    pub bytes: Bytes,
+}
+
+/// What a robot sends of an image.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Pixels {
+    /// All of it.
+    Image(EncodedImage),
+    /// The quads that its own detector found, best first, with the pixels around them.
+    Quads(Vec<CheckedQuad>),
+}
+
 /// A checked frame. The pixels are still encoded.
 #[derive(Debug, Clone)]
 pub struct CheckedFrame {
@@ -55,14 +76,12 @@ pub struct CheckedFrame {
     pub seq: u64,
     /// Robot's clock at capture, ns since the Unix epoch.
     pub captured_ns: i64,
-    /// Encoding of `image`.
-    pub encoding: Encoding,
     /// Claimed width, px; compared with the decoded one later.
     pub width_px: u32,
     /// Claimed height, px; compared with the decoded one later.
     pub height_px: u32,
-    /// Encoded image: at most [`MAX_ENCODED_IMAGE_BYTES`], or exactly the bytes of its pixels.
-    pub image: Bytes,
+    /// The image, or its quads.
+    pub pixels: Pixels,
     /// Intrinsics of the camera, where it is calibrated.
     pub intrinsics: Option<Intrinsics>,
     /// Extrinsics of the camera at capture.
@@ -77,23 +96,14 @@ pub struct CheckedFrame {
     pub map: Option<Name>,
 }
 
-impl TryFrom<v1::Frame> for CheckedFrame {
-    type Error = Rejection;
+impl CheckedFrame {
+    /// Whether the whole image is there: of other parts than those of its quads, nothing can be said.
+    pub fn is_whole(&self) -> bool {
+        matches!(self.pixels, Pixels::Image(_))
+    }
 
-    fn try_from(frame: v1::Frame) -> Result<Self, Rejection> {
-        let encoding = match frame.encoding() {
-            v1::ImageEncoding::Jpeg => Encoding::Jpeg,
-            v1::ImageEncoding::Png => Encoding::Png,
-            v1::ImageEncoding::Gray8 => Encoding::Gray8,
-            v1::ImageEncoding::Rgb8 => Encoding::Rgb8,
-            v1::ImageEncoding::Bgr8 => Encoding::Bgr8,
-            v1::ImageEncoding::Unspecified => {
-                let known = "JPEG (1), PNG (2), GRAY8 (3), RGB8 (4), BGR8 (5)";
-                let detail = format!("{} is none of {known}", frame.encoding);
-                return Err(Rejection::new(Code::OutOfRange, "encoding", detail));
-            }
-        };
-        size(&frame, encoding)?;
+    /// A message whose pixels are checked already.
+    fn with_pixels(frame: &v1::Frame, pixels: Pixels) -> Result<Self, Rejection> {
         let map = match frame.map.as_str() {
             "" => None,
             name => Some(Name::new(name).map_err(|e| Rejection::new(Code::BadName, "map", e.to_string()))?),
@@ -110,48 +120,100 @@ impl TryFrom<v1::Frame> for CheckedFrame {
             epoch: frame.epoch,
             seq: frame.seq,
             captured_ns: frame.captured_ns,
-            encoding,
             width_px: frame.width_px,
             height_px: frame.height_px,
+            pixels,
             intrinsics: camera.map_err(|r| r.inside("intrinsics"))?,
             mounting: mounting.map_err(|r| r.inside("robot_from_camera"))?,
             odometry: odometry.map_err(|r| r.inside("odometry"))?,
             prior: prior.map_err(|r| r.inside("prior"))?,
             deadline_ms: (frame.deadline_ms > 0).then_some(frame.deadline_ms),
             map,
-            image: frame.image,
         })
     }
 }
 
-/// Claimed size and bytes, before anything is decoded.
-fn size(frame: &v1::Frame, encoding: Encoding) -> Result<(), Rejection> {
-    for (field, side) in [("width_px", frame.width_px), ("height_px", frame.height_px)] {
+impl TryFrom<v1::Frame> for CheckedFrame {
+    type Error = Rejection;
+
+    fn try_from(frame: v1::Frame) -> Result<Self, Rejection> {
+        let size = (frame.width_px, frame.height_px);
+        let pixels = Pixels::Image(encoded_image(frame.encoding, size, frame.image.clone())?);
+        Self::with_pixels(&frame, pixels)
+    }
+}
+
+impl TryFrom<v1::Quads> for CheckedFrame {
+    type Error = Rejection;
+
+    fn try_from(quads: v1::Quads) -> Result<Self, Rejection> {
+        let size = (quads.width_px, quads.height_px);
+        image_area(size)?;
+        let pixels = Pixels::Quads(quads::checked(quads.quads, size)?);
+        let frame = v1::Frame {
+            epoch: quads.epoch,
+            seq: quads.seq,
+            captured_ns: quads.captured_ns,
+            width_px: quads.width_px,
+            height_px: quads.height_px,
+            intrinsics: quads.intrinsics,
+            robot_from_camera: quads.robot_from_camera,
+            odometry: quads.odometry,
+            prior: quads.prior,
+            deadline_ms: quads.deadline_ms,
+            map: quads.map,
+            ..v1::Frame::default()
+        };
+        Self::with_pixels(&frame, pixels)
+    }
+}
+
+/// Encoding and bytes of an image of a claimed size, px, before anything is decoded.
+fn encoded_image(encoding: i32, size: (u32, u32), bytes: Bytes) -> Result<EncodedImage, Rejection> {
+    let encoding = match v1::ImageEncoding::try_from(encoding) {
+        Ok(v1::ImageEncoding::Jpeg) => Encoding::Jpeg,
+        Ok(v1::ImageEncoding::Png) => Encoding::Png,
+        Ok(v1::ImageEncoding::Gray8) => Encoding::Gray8,
+        Ok(v1::ImageEncoding::Rgb8) => Encoding::Rgb8,
+        Ok(v1::ImageEncoding::Bgr8) => Encoding::Bgr8,
+        Ok(v1::ImageEncoding::Unspecified) | Err(_) => {
+            let known = "JPEG (1), PNG (2), GRAY8 (3), RGB8 (4), BGR8 (5)";
+            let detail = format!("{encoding} is none of {known}");
+            return Err(Rejection::new(Code::OutOfRange, "encoding", detail));
+        }
+    };
+    let area = image_area(size)?;
+    let length = bytes.len();
+    if length == 0 {
+        return Err(Rejection::new(Code::Missing, "image", "the image is empty"));
+    }
+    match encoding.bytes_per_px().map(|each| each * area as usize) {
+        None if length > MAX_ENCODED_IMAGE_BYTES => {
+            let detail = format!("{length} bytes are more than {MAX_ENCODED_IMAGE_BYTES}");
+            Err(Rejection::new(Code::TooLarge, "image", detail))
+        }
+        Some(expected) if length != expected => {
+            let detail = format!("{length} bytes, {expected} expected for the claimed size");
+            Err(Rejection::new(Code::SizeMismatch, "image", detail))
+        }
+        _ => Ok(EncodedImage { encoding, bytes }),
+    }
+}
+
+/// Width times height, px, of an image of at most [`MAX_FRAME_PX`].
+fn image_area((width_px, height_px): (u32, u32)) -> Result<u32, Rejection> {
+    for (field, side) in [("width_px", width_px), ("height_px", height_px)] {
         if side == 0 || side > MAX_FRAME_SIDE_PX {
             let detail = format!("{side} is outside 1 to {MAX_FRAME_SIDE_PX}");
             return Err(Rejection::new(Code::OutOfRange, field, detail));
         }
     }
-    let area = frame.width_px * frame.height_px;
+    let area = width_px * height_px;
     if area > MAX_FRAME_PX {
         let detail = format!("{area} pixels are more than {MAX_FRAME_PX}");
         return Err(Rejection::new(Code::OutOfRange, "width_px", detail));
     }
-    let bytes = frame.image.len();
-    if bytes == 0 {
-        return Err(Rejection::new(Code::Missing, "image", "the image is empty"));
-    }
-    match encoding.bytes_per_px().map(|each| each * area as usize) {
-        None if bytes > MAX_ENCODED_IMAGE_BYTES => {
-            let detail = format!("{bytes} bytes are more than {MAX_ENCODED_IMAGE_BYTES}");
-            Err(Rejection::new(Code::TooLarge, "image", detail))
-        }
-        Some(expected) if bytes != expected => {
-            let detail = format!("{bytes} bytes, {expected} expected for the claimed size");
-            Err(Rejection::new(Code::SizeMismatch, "image", detail))
-        }
-        _ => Ok(()),
-    }
+    Ok(area)
 }
 
 #[cfg(test)]
@@ -167,6 +229,13 @@ mod tests {
             height_px: 3,
             image: Bytes::from(vec![0; 12]),
             ..v1::Frame::default()
+        }
+    }
+
+    fn encoding_of(frame: &CheckedFrame) -> Encoding {
+        match &frame.pixels {
+            Pixels::Image(image) => image.encoding,
+            Pixels::Quads(_) => panic!("a whole image was sent"),
         }
     }
 
@@ -189,7 +258,7 @@ mod tests {
     #[test]
     fn a_plain_frame_passes() {
         let checked = CheckedFrame::try_from(frame()).unwrap();
-        assert_eq!((checked.encoding, checked.map, checked.deadline_ms), (Encoding::Gray8, None, None));
+        assert_eq!((encoding_of(&checked), checked.map, checked.deadline_ms), (Encoding::Gray8, None, None));
     }
 
     #[test]
@@ -244,7 +313,7 @@ mod tests {
                 let encoding = encoding.into();
                 CheckedFrame::try_from(v1::Frame { encoding, width_px, height_px, image, ..frame() })
             };
-            assert_eq!(of((4, 3), 12 * each).unwrap().encoding, checked);
+            assert_eq!(encoding_of(&of((4, 3), 12 * each).unwrap()), checked);
             // The largest frame: more than an encoded image may have, where it is coloured.
             assert!(of((1920, 1200), each * MAX_FRAME_PX as usize).is_ok());
             for wrong in [12 * each - 1, 12 * each + 1, 2 * 12 * each] {

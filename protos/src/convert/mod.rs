@@ -6,10 +6,13 @@ pub mod frame;
 pub mod gaze;
 pub mod geometry;
 pub mod image_header;
+pub mod localise;
 pub mod motion;
 pub mod result;
 
-pub use frame::{CheckedFrame, Encoding};
+pub use frame::quads::{self, CheckedPatch, CheckedQuad};
+pub use frame::{CheckedFrame, EncodedImage, Encoding, Pixels};
 pub use gaze::CheckedGaze;
 pub use image_header::image_header;
+pub use localise::CheckedLocalise;
 pub use motion::{CheckedOdometry, CheckedScan};

@@ -104,7 +104,7 @@ impl Policy {
 
 /// The map itself, and every map that lies in the same coordinates.
 fn linked_with(snapshots: &Snapshots, map: &str) -> BTreeSet<String> {
-    let others = snapshots.all().into_iter().map(|other| other.name.clone());
+    let others = snapshots.all().into_iter().filter(|other| !other.is_draft).map(|other| other.name.clone());
     let mut maps: BTreeSet<String> =
         others.filter(|other| snapshots.relation(map, other).is_some()).collect();
     maps.insert(map.to_owned());
@@ -118,8 +118,8 @@ fn rule(id: &str, keys: &[impl AsRef<str>], messages: &[&str], flows: &[&str]) -
 
 /// What each robot may: learn that the server listens, and ask for changes of maps, of which only its own arrive.
 fn shared(keys: &Keys) -> [Value; 3] {
-    let inputs = [keys.all_frames(), keys.all_odometry(), keys.all_scans()];
-    let questions = [keys.all_gaze(), keys.all_hellos(), keys.all_map_versions()];
+    let inputs = [keys.all_frames(), keys.all_quads(), keys.all_odometry(), keys.all_scans()];
+    let questions = [keys.all_gaze(), keys.all_hellos(), keys.all_localisations(), keys.all_map_versions()];
     let maps = [keys.all_map_changes(), keys.all_map_versions()];
     [
         rule("inputs", &inputs, &["declare_subscriber"], &["egress"]),
@@ -132,9 +132,11 @@ fn shared(keys: &Keys) -> [Value; 3] {
 fn of_robot(keys: &Keys, robot: &Name, grant: &Grant) -> Vec<Value> {
     let key = |key: &Key| keys.build(key);
     let id = |what: &str| format!("{robot} {what}");
-    let written = [keys.frames_of(robot), key(&Key::Odometry(robot.clone())), key(&Key::Scan(robot.clone()))];
+    let (odometry, scans) = (key(&Key::Odometry(robot.clone())), key(&Key::Scan(robot.clone())));
+    let written = [keys.frames_of(robot), keys.quads_of(robot), odometry, scans];
     let read = [keys.answers_of(robot), key(&Key::Pose(robot.clone()))];
-    let asked = [key(&Key::Gaze(robot.clone())), key(&Key::Hello(robot.clone()))];
+    let asked = [Key::Gaze(robot.clone()), Key::Hello(robot.clone()), Key::Localise(robot.clone())];
+    let asked = asked.map(|asked| key(&asked));
     let mut rules = vec![
         rule(&id("writes"), &written, &["put"], &["ingress"]),
         rule(&id("lives"), &[keys.tokens_of(robot)], &["liveliness_token"], &["ingress"]),

@@ -12,7 +12,9 @@ use super::{
 };
 use crate::{
     config::Ros2Robot,
-    identity::certificates::{CertificateError, CertificateRegistry, Certificates, LinkCertificates},
+    identity::certificates::{
+        CertificateError, CertificateRegistry, Certificates, LinkCertificates, ServerCertificate,
+    },
 };
 use engine::{snapshot::Snapshots, vitals::Pulse};
 use protos::{Key, Keys, Name};
@@ -47,6 +49,9 @@ pub(super) struct GateSettings {
     pub(super) robots: usize,
     pub(super) frame_bytes: usize,
 }
+
+/// What tells the gate that robots may do something else, and that the server shows another certificate.
+type News = (watch::Receiver<u64>, watch::Receiver<Arc<ServerCertificate>>);
 
 /// The gate at work.
 pub(super) struct Gate {
@@ -105,12 +110,14 @@ impl GateSettings {
 impl Gate {
     /// Opens the gate, and keeps it after what robots may.
     pub(super) async fn open(settings: GateSettings, pulse: Pulse) -> Result<Self, BusError> {
-        let change = *settings.registry.changes().borrow();
+        // Before anything is read: a change after that is seen, however late the task begins.
+        let mut news = (settings.registry.changes(), settings.certificates.current());
+        let change = *news.0.borrow_and_update();
         let policy = settings.policy();
         let session = settings.open(&policy).await?;
         settings.registry.set_applied(change);
         let (stop, stopping) = watch::channel(false);
-        let task = tokio::spawn(keep(settings, policy, session, stopping, pulse));
+        let task = tokio::spawn(keep(settings, policy, session, news, stopping, pulse));
         Ok(Self { task, stop })
     }
 
@@ -126,10 +133,10 @@ async fn keep(
     settings: GateSettings,
     mut policy: Policy,
     mut session: zenoh::Session,
+    (mut changes, mut shown): News,
     mut stopping: watch::Receiver<bool>,
     pulse: Pulse,
 ) {
-    let (mut changes, mut shown) = (settings.registry.changes(), settings.certificates.current());
     loop {
         let is_other_certificate = tokio::select! {
             _ = stopping.wait_for(|stop| *stop) => break,

@@ -3,15 +3,12 @@
 
 use super::{BusError, Outbox, Receivers, caught};
 use engine::{
+    intake::FrameKind,
     panics::Edge,
     slots::SlotKey,
     workers::{Publish, failed},
 };
-use protos::{
-    Key, Keys, Name,
-    prost::{Message, bytes::Bytes},
-    v1,
-};
+use protos::{Key, Keys, Name, prost::bytes::Bytes, v1};
 use std::time::Instant;
 use zenoh::{
     Session,
@@ -59,6 +56,8 @@ pub(super) async fn subscribe(
             }
         }
     };
+    let quads =
+        session.declare_subscriber(keys.all_quads()).callback(caught(&to.vitals, "quads", frames.clone()));
     let frames = session.declare_subscriber(keys.all_frames()).callback(caught(&to.vitals, "frame", frames));
     let odometry =
         session.declare_subscriber(keys.all_odometry()).callback(caught(&to.vitals, "odometry", odometry));
@@ -73,6 +72,7 @@ pub(super) async fn subscribe(
         scans.await.map_err(declared("subscribe to scans"))?,
         alive.await.map_err(declared("watch robots"))?,
         frames.await.map_err(declared("subscribe to frames"))?,
+        quads.await.map_err(declared("subscribe to quads"))?,
     ])
 }
 
@@ -93,16 +93,20 @@ pub(crate) fn announce_presence(to: &Receivers, robot: &Name, token: (Option<u64
 
 fn frame(keys: &Keys, to: &Receivers, outbox: &Outbox, sample: &Sample) {
     let key = sample.key_expr().as_str();
-    let Ok(Key::Frame(robot, camera)) = keys.parse(key) else {
-        // The key names no camera, so there is nobody to answer.
-        tracing::debug!(key, "frame_key_invalid");
-        return to.intake.slots.refuse(protos::Code::BadName);
+    let (kind, robot, camera) = match keys.parse(key) {
+        Ok(Key::Frame(robot, camera)) => (FrameKind::Image, robot, camera),
+        Ok(Key::Quads(robot, camera)) => (FrameKind::Quads, robot, camera),
+        _ => {
+            // The key names no camera, so there is nobody to answer.
+            tracing::debug!(key, "frame_key_invalid");
+            return to.intake.slots.refuse(protos::Code::BadName);
+        }
     };
-    take_frame(to, outbox, &SlotKey { robot, camera }, bytes(sample));
+    take_frame(to, outbox, kind, &SlotKey { robot, camera }, bytes(sample));
 }
 
-/// Passes a `Frame` message to the intake. A refusal is answered.
-pub(crate) fn take_frame(to: &Receivers, outbox: &Outbox, slot: &SlotKey, message: Bytes) {
+/// Passes a message of a camera image to the intake. A refusal is answered.
+pub(crate) fn take_frame(to: &Receivers, outbox: &Outbox, kind: FrameKind, slot: &SlotKey, message: Bytes) {
     if !to.admits(&slot.robot) {
         tracing::debug!(?slot, "frame_of_a_revoked_robot");
         return to.intake.slots.refuse(protos::Code::UnknownRobot);
@@ -110,8 +114,8 @@ pub(crate) fn take_frame(to: &Receivers, outbox: &Outbox, slot: &SlotKey, messag
     let panics = to.vitals.panics();
     let follows = "it is refused as internal";
     let received =
-        panics.catch(Edge::Message, "frame", follows, || to.intake.receive(slot.clone(), message.clone()));
-    if let Err(answer) = received.unwrap_or_else(|| Err(internal(message))) {
+        panics.catch(Edge::Message, "frame", follows, || to.intake.take(kind, slot.clone(), message.clone()));
+    if let Err(answer) = received.unwrap_or_else(|| Err(internal(kind, message))) {
         tracing::debug!(?slot, rejection = ?answer.rejection, "frame_refused");
         outbox.answer(slot, &answer);
         to.live.publish_refusal(slot, answer.into());
@@ -119,10 +123,8 @@ pub(crate) fn take_frame(to: &Receivers, outbox: &Outbox, slot: &SlotKey, messag
 }
 
 /// The answer to a frame on which the intake panicked.
-fn internal(message: Bytes) -> Box<v1::Answer> {
-    let v1::Frame { epoch, seq, captured_ns, .. } = v1::Frame::decode(message).unwrap_or_default();
-    let (status, rejection) = (v1::Status::Rejected.into(), Some((&failed()).into()));
-    Box::new(v1::Answer { epoch, seq, captured_ns, status, rejection, ..v1::Answer::default() })
+fn internal(kind: FrameKind, message: Bytes) -> Box<v1::Answer> {
+    Box::new(v1::Answer { rejection: Some((&failed()).into()), ..kind.echo(message) })
 }
 
 fn bytes(sample: &Sample) -> Bytes {

@@ -9,6 +9,7 @@ mod gate;
 mod gaze;
 mod hello;
 mod inbox;
+mod localise;
 mod outbox;
 mod router;
 mod versions;
@@ -24,6 +25,7 @@ use crate::{
     store::now_ms,
 };
 use engine::{
+    decode::ImageLimits,
     gaze::GazeControllers,
     intake::Intake,
     live::LiveHub,
@@ -32,6 +34,7 @@ use engine::{
     vitals::{Pulse, Vitals},
 };
 use gate::{Gate, GateSettings};
+use localise::Localiser;
 use protos::{Key, Keys, Name, v1};
 use router::{RouterSettings, RouterTls};
 use std::sync::Arc;
@@ -100,6 +103,7 @@ pub struct Bus {
     changes: JoinHandle<()>,
     subscribers: Vec<Subscriber<()>>,
     queryables: [Queryable<()>; 3],
+    localiser: Localiser,
     gate: Option<Gate>,
 }
 
@@ -135,6 +139,8 @@ impl Bus {
             versions::answer_versions(&session, &keys, &to).await?,
             hello::answer_hellos(&session, &keys, &to).await?,
         ];
+        let pixels = ImageLimits { bytes: config.limits.frame_bytes, pixels: config.limits.frame_pixels };
+        let localiser = Localiser::start(&session, &keys, &to, pixels).await?;
         let gate = match encrypted.zip(link) {
             None => None,
             Some((certificates, (link_endpoint, link))) => {
@@ -154,7 +160,7 @@ impl Bus {
             }
         };
         tracing::info!(endpoint, fleet = %config.fleet, "robots may connect");
-        Ok(Self { endpoint, session, outbox, changes, subscribers, queryables, gate })
+        Ok(Self { endpoint, session, outbox, changes, subscribers, queryables, localiser, gate })
     }
 
     /// Where robots connect, with the real port.
@@ -186,6 +192,7 @@ impl Bus {
                 tracing::warn!(%error, "zenoh_undeclare_failed");
             }
         }
+        self.localiser.close().await;
         self.outbox.drain().await;
         if let Some(gate) = gate {
             gate.close().await;
@@ -235,7 +242,8 @@ async fn forward_map_changes(to: Receivers, outbox: Outbox, pulse: Pulse) {
     loop {
         match changes.recv().await {
             Ok(change) => {
-                if let (Some(version), Ok(map)) = (change.version, protos::Name::new(change.map.as_str())) {
+                let version = change.version.filter(|_| !change.is_draft);
+                if let (Some(version), Ok(map)) = (version, protos::Name::new(change.map.as_str())) {
                     let message = v1::MapChanged { map: change.map.clone(), version };
                     outbox.send(&Key::MapChanged(map), &message);
                 }

@@ -1,5 +1,8 @@
 //! Over loopback zenoh, with the robot's own client: what is promised on the wire holds.
 
+mod localise;
+mod quads;
+
 use super::*;
 use crate::config::RawConfig;
 use client::{Capture, Delivery, RobotClient, RobotOptions};

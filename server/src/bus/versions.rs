@@ -27,7 +27,7 @@ pub(super) async fn answer_versions(
 }
 
 fn reply(keys: &Keys, to: &Receivers, query: &Query) {
-    for map in to.intake.snapshots.all() {
+    for map in to.intake.snapshots.all().into_iter().filter(|map| !map.is_draft) {
         let Ok(name) = Name::new(map.name.as_str()) else { continue };
         let key = keys.build(&Key::MapVersion(name));
         let asked = KeyExpr::new(key.as_str()).is_ok_and(|key| query.key_expr().intersects(&key));

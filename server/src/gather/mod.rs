@@ -28,7 +28,7 @@ use frame_tap::{ActiveGatherings, lock};
 use map::tracks::{GatherParams, StoredTrack, TrackOutcome, ViewTracker};
 use protos::{
     api::{GatheringChange, ServerEventBody},
-    convert::Encoding,
+    convert::{Encoding, Pixels},
 };
 use std::{collections::BTreeMap, sync::Arc};
 use tokio::sync::mpsc::Receiver;
@@ -306,9 +306,11 @@ fn new_view(
     capture: Option<&StoredCapture>,
 ) -> Option<NewView> {
     let (frame, grey) = (&offered.frame, &offered.analysed.image);
-    let (image, image_kind) = match frame.encoding {
-        Encoding::Jpeg => (frame.image.to_vec(), "jpeg"),
-        Encoding::Png => (frame.image.to_vec(), "png"),
+    // Only whole images are offered.
+    let Pixels::Image(sent) = &frame.pixels else { return None };
+    let (image, image_kind) = match sent.encoding {
+        Encoding::Jpeg => (sent.bytes.to_vec(), "jpeg"),
+        Encoding::Png => (sent.bytes.to_vec(), "png"),
         Encoding::Gray8 | Encoding::Rgb8 | Encoding::Bgr8 => {
             (picture::png(grey.width(), grey.height(), grey.data()).ok()?, "png")
         }

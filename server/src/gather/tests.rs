@@ -11,7 +11,11 @@ use engine::{
 };
 use map::pose2::{Pose2, Pose2Covariance};
 use nalgebra::Matrix3;
-use protos::{CheckedFrame, Name, prost::bytes::Bytes};
+use protos::{
+    CheckedFrame, Name,
+    convert::{EncodedImage, Encoding, Pixels},
+    prost::bytes::Bytes,
+};
 use vision::{pipeline, recognise::DistanceKind, trace::NoTrace};
 
 async fn store(dir: &std::path::Path) -> (Catalogue, crate::publication::CatalogueTasks) {
@@ -46,10 +50,12 @@ fn offered(count: u64) -> Vec<(CheckedFrame, AnalysedFrame)> {
                 epoch: 1,
                 seq,
                 captured_ns: seq as i64 * 200_000_000,
-                encoding: Encoding::Gray8,
                 width_px: 640,
                 height_px: 480,
-                image: Bytes::from(image.data().to_vec()),
+                pixels: Pixels::Image(EncodedImage {
+                    encoding: Encoding::Gray8,
+                    bytes: Bytes::from(image.data().to_vec()),
+                }),
                 intrinsics: Some(scene.intrinsics()),
                 mounting: None,
                 odometry: None,

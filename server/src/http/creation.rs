@@ -35,6 +35,8 @@ type LargestBody = fn(&Limits) -> usize;
 /// once at most (a mapping, a recording), so that a repeat is refused by itself.
 pub(super) const CREATIONS: &[(&str, LargestBody)] = &[
     ("/maps", json),
+    ("/maps/{map}/copies", json),
+    ("/maps/{map}/drafts", json),
     ("/maps/{map}/landmarks", json),
     ("/maps/{map}/bulk/create-landmarks", json),
     ("/maps/{map}/landmarks/{landmark}/views", |limits| limits.upload_bytes + FORM_OVERHEAD),

@@ -107,6 +107,7 @@ fn unknown(what: Kind) -> (&'static str, &'static str) {
         Kind::Token => ("unknown_token", "token"),
         Kind::Certificate => ("unknown_certificate", "serial"),
         Kind::Backup => ("unknown_backup", "backup"),
+        Kind::Draft => ("unknown_draft", "draft"),
         Kind::Commit => ("unknown_commit", "commit"),
         Kind::Answer => ("unknown_answer", "answer"),
         Kind::Model | Kind::Picture => ("not_found", "path"),
@@ -134,6 +135,9 @@ impl From<StoreError> for ApiError {
             StoreError::ChangedSince { by, .. } => {
                 Self::new(StatusCode::CONFLICT, "changed_since", detail).field("commit").with("by", json!(by))
             }
+            StoreError::Conflicts { with, .. } => Self::new(StatusCode::CONFLICT, "conflict", detail)
+                .field("draft")
+                .with("conflicts", json!(with)),
             StoreError::Frames(error) => {
                 let code = match error {
                     MapLinkError::Cycle => "cycle",

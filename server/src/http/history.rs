@@ -39,7 +39,7 @@ pub(super) fn router() -> OpenApiRouter<AppState> {
         .routes(routes!(undo))
 }
 
-fn shown(row: CommitRow) -> Commit {
+pub(super) fn shown(row: CommitRow) -> Commit {
     Commit {
         id: row.id as u64,
         parent: row.parent.map(|id| id as u64),
@@ -121,7 +121,7 @@ async fn difference(
     Ok(Json(Difference { from_commit, to_commit, summary, walls: found.walls, landmarks }))
 }
 
-fn page_of(
+pub(super) fn page_of(
     rows: Vec<(i64, LandmarkChange)>,
     limit: usize,
     total: u64,
@@ -131,7 +131,7 @@ fn page_of(
     Page { items: items.into_iter().map(&mut item).collect(), next, total }
 }
 
-fn landmark(change: LandmarkChange, name: String) -> LandmarkDifference {
+pub(super) fn landmark(change: LandmarkChange, name: String) -> LandmarkDifference {
     let LandmarkChange { present, names: [old, _], fields, views, model } = change;
     LandmarkDifference {
         old_name: old.filter(|old| *old != name),
@@ -201,7 +201,11 @@ async fn undo(
     newest(&app, id, true).await
 }
 
-async fn newest(app: &AppState, map: i64, changed: bool) -> Result<Json<RollbackOutcome>, ApiError> {
+pub(super) async fn newest(
+    app: &AppState,
+    map: i64,
+    changed: bool,
+) -> Result<Json<RollbackOutcome>, ApiError> {
     let db = app.store.reads();
     let id = history::newest(db, map).await?;
     let commit = shown(history::get(db, map, id).await?);

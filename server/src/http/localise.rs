@@ -6,23 +6,22 @@ use super::{
     extract::{PathParams, json, too_large},
     upload::{FORM_OVERHEAD, Form},
 };
-use crate::store::{StoreError, kind::Kind};
+use crate::{
+    localise_body::localise_body,
+    store::{StoreError, kind::Kind},
+};
 use axum::{
     Json,
     extract::{DefaultBodyLimit, Request, State},
 };
 use engine::{
-    localise::{Localisation, LocaliseFrame, LocaliseInput, localise},
+    localise::{LocaliseFrame, LocaliseInput, localise},
     picture,
-    snapshot::MapSnapshot,
 };
 use map::{extrinsics::CameraExtrinsics, laser::Scan};
 use protos::{
-    api::{LocaliseForm, LocaliseHypothesisBody, LocaliseResult, LocaliseStatus, Problem, ScanBody},
-    convert::{
-        geometry::{self, pose2_covariance_wire},
-        motion::CheckedScan,
-    },
+    api::{LocaliseForm, LocaliseResult, Problem, ScanBody},
+    convert::{geometry, localise::MAX_LOCALISE_MS, motion::CheckedScan},
     v1,
 };
 use std::{
@@ -38,9 +37,6 @@ use vision::frame::Intrinsics;
 pub(super) fn router(upload_bytes: usize) -> OpenApiRouter<AppState> {
     OpenApiRouter::new().routes(routes!(at)).layer(DefaultBodyLimit::max(upload_bytes + FORM_OVERHEAD))
 }
-
-/// Longest search. It ends as soon as the client has gone, too.
-const BUDGET: Duration = Duration::from_secs(10);
 
 /// Set when the request is given up: its handler is dropped.
 struct GivenUp(Arc<AtomicBool>);
@@ -83,9 +79,10 @@ async fn at(
         let frame = sensed.frame.as_ref().zip(image.as_ref());
         let frame = frame.map(|((_, camera, extrinsics), image)| LocaliseFrame { image, camera, extrinsics });
         let input = LocaliseInput { map: &snapshot, frame, scan: sensed.scan.as_ref() };
-        let until = Instant::now() + BUDGET;
+        // It ends as soon as the client has gone, too.
+        let until = Instant::now() + Duration::from_millis(u64::from(MAX_LOCALISE_MS));
         let stop = || stopped.load(Ordering::Relaxed) || Instant::now() >= until;
-        Ok(shown(localise(&input, &stop), &snapshot))
+        Ok(localise_body(localise(&input, &stop), &snapshot))
     });
     found.await?.map(Json)
 }
@@ -126,33 +123,4 @@ fn scan(text: &[u8]) -> Result<Scan, ApiError> {
         ..v1::Scan::default()
     };
     Ok(CheckedScan::try_from(message).map_err(|r| r.inside("scan"))?.scan)
-}
-
-fn shown(found: Localisation, map: &MapSnapshot) -> LocaliseResult {
-    let Localisation { hypotheses, reason, answer } = found;
-    let name = |id| map.landmarks.get(id).map(|landmark| landmark.name.clone());
-    let hypotheses: Vec<_> = hypotheses
-        .iter()
-        .map(|hypothesis| LocaliseHypothesisBody {
-            map_from_robot: pose2_covariance_wire(&hypothesis.pose),
-            probability: hypothesis.probability,
-            landmarks: hypothesis.landmarks.iter().filter_map(name).collect(),
-            matched: hypothesis.matched,
-        })
-        .collect();
-    let status = match (&reason, hypotheses.as_slice()) {
-        (_, []) => LocaliseStatus::NoMatch,
-        (None, _) => LocaliseStatus::Located,
-        (Some(_), _) => LocaliseStatus::Ambiguous,
-    };
-    let pose = hypotheses.first().filter(|_| status == LocaliseStatus::Located);
-    LocaliseResult {
-        map: map.name.clone(),
-        map_version: map.version,
-        status,
-        reason: reason.map(|reason| reason.as_str().to_owned()),
-        map_from_robot: pose.map(|pose| pose.map_from_robot.clone()),
-        hypotheses,
-        answer,
-    }
 }

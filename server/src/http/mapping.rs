@@ -10,7 +10,8 @@ use crate::{
     identity::Principal,
     store::{
         actor::{Actor, inherited},
-        maps, robots, walls,
+        maps, robots,
+        walls::{self, StoredWall},
     },
 };
 use axum::{Extension, Json, extract::State, http::StatusCode};
@@ -155,7 +156,8 @@ async fn store(
     if count > max {
         return Err(format!("{count} walls are more than {max}"));
     }
-    if let Some(error) = walls.iter().find_map(|ends| map::segments::LaserSegment::by_hand(ends).err()) {
+    let walls: Vec<StoredWall> = walls.iter().map(StoredWall::from).collect();
+    if let Some(error) = walls.iter().find_map(|wall| wall.segment().err()) {
         return Err(error.to_string());
     }
     let map = map.to_owned();

@@ -11,6 +11,8 @@ use super::{
 use crate::{
     identity::Principal,
     store::{
+        contents::{self, Written},
+        drafts::MAX_DRAFTS,
         map_locations::{self, MapLocation},
         maps::{self, MapRow},
         revisions::{self, Subject},
@@ -24,7 +26,7 @@ use map::{
 };
 use nalgebra::{Matrix3, Vector3};
 use protos::api::{
-    ListQuery, Map, MapPatch, NewMap, Page, Parent, Problem, TransformQuery, TransformResponse,
+    ListQuery, Map, MapPatch, NewCopy, NewMap, Page, Parent, Problem, TransformQuery, TransformResponse,
     TransformedPose,
 };
 use utoipa_axum::{router::OpenApiRouter, routes};
@@ -33,6 +35,7 @@ pub(super) fn router() -> OpenApiRouter<AppState> {
     OpenApiRouter::new()
         .routes(routes!(create, list))
         .routes(routes!(get, patch, delete))
+        .routes(routes!(copy))
         .routes(routes!(transform))
 }
 
@@ -71,6 +74,7 @@ fn map_shown(row: MapRow, found: MapLocation, principal: &Principal) -> Map {
         revision: row.revision,
         landmarks: row.landmarks,
         distance: row.distance.into(),
+        draft_of: row.draft_of,
         parent: link.as_ref().map(parent_shown),
         site: found.site,
         building: found.building,
@@ -137,7 +141,7 @@ impl Listed for MapRow {
     }
 }
 
-/// Lists maps.
+/// Lists maps, without their drafts.
 #[utoipa::path(get, path = "/maps", tag = "maps", params(ListQuery), responses((status = 200, body = Page<Map>),
     (status = 422, body = Problem, description = "out_of_range, invalid_value")))]
 async fn list(
@@ -146,8 +150,9 @@ async fn list(
     Extension(principal): Extension<Principal>,
 ) -> Result<Json<Page<Map>>, ApiError> {
     let limits = &app.config.limits;
-    let mut rows = maps::page(app.store.reads(), "", limits.maps).await?;
-    rows.retain(|row| principal.may_see(&row.name));
+    let with_drafts = limits.maps.saturating_mul(1 + MAX_DRAFTS);
+    let mut rows = maps::page(app.store.reads(), "", with_drafts).await?;
+    rows.retain(|row| row.draft_of.is_none() && principal.may_see(&row.name));
     let mut known = map_locations::all(app.store.reads()).await?;
     let Page { items, next, total } = selected(rows, &query, limits.page)?;
     let shown = |row: MapRow| {
@@ -214,7 +219,7 @@ async fn patch(
 /// Deletes a map and all that is in it.
 #[utoipa::path(delete, path = "/maps/{map}", tag = "maps", params(("map" = String, Path)), responses(
     (status = 204), (status = 404, body = Problem),
-    (status = 409, body = Problem, description = "in_use: a robot stands on it, or another map lies in it")))]
+    (status = 409, body = Problem, description = "in_use: a robot stands on it, another map lies in it, or it has a draft")))]
 async fn delete(
     State(app): State<AppState>,
     PathParams(map): PathParams<String>,
@@ -228,6 +233,25 @@ async fn delete(
     });
     write.await?;
     Ok(StatusCode::NO_CONTENT)
+}
+
+/// Makes a new map of all that a map has: landmarks with their views, photographs and models, walls, underlay, reference runs
+/// and settings. Robots stay where they are, and the copy begins a history of its own.
+#[utoipa::path(post, path = "/maps/{map}/copies", tag = "maps", params(("map" = String, Path)), request_body = NewCopy,
+    responses((status = 201, body = Map), (status = 404, body = Problem),
+    (status = 409, body = Problem, description = "exists, too_many: maps, or bytes of one map"),
+    (status = 422, body = Problem, description = "bad_name")))]
+async fn copy(
+    State(app): State<AppState>,
+    PathParams(map): PathParams<String>,
+    Extension(principal): Extension<Principal>,
+    Body(new): Body<NewCopy>,
+) -> Result<(StatusCode, Json<Map>), ApiError> {
+    let new_name = name("name", new.name)?;
+    let shown = move |written: &Written| {
+        (StatusCode::CREATED, map_shown(written.map.clone(), written.location.clone(), &principal))
+    };
+    created(shown, contents::copy(&app.store, &map, new_name.as_str(), &app.config.limits)).await
 }
 
 fn pose_shown(p: &Pose2Covariance) -> TransformedPose {

@@ -20,6 +20,7 @@ mod extract;
 mod gathering;
 mod guard;
 mod health;
+mod drafts;
 mod history;
 mod landmark_models;
 mod landmarks;
@@ -36,6 +37,7 @@ mod pictures;
 mod recognise;
 mod reference_runs;
 mod relocalisation;
+mod replay;
 mod revision;
 mod robot_certificates;
 mod robots;
@@ -62,7 +64,10 @@ use crate::{
 };
 use authorise::Asker;
 use axum::http::StatusCode;
-use engine::{live::LiveHub, motion::MotionTracker, panics::Edge, relocalise::Relocalisers, workers::Engine};
+use engine::{
+    kept_frames::KeptFrames, live::LiveHub, motion::MotionTracker, panics::Edge, relocalise::Relocalisers,
+    workers::Engine,
+};
 use error::ApiError;
 pub(crate) use robot_certificates::Enrolment;
 use std::{
@@ -89,6 +94,8 @@ pub(crate) struct App {
     pub(crate) live: Arc<LiveHub>,
     /// Where they are.
     pub(crate) motion: Arc<MotionTracker>,
+    /// Their last frames.
+    pub(crate) kept_frames: Arc<KeptFrames>,
     /// Where those may be that do not know.
     pub(crate) searches: Arc<Relocalisers>,
     /// Robots of ROS 2.
@@ -138,7 +145,7 @@ impl App {
         let streams = Arc::new(Semaphore::new(config.limits.streams));
         let uploads = Semaphore::new(config.limits.uploads);
         let (live, motion) = (engine.live.clone(), engine.motion.clone());
-        let searches = engine.relocalisers.clone();
+        let (searches, kept_frames) = (engine.relocalisers.clone(), engine.kept_frames.clone());
         Self {
             config,
             store,
@@ -146,6 +153,7 @@ impl App {
             gatherer,
             live,
             motion,
+            kept_frames,
             searches,
             ros2,
             sessions,

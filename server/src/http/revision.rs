@@ -30,6 +30,7 @@ pub(super) const REVISED: &[(&str, &[&str])] = &[
     ("/maps/{map}/landmarks/{landmark}", &["patch", "delete"]),
     ("/maps/{map}/rollback", &["post"]),
     ("/maps/{map}/commits/{commit}/undo", &["post"]),
+    ("/maps/{map}/drafts/{draft}/publish", &["post"]),
 ];
 
 /// The revisions that a change is meant for. Errors: `precondition_required`, `invalid_value`.

@@ -128,8 +128,9 @@ async fn revoke(
     Ok(StatusCode::NO_CONTENT)
 }
 
-/// Waits until robots' connections follow the change, where they are encrypted: whoever connects after the answer finds it.
-async fn access_control(app: &AppState) {
+/// Waits until robots' connections follow a change of certificates or robots, where they are encrypted: whoever connects after
+/// the answer finds it, and meets no listener that is about to open again.
+pub(super) async fn access_control(app: &AppState) {
     if app.enrolment.is_some() && !app.store.certificates().applied().await {
         tracing::warn!(follows = "messages of revoked certificates are refused", "access_control_is_late");
     }

@@ -6,6 +6,7 @@ use super::{
     authorise::check_map,
     error::ApiError,
     extract::{Body, PathParams, QueryParams, name},
+    robot_certificates::access_control,
 };
 use crate::{
     identity::Principal,
@@ -96,7 +97,9 @@ async fn put(
     let write = app
         .store
         .write(move |tx| Box::pin(async move { robots::put(tx, robot.as_str(), &to.map, max).await }));
-    Ok(Json(robot_shown(write.await?, &app.motion, &app.live)))
+    let row = write.await?;
+    access_control(&app).await;
+    Ok(Json(robot_shown(row, &app.motion, &app.live)))
 }
 
 /// Lists robots by name, with what is known of each: whether its software is connected, whether a second program uses its
@@ -147,6 +150,7 @@ async fn delete(
         })
     });
     write.await?;
+    access_control(&app).await;
     Ok(StatusCode::NO_CONTENT)
 }
 

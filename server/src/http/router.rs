@@ -1,13 +1,13 @@
 //! Every route, with the layers around them and the OpenAPI document made from them.
 
 use super::{
-    API, App, AppState, audit, authorise, backups, bulk, cameras, creation, documented,
+    API, App, AppState, audit, authorise, backups, bulk, cameras, creation, documented, drafts,
     error::{ApiError, method_not_allowed, not_found},
     events,
     examples::with_examples,
     gathering, guard, health, history, landmark_models, landmarks, learning, live, localise, mapping, maps,
-    modalities, page_session, pages, recognise, reference_runs, relocalisation, revision, robot_certificates,
-    robots, ros2,
+    modalities, page_session, pages, recognise, reference_runs, relocalisation, replay, revision,
+    robot_certificates, robots, ros2,
     security::with_security,
     stored_answers, tokens, underlay, views, visibility, visibility_settings, walls,
 };
@@ -43,6 +43,8 @@ fn api(limits: &Limits) -> OpenApiRouter<AppState> {
         .merge(walls::router())
         .merge(underlay::router(limits.upload_bytes))
         .merge(history::router())
+        .merge(drafts::router())
+        .merge(replay::router())
         .merge(mapping::router())
         .merge(landmarks::router())
         .merge(bulk::router())

@@ -9,7 +9,7 @@ use super::{
 use crate::store::{
     maps,
     revisions::{self, Subject},
-    walls,
+    walls::{self, StoredWall},
 };
 use axum::extract::State;
 use protos::api::{Problem, WallBody, WallsBody};
@@ -19,12 +19,14 @@ pub(super) fn router() -> OpenApiRouter<AppState> {
     OpenApiRouter::new().routes(routes!(put, get))
 }
 
-/// Checks the ends of a wall.
-fn checked(index: usize, WallBody { a, b }: &WallBody) -> Result<[f64; 4], ApiError> {
-    let ends = [a[0], a[1], b[0], b[1]];
-    map::segments::LaserSegment::by_hand(&ends)
-        .map(|_| ends)
-        .map_err(|e| out_of_range(&e, &format!("segments[{index}]")))
+/// Checks the ends of a wall and its covariance.
+fn checked(index: usize, WallBody { a, b, covariance }: &WallBody) -> Result<StoredWall, ApiError> {
+    let wall = StoredWall { ends: [a[0], a[1], b[0], b[1]], covariance: *covariance };
+    wall.segment().map(|_| wall).map_err(|e| out_of_range(&e, &format!("segments[{index}]")))
+}
+
+fn shown(StoredWall { ends: [ax, ay, bx, by], covariance }: StoredWall) -> WallBody {
+    WallBody { a: [ax, ay], b: [bx, by], covariance }
 }
 
 /// Replaces the walls.
@@ -41,12 +43,12 @@ async fn put(
     if walls.segments.len() > max {
         return Err(ApiError::invalid("too_many", "segments", format!("more than {max} segments")));
     }
-    let ends =
+    let checked =
         walls.segments.iter().enumerate().map(|(i, s)| checked(i, s)).collect::<Result<Vec<_>, _>>()?;
     let write = app.store.write(move |tx| {
         Box::pin(async move {
             revisions::check(tx, &map, &Subject::Walls, &is).await?;
-            walls::replace(tx, &map, &ends).await?;
+            walls::replace(tx, &map, &checked).await?;
             revisions::after(tx, &map, &Subject::Walls).await
         })
     });
@@ -63,6 +65,5 @@ async fn get(
     let revision = app.store.revision(&map, &Subject::Walls).await?;
     let map = maps::get(app.store.reads(), &map).await?;
     let stored = walls::all_of(app.store.reads(), map.id).await?;
-    let segments = stored.into_iter().map(|[ax, ay, bx, by]| WallBody { a: [ax, ay], b: [bx, by] }).collect();
-    Ok(Revised(revision, WallsBody { segments }))
+    Ok(Revised(revision, WallsBody { segments: stored.into_iter().map(shown).collect() }))
 }

@@ -4,7 +4,7 @@
 
 use crate::store::{
     StoreError,
-    map_rows::{self, MapHead},
+    map_rows::{self, LandmarkHead, MapHead, RowState},
     modality_stats,
     models::{self, ModelDigest},
     walls,
@@ -35,12 +35,7 @@ pub(super) async fn snapshot(
     let Some(head) = map_rows::head(&mut *conn, id).await? else { return Ok(None) };
     let before = snapshots.get(&head.name);
     let before = before.as_deref();
-    let info = |l: map_rows::LandmarkHead| {
-        let (size, place) = (l.geometry.size, l.geometry.landmark_place());
-        (l.id, LandmarkInfo { name: l.name, size, place, health: l.health })
-    };
-    let landmarks: BTreeMap<_, _> =
-        map_rows::landmarks(&mut *conn, id).await?.into_iter().map(info).collect();
+    let landmarks = landmarks(&mut *conn, id, before).await?;
     let (walls, wall_index) = walls_and_index(&mut *conn, id, &head, before, panics).await?;
     let (modalities, reference_runs) = modalities(&mut *conn, id, before).await?;
     #[cfg(test)]
@@ -63,6 +58,7 @@ pub(super) async fn snapshot(
         sizes: landmarks.iter().filter_map(|(id, l)| Some((*id, l.size?))).collect(),
         name: head.name,
         version: head.version,
+        is_draft: head.is_draft,
         landmarks,
         models,
         look_alikes,
@@ -81,6 +77,31 @@ pub(super) async fn snapshot(
     }))
 }
 
+/// Its landmarks; only those are read whose rows have changed.
+async fn landmarks(
+    conn: &mut SqliteConnection,
+    id: i64,
+    before: Option<&MapSnapshot>,
+) -> Result<BTreeMap<LandmarkId, LandmarkInfo>, StoreError> {
+    let states = map_rows::row_states(&mut *conn, id).await?;
+    let known = |state: &RowState| {
+        let info = before?.landmarks.get(&state.id)?;
+        (info.stored == state.edited && info.health == state.health).then_some(info)
+    };
+    let changed: Vec<_> =
+        states.iter().filter(|state| known(state).is_none()).map(|state| state.id).collect();
+    let mut read = map_rows::landmarks(conn, id, &changed).await?;
+    let info = |state: RowState| {
+        if let Some(info) = known(&state) {
+            return Some((state.id, info.clone()));
+        }
+        let LandmarkHead { name, geometry } = read.remove(&state.id)?;
+        let (size, place) = (geometry.size, geometry.landmark_place());
+        Some((state.id, LandmarkInfo { name, size, place, health: state.health, stored: state.edited }))
+    };
+    Ok(states.into_iter().filter_map(info).collect())
+}
+
 type Walls = (Arc<Vec<LaserSegment>>, Arc<WallIndex>);
 
 /// The walls and their index, which is built off the runtime.
@@ -94,8 +115,8 @@ async fn walls_and_index(
     if let Some(before) = before.filter(|before| before.walls_version == head.walls_version) {
         return Ok((before.walls.clone(), before.wall_index.clone()));
     }
-    let ends = walls::all_of(conn, id).await?;
-    let walls: Arc<Vec<_>> = Arc::new(ends.iter().filter_map(|e| LaserSegment::by_hand(e).ok()).collect());
+    let stored = walls::all_of(conn, id).await?;
+    let walls: Arc<Vec<_>> = Arc::new(stored.iter().filter_map(|wall| wall.segment().ok()).collect());
     let indexed = walls.clone();
     let made = tokio::task::spawn_blocking(move || WallIndex::new(indexed.iter())).await;
     let made = panics.joined(Edge::Publication, "the index of the walls", "scans correct nothing here", made);

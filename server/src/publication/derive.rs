@@ -1,8 +1,13 @@
 //! Derives data from a version of a map, off the runtime and outside of the writer: visibility areas, then look-alike classes.
 //! Each is published as soon as it is computed, as the same version of the map with more data. If a newer version replaces it
-//! meanwhile, that version takes over what still holds.
+//! meanwhile, that version takes over what still holds. Areas are stored when they are published, so that a start computes none
+//! again.
 
-use super::{build::digests, visibility_areas};
+use super::{build::digests, visibility_areas as areas};
+use crate::store::{
+    Store, StoreError,
+    visibility_areas::{self, StoredArea},
+};
 use engine::{
     panics::Edge,
     snapshot::{LookAlikeClasses, MapSnapshot, Snapshots, look_alike_classes},
@@ -19,7 +24,7 @@ type Last = BTreeMap<String, Arc<MapSnapshot>>;
 
 /// Derives whenever it is woken, until told to stop.
 pub(super) async fn run(
-    snapshots: Arc<Snapshots>,
+    (snapshots, store): (Arc<Snapshots>, Store),
     vitals: Arc<Vitals>,
     wake: Arc<Notify>,
     mut stopping: watch::Receiver<bool>,
@@ -41,12 +46,14 @@ pub(super) async fn run(
                 break;
             }
             let before = last.remove(&map.name);
-            let done = Arc::new(derived(map.clone(), before, &vitals).await);
+            let (done, computed) = derived(map.clone(), before, &store, &vitals).await;
+            let done = Arc::new(done);
             if done.pending == map.pending {
                 failed.insert(map.name.clone(), map.version);
             }
             snapshots.publish_derived(&map, &done);
             last.insert(done.name.clone(), done);
+            keep(&store, computed).await;
         }
         last.retain(|name, _| snapshots.get(name).is_some());
         failed.retain(|name, _| snapshots.get(name).is_some());
@@ -54,27 +61,71 @@ pub(super) async fn run(
     pulse.end();
 }
 
-/// `map` with one more kind of derived data. The next version tries again what fails. Until then, areas that fail are left
+/// Stores areas. Without it they are computed again at the next start.
+async fn keep(store: &Store, computed: Vec<StoredArea>) {
+    match visibility_areas::put(store, computed).await {
+        Ok(()) | Err(StoreError::Closed) => {}
+        Err(error) => {
+            let error = &error as &dyn std::error::Error;
+            tracing::warn!(
+                error,
+                follows = "the next start computes them again",
+                "visibility_areas_not_stored"
+            );
+        }
+    }
+}
+
+/// `map` with its visibility areas, and those of them that were computed and not read.
+async fn with_areas(
+    map: Arc<MapSnapshot>,
+    before: Option<Arc<MapSnapshot>>,
+    store: &Store,
+    vitals: &Vitals,
+) -> Option<(areas::Areas, Vec<StoredArea>)> {
+    let panics = vitals.panics();
+    let (what, follows) = ("visibility areas", "those of this version are absent");
+    let first = map.clone();
+    let work = move || {
+        #[cfg(test)]
+        planting::planted(&first.name, "visibility areas");
+        areas::known(&first, before.as_deref())
+    };
+    let made = tokio::task::spawn_blocking(work).await;
+    let (mut known, missing) = panics.joined(Edge::Publication, what, follows, made).ok()?;
+    if missing.is_empty() {
+        return Some((known, Vec::new()));
+    }
+    let wanted: Vec<_> = missing.iter().map(areas::Missing::wanted).collect();
+    let stored = visibility_areas::get(store.reads(), &wanted).await;
+    let work = move || {
+        let computed = areas::complete(&mut known, missing, stored, &map.visibility_settings);
+        #[cfg(test)]
+        planting::computed(&map.name, computed.len());
+        (known, computed)
+    };
+    let made = tokio::task::spawn_blocking(work).await;
+    panics.joined(Edge::Publication, what, follows, made).ok()
+}
+
+/// `map` with one more kind of derived data, and areas that are to be stored. The next version tries again what fails. Until then, areas that fail are left
 /// out, since whoever waits for areas would wait for ever. Look-alike classes that fail stay pending: without them a known
 /// pose names nothing.
-async fn derived(map: Arc<MapSnapshot>, before: Option<Arc<MapSnapshot>>, vitals: &Vitals) -> MapSnapshot {
+async fn derived(
+    map: Arc<MapSnapshot>,
+    before: Option<Arc<MapSnapshot>>,
+    store: &Store,
+    vitals: &Vitals,
+) -> (MapSnapshot, Vec<StoredArea>) {
     let mut next = MapSnapshot::clone(&map);
-    let panics = vitals.panics();
     if map.pending.visibility {
-        let work = move || {
-            #[cfg(test)]
-            planting::planted(&map.name, "visibility areas");
-            visibility_areas::areas(&map, before.as_deref())
-        };
-        let made = tokio::task::spawn_blocking(work).await;
-        let made =
-            panics.joined(Edge::Publication, "visibility areas", "those of this version are absent", made);
-        if let Ok(areas) = made {
-            next.visibility = areas;
-        }
+        let made = with_areas(map, before, store, vitals).await;
         next.pending.visibility = false;
-        return next;
+        let Some((areas, computed)) = made else { return (next, Vec::new()) };
+        next.visibility = areas;
+        return (next, computed);
     }
+    let panics = vitals.panics();
     let work = move || {
         #[cfg(test)]
         planting::planted(&map.name, "look-alike classes");
@@ -87,7 +138,7 @@ async fn derived(map: Arc<MapSnapshot>, before: Option<Arc<MapSnapshot>>, vitals
         next.look_alikes = classes;
         next.pending.look_alikes = false;
     }
-    next
+    (next, Vec::new())
 }
 
 fn look_alikes(map: &MapSnapshot, before: Option<&MapSnapshot>) -> Arc<LookAlikeClasses> {
@@ -115,6 +166,19 @@ pub(super) mod planting {
     /// Takes all panics of a map away.
     pub(super) fn clear(map: &str) {
         PLANTED.lock().unwrap_or_else(PoisonError::into_inner).retain(|(planted, _)| *planted != map);
+    }
+
+    /// Areas that were computed, by map.
+    static COMPUTED: Mutex<Vec<(String, usize)>> = Mutex::new(Vec::new());
+
+    pub(super) fn computed(map: &str, count: usize) {
+        COMPUTED.lock().unwrap_or_else(PoisonError::into_inner).push((map.to_owned(), count));
+    }
+
+    /// How many areas of a map were computed since the last call.
+    pub(super) fn computed_of(map: &str) -> usize {
+        let mut all = COMPUTED.lock().unwrap_or_else(PoisonError::into_inner);
+        all.extract_if(.., |(of, _)| of == map).map(|(_, count)| count).sum()
     }
 
     pub(super) fn planted(map: &str, what: &str) {

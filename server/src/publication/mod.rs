@@ -75,7 +75,7 @@ impl Catalogue {
         let wake = publisher.derive.clone();
         let (store, writer) = Store::open(config, Arc::new(publisher), vitals.clone()).await?;
         let (stop, stopping) = watch::channel(false);
-        let deriver = tokio::spawn(derive::run(snapshots.clone(), vitals, wake, stopping));
+        let deriver = tokio::spawn(derive::run((snapshots.clone(), store.clone()), vitals, wake, stopping));
         Ok((
             Self { store, snapshots, tokens, certificates, events: Arc::default() },
             CatalogueTasks { writer, deriver, stop },

@@ -1,5 +1,7 @@
 //! The store and its publication as a whole, on fresh databases.
 
+mod incremental;
+
 use super::{build::tests as planting, *};
 use crate::store::kind::Kind;
 use crate::{

@@ -9,7 +9,7 @@ use super::{
     wire::{Wire, refusal_word},
 };
 use crate::bus::{Outbox, Receivers, announce_presence, take_frame};
-use engine::{panics::Edge, slots::SlotKey, vitals::Pulse, workers::Publish};
+use engine::{intake::FrameKind, panics::Edge, slots::SlotKey, vitals::Pulse, workers::Publish};
 use protos::{Name, prost::Message, v1};
 use ros2::robot::{Lack, Problem, RobotAdapter, RobotMessage, Taken, TopicUse};
 use std::{
@@ -107,7 +107,8 @@ impl RobotThread {
                         self.frame_ids.insert(camera.clone(), frame_id);
                     }
                     let slot = SlotKey { robot: self.robot.clone(), camera };
-                    take_frame(&self.to, &self.outbox, &slot, frame.encode_to_vec().into());
+                    let kind = FrameKind::Image;
+                    take_frame(&self.to, &self.outbox, kind, &slot, frame.encode_to_vec().into());
                 }
                 RobotMessage::Odometry(odometry) => {
                     let message = odometry.encode_to_vec().into();

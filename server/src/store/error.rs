@@ -61,6 +61,17 @@ pub(crate) enum StoreError {
         /// Number of the later commit.
         by: i64,
     },
+    /// A draft cannot be published, because its map has changed the same since it began.
+    #[error(
+        "draft `{draft}` and its map have both changed: {}. Take that back on one side, or discard the draft",
+        .with.join("; ")
+    )]
+    Conflicts {
+        /// Name of the draft.
+        draft: String,
+        /// What both have changed, in words.
+        with: Vec<String>,
+    },
     /// The map links are impossible.
     #[error(transparent)]
     Frames(#[from] map::map_links::MapLinkError),

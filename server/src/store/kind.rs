@@ -21,6 +21,7 @@ pub(crate) enum Kind {
     Certificate,
     Backup,
     Commit,
+    Draft,
     Answer,
 }
 
@@ -43,6 +44,7 @@ impl fmt::Display for Kind {
             Self::Certificate => "certificate",
             Self::Backup => "backup",
             Self::Commit => "commit",
+            Self::Draft => "draft",
             Self::Answer => "stored answer",
         })
     }

@@ -107,7 +107,7 @@ pub(crate) struct LandmarkRow {
 }
 
 /// The word for a landmark's health in the database.
-fn health_word(health: LandmarkHealth) -> &'static str {
+pub(super) fn health_word(health: LandmarkHealth) -> &'static str {
     match health {
         LandmarkHealth::Sound => "sound",
         LandmarkHealth::Flagged => "flagged",
@@ -156,7 +156,11 @@ fn covariance_bytes(covariance: &Matrix6<f64>) -> Vec<u8> {
     covariance.transpose().iter().flat_map(|v| v.to_le_bytes()).collect()
 }
 
-async fn set_geometry(tx: &mut Tx, id: i64, geometry: &LandmarkGeometry) -> Result<(), StoreError> {
+pub(super) async fn set_geometry(
+    tx: &mut Tx,
+    id: i64,
+    geometry: &LandmarkGeometry,
+) -> Result<(), StoreError> {
     let (size, place) = (geometry.size, geometry.place);
     sqlx::query(UPDATE)
         .bind(id)

@@ -74,7 +74,7 @@ pub(crate) async fn set(
     let mut locations = all(&mut tx.conn).await?;
     let location = change(locations.remove(map).unwrap_or_default());
     let parent = match &location.link {
-        Some(link) => Some(maps::get(&mut tx.conn, &link.parent).await?.id),
+        Some(link) => Some(outer(maps::get(&mut tx.conn, &link.parent).await?)?),
         None => None,
     };
     locations.insert(map.to_owned(), location.clone());
@@ -91,6 +91,16 @@ pub(crate) async fn set(
         .map_err(StoreError::during("locate map"))?;
     tx.changed(CommittedChange::Links);
     Ok(location)
+}
+
+/// The number of a map that others may lie in. A draft goes away.
+fn outer(map: maps::MapRow) -> Result<i64, StoreError> {
+    match map.draft_of {
+        Some(of) => {
+            Err(StoreError::InUse(format!("map `{}` is a draft of map `{of}`: use that one", map.name)))
+        }
+        None => Ok(map.id),
+    }
 }
 
 #[cfg(test)]

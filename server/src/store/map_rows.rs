@@ -3,14 +3,17 @@
 use super::{StoreError, landmarks, maps, statements::statements, visibility_settings};
 use map::{landmark_health::LandmarkHealth, visibility::VisibilitySettings};
 use sqlx::{Row, SqliteConnection};
+use std::collections::BTreeMap;
 use vision::{model::LandmarkId, recognise::DistanceKind};
 
 statements! {
-    MAP = "SELECT name, version, distance, sight, walls_version FROM maps WHERE id = ?1";
+    MAP = "SELECT name, version, draft_of IS NOT NULL AS is_draft, distance, sight, walls_version FROM maps WHERE id = ?1";
     NAME = "SELECT name FROM maps WHERE id = ?1";
     MAP_IDS = "SELECT id FROM maps ORDER BY id";
+    ROWS = "SELECT coalesce(group_concat(id || ' ' || revision || ' ' || changed_ms || ' ' || health, ';'), '') \
+            FROM landmarks WHERE map_id = ?1";
     LANDMARKS = "SELECT id, name, width_m, height_m, x_m, y_m, z_m, theta_rad, roll_rad, tilt_rad, place_covariance, \
-                 size_from_views, health FROM landmarks WHERE map_id = ?1 ORDER BY id";
+                 size_from_views FROM landmarks WHERE map_id = ?1 AND id IN (SELECT value FROM json_each(?2))";
 }
 
 /// A map without what belongs to it.
@@ -18,6 +21,7 @@ statements! {
 pub(crate) struct MapHead {
     pub(crate) name: String,
     pub(crate) version: u64,
+    pub(crate) is_draft: bool,
     pub(crate) distance: DistanceKind,
     /// Camera and limits of its visibility areas.
     pub(crate) visibility_settings: VisibilitySettings,
@@ -25,13 +29,21 @@ pub(crate) struct MapHead {
     pub(crate) walls_version: i64,
 }
 
+/// What changes whenever the row of a landmark does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct RowState {
+    pub(crate) id: LandmarkId,
+    /// Revision, and time of the last edit.
+    pub(crate) edited: (i64, i64),
+    /// Robots change it without an edit.
+    pub(crate) health: LandmarkHealth,
+}
+
 /// A landmark without its views and its model.
 #[derive(Debug, Clone)]
 pub(crate) struct LandmarkHead {
-    pub(crate) id: LandmarkId,
     pub(crate) name: String,
     pub(crate) geometry: landmarks::LandmarkGeometry,
-    pub(crate) health: LandmarkHealth,
 }
 
 /// Numbers of all maps.
@@ -56,6 +68,7 @@ pub(crate) async fn head(conn: &mut SqliteConnection, id: i64) -> Result<Option<
     let name: String = row.try_get("name").map_err(at())?;
     Ok(Some(MapHead {
         version: row.try_get::<i64, _>("version").map_err(at())? as u64,
+        is_draft: row.try_get("is_draft").map_err(at())?,
         distance: maps::distance_of(&row.try_get::<String, _>("distance").map_err(at())?),
         visibility_settings: visibility_settings::read(
             &name,
@@ -66,17 +79,39 @@ pub(crate) async fn head(conn: &mut SqliteConnection, id: i64) -> Result<Option<
     }))
 }
 
-/// Its landmarks by rising number.
-pub(crate) async fn landmarks(conn: &mut SqliteConnection, id: i64) -> Result<Vec<LandmarkHead>, StoreError> {
+/// The state of each of its landmarks. One row for all of them: reading a row costs more than what is in it, and this is read
+/// after every change of the map.
+pub(crate) async fn row_states(conn: &mut SqliteConnection, id: i64) -> Result<Vec<RowState>, StoreError> {
+    let states: String = sqlx::query_scalar(ROWS)
+        .bind(id)
+        .fetch_one(conn)
+        .await
+        .map_err(StoreError::during("read the landmarks' revisions"))?;
+    let state = |text: &str| {
+        let mut parts = text.split(' ');
+        let mut number = || parts.next()?.parse::<i64>().ok();
+        let (id, edited) = (LandmarkId(number()? as u64), (number()?, number()?));
+        Some(RowState { id, edited, health: landmarks::health_of(parts.next()?) })
+    };
+    states.split_terminator(';').map(state).collect::<Option<_>>().ok_or_else(|| StoreError::Damaged {
+        what: "the list of landmarks".to_owned(),
+        reason: "it cannot be read".to_owned(),
+    })
+}
+
+/// Those of its landmarks that are asked for.
+pub(crate) async fn landmarks(
+    conn: &mut SqliteConnection,
+    id: i64,
+    wanted: &[LandmarkId],
+) -> Result<BTreeMap<LandmarkId, LandmarkHead>, StoreError> {
     let at = || StoreError::during("read landmarks of a map");
-    let rows = sqlx::query(LANDMARKS).bind(id).fetch_all(conn).await.map_err(at())?;
+    let wanted: Vec<_> = wanted.iter().map(|id| id.0.to_string()).collect();
+    let wanted = format!("[{}]", wanted.join(","));
+    let rows = sqlx::query(LANDMARKS).bind(id).bind(wanted).fetch_all(conn).await.map_err(at())?;
     let head = |row: &sqlx::sqlite::SqliteRow| {
-        Ok(LandmarkHead {
-            id: LandmarkId(row.try_get::<i64, _>("id")? as u64),
-            name: row.try_get("name")?,
-            geometry: landmarks::geometry(row)?,
-            health: landmarks::health_of(row.try_get("health")?),
-        })
+        let id = LandmarkId(row.try_get::<i64, _>("id")? as u64);
+        Ok((id, LandmarkHead { name: row.try_get("name")?, geometry: landmarks::geometry(row)? }))
     };
     rows.iter().map(head).collect::<Result<_, _>>().map_err(at())
 }

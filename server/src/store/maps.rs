@@ -5,11 +5,14 @@ use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
 use vision::recognise::DistanceKind;
 
 statements! {
-    COUNT = "SELECT count(*) FROM maps";
+    // Drafts are no further maps.
+    COUNT = "SELECT count(*) FROM maps WHERE draft_of IS NULL";
     INSERT = "INSERT INTO maps (name, distance, created_ms) VALUES (?1, ?2, ?3) RETURNING id";
-    GET = "SELECT id, name, version, id || '.' || revision AS revision, changed_ms, distance, (SELECT count(*) FROM landmarks WHERE map_id = maps.id) AS landmarks \
+    GET = "SELECT id, name, version, id || '.' || revision AS revision, changed_ms, distance, \
+           (SELECT o.name FROM maps o WHERE o.id = maps.draft_of) AS draft_of, (SELECT count(*) FROM landmarks WHERE map_id = maps.id) AS landmarks \
            FROM maps WHERE name = ?1";
-    PAGE = "SELECT id, name, version, id || '.' || revision AS revision, changed_ms, distance, (SELECT count(*) FROM landmarks WHERE map_id = maps.id) AS landmarks \
+    PAGE = "SELECT id, name, version, id || '.' || revision AS revision, changed_ms, distance, \
+           (SELECT o.name FROM maps o WHERE o.id = maps.draft_of) AS draft_of, (SELECT count(*) FROM landmarks WHERE map_id = maps.id) AS landmarks \
             FROM maps WHERE name > ?1 ORDER BY name LIMIT ?2";
     BUMP = "UPDATE maps SET version = version + 1 WHERE id = ?1";
     DELETE = "DELETE FROM maps WHERE id = ?1";
@@ -18,6 +21,7 @@ statements! {
     OPEN_JOB = "SELECT id FROM jobs WHERE map = ?1 AND state IN ('queued', 'running') LIMIT 1";
     OPEN_GATHERING = "SELECT id FROM gatherings WHERE map_id = ?1 AND open = 1 LIMIT 1";
     LIES_IN = "SELECT name FROM maps WHERE parent_id = ?1 ORDER BY name LIMIT 1";
+    DRAFT_OF = "SELECT name FROM maps WHERE draft_of = ?1 ORDER BY name LIMIT 1";
     ROBOT_ON = "SELECT name FROM robots WHERE map_id = ?1 ORDER BY name LIMIT 1";
     FORGET_IN_TOKENS = "UPDATE tokens SET maps = (SELECT json_group_array(value) FROM json_each(tokens.maps) \
                         WHERE value <> ?1) WHERE maps IS NOT NULL";
@@ -34,6 +38,8 @@ pub(crate) struct MapRow {
     /// When the revision changed last.
     pub(crate) changed_ms: i64,
     pub(crate) distance: DistanceKind,
+    /// The map that it is a draft of.
+    pub(crate) draft_of: Option<String>,
     /// How many landmarks it has.
     pub(crate) landmarks: u64,
 }
@@ -47,6 +53,7 @@ fn map_row(row: &SqliteRow) -> Result<MapRow, sqlx::Error> {
         revision: row.try_get("revision")?,
         changed_ms: row.try_get("changed_ms")?,
         distance: distance_of(&distance),
+        draft_of: row.try_get("draft_of")?,
         landmarks: row.try_get::<i64, _>("landmarks")? as u64,
     })
 }
@@ -174,7 +181,8 @@ async fn no_robot_on(tx: &mut Tx, map: &MapRow) -> Result<(), StoreError> {
     }
 }
 
-/// Deletes a map and all that is in it. Errors: `InUse` while a robot is on it, or another map is linked to it.
+/// Deletes a map and all that is in it. Errors: `InUse` while a robot is on it, another map is linked to it, or it has
+/// a draft.
 pub(crate) async fn delete(tx: &mut Tx, name: &str) -> Result<(), StoreError> {
     let map = get(&mut tx.conn, name).await?;
     no_robot_on(tx, &map).await?;
@@ -185,6 +193,15 @@ pub(crate) async fn delete(tx: &mut Tx, name: &str) -> Result<(), StoreError> {
         .map_err(StoreError::during("look for maps in it"))?;
     if let Some(inner) = inner {
         return Err(StoreError::InUse(format!("map `{inner}` lies in map `{name}`")));
+    }
+    let draft: Option<String> = sqlx::query_scalar(DRAFT_OF)
+        .bind(map.id)
+        .fetch_optional(&mut tx.conn)
+        .await
+        .map_err(StoreError::during("look for drafts"))?;
+    if let Some(draft) = draft {
+        let why = format!("map `{name}` has the draft `{draft}`: publish or discard it first");
+        return Err(StoreError::InUse(why));
     }
     sqlx::query(DELETE).bind(map.id).execute(&mut tx.conn).await.map_err(StoreError::during("delete map"))?;
     // A token is not for a later map of the same name; one that was for this map alone is for none.

@@ -37,6 +37,9 @@ const FILES: &[(&str, &str)] = files![
     "0023_commits",
     "0025_stored_answers",
     "0030_audit",
+    "0031_wall_covariance",
+    "0032_visibility_areas",
+    "0033_drafts",
 ];
 
 /// The steps in order.

@@ -28,6 +28,7 @@ pub(crate) mod gatherings;
 pub(crate) mod track_acceptance;
 pub(crate) mod modality_stats;
 pub(crate) mod visibility_settings;
+pub(crate) mod visibility_areas;
 pub(crate) mod robot_certificates;
 pub(crate) mod robots;
 pub(crate) mod stored_answers;
@@ -38,6 +39,8 @@ pub(crate) mod actor;
 pub(crate) mod audit;
 pub(crate) mod revisions;
 pub(crate) mod history;
+pub(crate) mod contents;
+pub(crate) mod drafts;
 
 pub(crate) use error::StoreError;
 pub(crate) use on_commit::{CommittedChange, OnCommit};

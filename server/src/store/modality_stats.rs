@@ -37,7 +37,7 @@ pub(crate) struct ModalitySettings {
 }
 
 /// The word of the column, whose CHECK knows the words of earlier builds.
-fn mode_word(mode: FusionMode) -> &'static str {
+pub(super) fn mode_word(mode: FusionMode) -> &'static str {
     match mode {
         FusionMode::All => "all",
         FusionMode::NearBest => "fuse",
@@ -45,7 +45,7 @@ fn mode_word(mode: FusionMode) -> &'static str {
     }
 }
 
-fn mode_of(word: &str) -> FusionMode {
+pub(super) fn mode_of(word: &str) -> FusionMode {
     match word {
         "fuse" => FusionMode::NearBest,
         "single" => FusionMode::Best,

@@ -3,8 +3,8 @@
 
 use super::{StoreError, Tx, kind::Kind, landmarks::ModelSummary, statements::statements};
 use sha2::{Digest as _, Sha256};
-use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
-use std::collections::BTreeSet;
+use sqlx::SqliteExecutor;
+use std::collections::{BTreeMap, BTreeSet};
 use vision::model::LandmarkId;
 
 statements! {
@@ -19,8 +19,8 @@ statements! {
            params_hash = excluded.params_hash, active = excluded.active, reasons = excluded.reasons, \
            facts = excluded.facts, views = excluded.views, generated_views = excluded.generated_views, \
            learnt_ms = excluded.learnt_ms, looks_like = excluded.looks_like";
-    DIGESTS = "SELECT m.landmark_id, m.sha256 FROM models m JOIN landmarks l ON l.id = m.landmark_id \
-               WHERE l.map_id = ?1 AND m.looks_like IS NULL ORDER BY m.landmark_id";
+    DIGESTS = "SELECT coalesce(group_concat(m.landmark_id || ' ' || hex(m.sha256), ';'), '') FROM models m \
+               JOIN landmarks l ON l.id = m.landmark_id WHERE l.map_id = ?1 AND m.looks_like IS NULL";
     REFUSED = "SELECT m.landmark_id FROM models m JOIN landmarks l ON l.id = m.landmark_id \
                WHERE l.map_id = ?1 AND m.looks_like IS NOT NULL";
     REPLACE_BYTES = "INSERT INTO model_contents (sha256, bytes) SELECT ?3, ?4 \
@@ -138,20 +138,31 @@ pub(crate) async fn refused(
     Ok(ids.into_iter().map(|id| LandmarkId(id as u64)).collect())
 }
 
-/// Landmark and digest of every model of a map, without those of refused landmarks.
+/// Landmark and digest of every model of a map, without those of refused landmarks. One row for all of them, as of the
+/// landmarks' revisions.
 pub(crate) async fn digests(
     db: impl SqliteExecutor<'_>,
     map_id: i64,
-) -> Result<Vec<(LandmarkId, ModelDigest)>, StoreError> {
-    let at = || StoreError::during("list models");
-    let rows = sqlx::query(DIGESTS).bind(map_id).fetch_all(db).await.map_err(at())?;
-    let pair = |row: &SqliteRow| {
-        let id: i64 = row.try_get("landmark_id").map_err(at())?;
-        let bytes: &[u8] = row.try_get("sha256").map_err(at())?;
+) -> Result<BTreeMap<LandmarkId, ModelDigest>, StoreError> {
+    let all: Result<String, _> = sqlx::query_scalar(DIGESTS).bind(map_id).fetch_one(db).await;
+    let all = all.map_err(StoreError::during("list models"))?;
+    let pair = |text: &str| {
+        let (id, digest) = text.split_once(' ')?;
         // The schema says 32 bytes; were it otherwise, no model would have this digest.
-        Ok((LandmarkId(id as u64), bytes.try_into().unwrap_or_default()))
+        Some((LandmarkId(id.parse::<i64>().ok()? as u64), from_hex(digest).unwrap_or_default()))
     };
-    rows.iter().map(pair).collect()
+    all.split_terminator(';').map(pair).collect::<Option<_>>().ok_or_else(|| StoreError::Damaged {
+        what: "the list of models".to_owned(),
+        reason: "it cannot be read".to_owned(),
+    })
+}
+
+fn from_hex(digits: &str) -> Option<ModelDigest> {
+    let (mut digest, mut parts) = (ModelDigest::default(), digits.as_bytes().chunks_exact(2));
+    for (byte, pair) in digest.iter_mut().zip(&mut parts) {
+        *byte = u8::from_str_radix(std::str::from_utf8(pair).ok()?, 16).ok()?;
+    }
+    (digits.len() == 2 * digest.len()).then_some(digest)
 }
 
 /// The bytes of a landmark's model.

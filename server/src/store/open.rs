@@ -101,6 +101,8 @@ pub(super) async fn open(data: &Path) -> Result<Opened, OpenError> {
     let reads = SqlitePoolOptions::new()
         .max_connections(READERS)
         .acquire_timeout(BUSY_TIMEOUT)
+        // A connection is tested when it comes back.
+        .test_before_acquire(false)
         .connect_with(options.read_only(true))
         .await
         .map_err(OpenError::Open)?;

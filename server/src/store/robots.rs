@@ -28,6 +28,10 @@ fn robot_row(row: &SqliteRow) -> Result<RobotRow, sqlx::Error> {
 /// Registers a robot, or moves it to another map.
 pub(crate) async fn put(tx: &mut Tx, name: &str, map: &str, max: usize) -> Result<RobotRow, StoreError> {
     let map = maps::get(&mut tx.conn, map).await?;
+    if let Some(of) = &map.draft_of {
+        let why = format!("map `{}` is a draft of map `{of}`: robots stand on that one", map.name);
+        return Err(StoreError::InUse(why));
+    }
     let put = sqlx::query(PUT).bind(name).bind(map.id).bind(now_ms()).execute(&mut tx.conn).await;
     put.map_err(StoreError::during("register robot"))?;
     let count = sqlx::query_scalar(COUNT)

@@ -74,11 +74,7 @@ pub(super) async fn stamp(
 
 /// The walls of a map (map frame).
 pub(super) async fn wall_segments(store: &Store, map: i64) -> Result<Vec<LaserSegment>, StoreError> {
-    Ok(walls::all_of(store.reads(), map)
-        .await?
-        .iter()
-        .filter_map(|ends| LaserSegment::by_hand(ends).ok())
-        .collect())
+    Ok(walls::all_of(store.reads(), map).await?.iter().filter_map(|wall| wall.segment().ok()).collect())
 }
 
 /// Computes off the runtime. A panic is caught, counted and answered.

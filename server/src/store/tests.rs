@@ -12,6 +12,7 @@ async fn every_statement_prepares_on_the_migrated_schema() {
         robot_certificates::ALL,
         map_locations::ALL,
         visibility_settings::ALL,
+        visibility_areas::ALL,
         landmarks::ALL,
         copies::ALL,
         pictures::ALL,
@@ -33,7 +34,9 @@ async fn every_statement_prepares_on_the_migrated_schema() {
         revisions::ALL,
         map_rows::ALL,
     ];
-    for (name, sql) in all.into_iter().chain(history::EVERY).flatten() {
+    for (name, sql) in
+        all.into_iter().chain(history::EVERY).chain(contents::EVERY).chain(drafts::EVERY).flatten()
+    {
         if let Err(error) = opened.writer.prepare(sql.into_sql_str()).await {
             panic!("{name}: {error}");
         }

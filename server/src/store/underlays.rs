@@ -48,10 +48,17 @@ pub(crate) async fn put(
 ) -> Result<UnderlayRow, StoreError> {
     let map = maps::get(&mut tx.conn, map).await?;
     row.created_ms = now_ms();
-    let ([width_px, height_px], [x_m, y_m, theta_rad]) = (row.size_px, row.map_from_picture);
     pictures::put(tx, &row.image_sha256, image).await?;
-    sqlx::query(PUT)
-        .bind(map.id)
+    insert(tx, map.id, &row).await?;
+    maps::bump(tx, map.id).await?;
+    Ok(row)
+}
+
+/// Stores the row of an underlay whose picture is there.
+pub(super) async fn insert(tx: &mut Tx, map: i64, row: &UnderlayRow) -> Result<(), StoreError> {
+    let ([width_px, height_px], [x_m, y_m, theta_rad]) = (row.size_px, row.map_from_picture);
+    let done = sqlx::query(PUT)
+        .bind(map)
         .bind(&row.image_sha256[..])
         .bind(&row.image_kind)
         .bind(width_px)
@@ -62,10 +69,8 @@ pub(crate) async fn put(
         .bind(theta_rad)
         .bind(row.created_ms)
         .execute(&mut tx.conn)
-        .await
-        .map_err(StoreError::during("store underlay"))?;
-    maps::bump(tx, map.id).await?;
-    Ok(row)
+        .await;
+    done.map_err(StoreError::during("store underlay")).map(drop)
 }
 
 /// The underlay of a map.

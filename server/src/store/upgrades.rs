@@ -111,7 +111,8 @@ async fn a_database_of_every_schema_opens_with_all_its_rows() {
             );
         }
         assert_eq!(views::distractors(db, 1).await.unwrap().len(), 1);
-        assert_eq!(walls::all_of(db, 1).await.unwrap(), [[0.0, 0.0, 6.5, 0.0], [6.5, 0.0, 6.5, 4.0]]);
+        let segments = [[0.0, 0.0, 6.5, 0.0], [6.5, 0.0, 6.5, 4.0]].map(walls::StoredWall::from);
+        assert_eq!(walls::all_of(db, 1).await.unwrap(), segments);
         assert_eq!(robots::get(db, "r1").await.unwrap().map, "office");
         assert_eq!(jobs::get(db, 1).await.unwrap().state, "done");
         if schema >= 6 {

@@ -87,7 +87,12 @@ pub(crate) struct TrainingViewRow {
 }
 
 pub(super) fn corners_bytes(corners: &Corners) -> Vec<u8> {
-    corners.points().iter().flat_map(|c| [c.x, c.y]).flat_map(f64::to_le_bytes).collect()
+    point_bytes(&corners.points().map(|c| [c.x, c.y]))
+}
+
+/// The column of four points.
+pub(super) fn point_bytes(corners_px: &[[f64; 2]; 4]) -> Vec<u8> {
+    corners_px.iter().flatten().flat_map(|v| v.to_le_bytes()).collect()
 }
 
 fn corners_of(bytes: &[u8]) -> Option<[[f64; 2]; 4]> {

@@ -26,6 +26,7 @@ fn every_key(robot: &str, map: &str) -> Vec<Key> {
     let (robot, map, camera) = (named(robot), named(map), named("front"));
     let all = vec![
         Key::Frame(robot.clone(), camera.clone()),
+        Key::Quads(robot.clone(), camera.clone()),
         Key::Answer(robot.clone(), camera),
         Key::Odometry(robot.clone()),
         Key::Scan(robot.clone()),
@@ -33,13 +34,15 @@ fn every_key(robot: &str, map: &str) -> Vec<Key> {
         Key::Alive(robot.clone(), None),
         Key::Alive(robot.clone(), Some(7)),
         Key::Gaze(robot.clone()),
-        Key::Hello(robot),
+        Key::Hello(robot.clone()),
+        Key::Localise(robot),
         Key::MapChanged(map.clone()),
         Key::MapVersion(map),
     ];
     for key in &all {
         match key {
             Key::Frame(..)
+            | Key::Quads(..)
             | Key::Answer(..)
             | Key::Odometry(_)
             | Key::Scan(_)
@@ -47,6 +50,7 @@ fn every_key(robot: &str, map: &str) -> Vec<Key> {
             | Key::Alive(..)
             | Key::Gaze(_)
             | Key::Hello(_)
+            | Key::Localise(_)
             | Key::MapChanged(_)
             | Key::MapVersion(_) => {}
         }
@@ -101,7 +105,7 @@ async fn a_robot_writes_its_own_keys_alone() {
         r1.delete(key).await.expect("delete");
         held.push(r1.liveliness().declare_token(key).await.expect("a token"));
     }
-    let [_, _, odometry, ..] = own.as_slice() else { panic!("keys") };
+    let [_, _, _, odometry, ..] = own.as_slice() else { panic!("keys") };
     let last = || async {
         // The last message that may pass: everything before it has passed or was dropped.
         r1.put(odometry, vec![9]).await.expect("put");
@@ -109,8 +113,9 @@ async fn a_robot_writes_its_own_keys_alone() {
     };
     eventually("the last message", last).await;
     tokio::time::sleep(ARRIVED).await;
-    let written: BTreeSet<String> =
-        ["frame/front", "odometry", "scan"].map(|key| format!("waymark/1/default/robot/r1/{key}")).into();
+    let written: BTreeSet<String> = ["frame/front", "odometry", "quads/front", "scan"]
+        .map(|key| format!("waymark/1/default/robot/r1/{key}"))
+        .into();
     assert_eq!(of(&heard, 1), written, "what r1's certificate may write");
     assert_eq!(of(&heard, 0), BTreeSet::new(), "deletions, and what the server writes itself");
     let alive: BTreeSet<String> =

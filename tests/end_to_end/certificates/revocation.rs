@@ -2,7 +2,13 @@
 
 use super::Fleet;
 use client::{Capture, ClientError, RobotClient, RobotOptions, v1};
-use std::time::Duration;
+use std::{
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
+    time::Duration,
+};
 use tests::eventually;
 use vision::frame::GrayImage;
 
@@ -19,6 +25,12 @@ async fn answered(robot: &RobotClient) {
     eventually("an answer", ask).await;
 }
 
+/// Connects in vain: the server is there, and takes nothing.
+async fn refused(options: &RobotOptions) {
+    let error = RobotClient::connect(options).await.err();
+    assert!(matches!(error, Some(ClientError::NotAdmitted { .. })), "{error:?}");
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn a_robot_that_is_enrolled_works_and_those_at_work_go_on() {
     let fleet = Fleet::start().await;
@@ -32,6 +44,43 @@ async fn a_robot_that_is_enrolled_works_and_those_at_work_go_on() {
     fleet.inside.maps().put_robot("r3", "hall").await.expect("moved");
     let told = || async { r3.map_version("hall", Duration::from_secs(1)).await.ok().flatten() };
     eventually("the version of the map it drives on now", told).await;
+    answered(&r1).await;
+    fleet.inside.server.stop().await;
+}
+
+/// How often the gate opens again while robots connect.
+const REOPENED: usize = 12;
+/// Programs that connect again and again meanwhile.
+const PROGRAMS: usize = 6;
+
+/// A session that meets the gate as that closes may keep a dead link for ever: the client opens it anew.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_robot_that_connects_while_the_gate_opens_again_is_admitted() {
+    let fleet = Fleet::start().await;
+    let options = fleet.options("r1");
+    let maps = fleet.inside.maps();
+    let done = Arc::new(AtomicBool::new(false));
+    let connecting = |options: RobotOptions, done: Arc<AtomicBool>| async move {
+        let mut connected = 0;
+        while !done.load(Ordering::Relaxed) {
+            RobotClient::connect(&options).await?.close().await?;
+            connected += 1;
+        }
+        Ok::<usize, ClientError>(connected)
+    };
+    let programs: Vec<_> =
+        (0..PROGRAMS).map(|_| tokio::spawn(connecting(options.clone(), done.clone()))).collect();
+    for i in 0..REOPENED {
+        // Another right of another robot; the answer comes once the gate is open again.
+        maps.put_robot("r2", if i % 2 == 0 { "hall" } else { "yard" }).await.expect("moved");
+        tokio::time::sleep(Duration::from_millis(250 + 37 * i as u64)).await;
+    }
+    done.store(true, Ordering::Relaxed);
+    for program in programs {
+        let connected = program.await.expect("no panic").expect("admitted each time");
+        assert!(connected > 0);
+    }
+    let r1 = RobotClient::connect(&options).await.expect("connected");
     answered(&r1).await;
     fleet.inside.server.stop().await;
 }
@@ -58,7 +107,7 @@ async fn a_revoked_certificate_gives_nothing_at_once() {
     let after = fleet.inside.server.slots.counts();
     assert_eq!(before.missing() + after.missing(), 0, "{after:?}");
     let again = RobotOptions { timeout: Duration::from_secs(3), ..fleet.options("r1") };
-    assert!(matches!(RobotClient::connect(&again).await, Err(ClientError::NotAdmitted { .. })));
+    refused(&again).await;
     // A new certificate is another one.
     fleet.enrol("r1", "r1-again");
     let r1 = RobotClient::connect(&fleet.options("r1-again")).await.expect("connected");
@@ -79,11 +128,11 @@ async fn one_of_two_certificates_is_revoked_and_the_other_stays() {
     let spare = RobotClient::connect(&fleet.options("r1-spare")).await.expect("connected");
     answered(&spare).await;
     let first = RobotOptions { timeout: Duration::from_secs(3), ..fleet.options("r1") };
-    assert!(matches!(RobotClient::connect(&first).await, Err(ClientError::NotAdmitted { .. })));
+    refused(&first).await;
     // A robot that is removed takes its certificates with it, also where its name is given again.
     maps.delete_robot("r1").await.expect("removed");
     maps.put_robot("r1", "hall").await.expect("another robot");
     let ghost = RobotOptions { timeout: Duration::from_secs(3), ..fleet.options("r1-spare") };
-    assert!(matches!(RobotClient::connect(&ghost).await, Err(ClientError::NotAdmitted { .. })));
+    refused(&ghost).await;
     fleet.inside.server.stop().await;
 }

@@ -12,6 +12,6 @@ pub use landmark_id::LandmarkId;
 pub use landmark_model::{
     DistanceSamples, Distances, Gate, GateFailure, LandmarkModel, MAX_EXEMPLARS, MAX_VIEWS, ModelStatus,
 };
-pub use model_bytes::StoredModelError;
+pub use model_bytes::{StoredModelError, renumbered};
 pub use model_set::{MAX_LANDMARKS, ModelSet, ModelSetError};
 pub use threshold::{LimitedBy, Threshold, ThresholdError};

@@ -14,6 +14,7 @@ use crate::{
     params::Params,
     points::taught::{MAX_LANDMARK_POINTS, POINT_BYTES, TaughtPoint},
 };
+use std::ops::Range;
 
 /// Largest stored model, in bytes.
 const MAX_BYTES: usize = 3 * MAX_ICON_SIZE * MAX_ICON_SIZE + MAX_LANDMARK_POINTS * POINT_BYTES + 8 * 1024;
@@ -22,6 +23,8 @@ const VERSION: u16 = 3;
 /// The last version without points.
 const WITHOUT_POINTS: u16 = 2;
 const DIGEST_BYTES: usize = 8;
+/// Where the landmark's number is, in every format: after the magic, the version and the hash of the parameters.
+const ID_AT: Range<usize> = 14..22;
 
 /// Why bytes are not a usable model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -119,6 +122,26 @@ impl LandmarkModel {
         }
         Ok(add_negatives(&model, &[], p))
     }
+}
+
+/// Bytes of the model of a landmark as those of the same model of another one, of whatever format and parameters. Done twice,
+/// with the first number the second time, it gives the first bytes.
+pub fn renumbered(bytes: &[u8], id: LandmarkId) -> Result<Vec<u8>, StoredModelError> {
+    if bytes.len() > MAX_BYTES || bytes.len() < ID_AT.end + DIGEST_BYTES || !bytes.starts_with(&MAGIC) {
+        return Err(StoredModelError::NotAModel);
+    }
+    let (content, stored_digest) = bytes.split_at(bytes.len() - DIGEST_BYTES);
+    if stored_digest != digest(content).to_le_bytes() {
+        return Err(StoredModelError::Damaged);
+    }
+    let found = u16::from_le_bytes([bytes[MAGIC.len()], bytes[MAGIC.len() + 1]]);
+    if !(WITHOUT_POINTS..=VERSION).contains(&found) {
+        return Err(StoredModelError::Version { found });
+    }
+    let mut made = content.to_vec();
+    made[ID_AT].copy_from_slice(&id.0.to_le_bytes());
+    made.extend(digest(&made).to_le_bytes());
+    Ok(made)
 }
 
 /// Reads bytes in order; every read is checked.

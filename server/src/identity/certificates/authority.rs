@@ -46,10 +46,16 @@ pub(crate) struct SignedCertificate {
     pub(crate) expires_ms: i64,
 }
 
-/// The name in a robot's certificate: `{robot}.{serial}`. Robots' names have no dot, and each certificate has a name of its
-/// own, so that one can be revoked and the others stay.
+/// Longest common name of a certificate, in characters (RFC 5280, `ub-common-name`): OpenSSL refuses longer ones.
+const MAX_COMMON_NAME: usize = 64;
+
+/// The name in a robot's certificate: `{robot}.{serial}`, the robot's name cut where the two are too long for a common name.
+/// Robots' names have no dot, and each certificate has a serial and so a name of its own: one can be revoked and the others
+/// stay, and none is another robot's.
 pub(crate) fn common_name(robot: &str, serial: &str) -> String {
-    format!("{robot}.{serial}")
+    let room = MAX_COMMON_NAME.saturating_sub(serial.len() + 1);
+    let shown = robot.get(..room).unwrap_or(robot);
+    format!("{shown}.{serial}")
 }
 
 impl Authority {

@@ -34,6 +34,16 @@ fn request() -> (String, String) {
     (key.serialize_pem(), CertificateParams::default().serialize_request(&key).unwrap().pem().unwrap())
 }
 
+#[test]
+fn a_common_name_has_at_most_64_characters_and_is_of_one_certificate() {
+    let serials = ["4000000000000001", "4000000000000002"];
+    let [one, other] = [63, 64].map(|length| "r".repeat(length));
+    assert_eq!(common_name("r1", serials[0]), "r1.4000000000000001");
+    assert_eq!(common_name(&"r".repeat(47), serials[0]).len(), 64);
+    assert_eq!(common_name(&other, serials[0]).len(), 64);
+    assert_ne!(common_name(&one, serials[0]), common_name(&other, serials[1]));
+}
+
 /// Shakes hands in memory; the certificate that the client has shown.
 fn shake(
     server: &Certificates,

@@ -1,7 +1,7 @@
 //! Derived data: when it is there, and what is computed.
 
 use super::super::{tests::config, *};
-use crate::store::{landmarks, maps, walls};
+use crate::store::{StoreError, landmarks, maps, walls};
 use engine::snapshot::MapSnapshot;
 use vision::recognise::DistanceKind;
 
@@ -57,7 +57,8 @@ async fn an_edit_computes_only_what_it_changed_and_not_in_the_writer() {
     assert!(map.pending.visibility && map.visibility.is_empty());
 
     let (stop, stopping) = watch::channel(false);
-    let deriver = tokio::spawn(derive::run(snapshots.clone(), vitals.clone(), wake.clone(), stopping));
+    let deriver =
+        tokio::spawn(derive::run((snapshots.clone(), store.clone()), vitals.clone(), wake.clone(), stopping));
     let before = snapshots.with_visibility("a").await.unwrap();
     assert_eq!((before.version, before.visibility.len()), (map.version, 2));
     stop.send_replace(true);
@@ -74,7 +75,7 @@ async fn an_edit_computes_only_what_it_changed_and_not_in_the_writer() {
     assert!(Arc::ptr_eq(&after.visibility[&p2], &before.visibility[&p2]), "its inputs are the same");
 
     let (_stop, stopping) = watch::channel(false);
-    tokio::spawn(derive::run(snapshots.clone(), vitals, wake, stopping));
+    tokio::spawn(derive::run((snapshots.clone(), store.clone()), vitals, wake, stopping));
     let derived = snapshots.with_visibility("a").await.unwrap();
     assert!(derived.version == after.version && derived.visibility.contains_key(&p1));
     assert!(Arc::ptr_eq(&derived.visibility[&p2], &before.visibility[&p2]));
@@ -134,4 +135,77 @@ async fn visibility_areas_that_fail_are_absent_until_the_next_version() {
     let next = store.snapshots().with_visibility(MAP).await.unwrap();
     assert!(next.version > failed.version && ids.iter().all(|id| next.visibility.contains_key(id)));
     assert_eq!(store.vitals().failure(), None);
+}
+
+/// Landmarks with their stored areas.
+async fn stored_areas(store: &Catalogue) -> Vec<(i64, Vec<u8>)> {
+    sqlx::query_as("SELECT landmark_id, area FROM visibility_areas ORDER BY landmark_id")
+        .fetch_all(store.reads())
+        .await
+        .unwrap()
+}
+
+/// The stored areas, once they are as wanted: they are stored after they are published.
+async fn once_stored(store: &Catalogue, is_ready: impl Fn(&[(i64, Vec<u8>)]) -> bool) -> Vec<(i64, Vec<u8>)> {
+    let waited = async {
+        loop {
+            let rows = stored_areas(store).await;
+            if is_ready(&rows) {
+                return rows;
+            }
+            tokio::time::sleep(std::time::Duration::from_millis(2)).await;
+        }
+    };
+    tokio::time::timeout(std::time::Duration::from_secs(20), waited).await.expect("stored in time")
+}
+
+#[tokio::test]
+async fn a_start_computes_no_area_again_and_an_edit_only_what_it_changed() {
+    const MAP: &str = "areas-stored";
+    let dir = tempfile::tempdir().unwrap();
+    let config = config(dir.path());
+    let (store, tasks) = Catalogue::open(&config).await.unwrap();
+    let [p1, p2] = two_placed(&store, MAP).await;
+    let first = store.snapshots().with_visibility(MAP).await.unwrap();
+    once_stored(&store, |rows| rows.len() == 2).await;
+    assert!(derive::planting::computed_of(MAP) >= 2);
+    tasks.close().await;
+
+    let (store, tasks) = Catalogue::open(&config).await.unwrap();
+    let again = store.snapshots().with_visibility(MAP).await.unwrap();
+    assert_eq!(again.visibility, first.visibility, "bit for bit");
+    assert_eq!(derive::planting::computed_of(MAP), 0, "areas that a start computes");
+    let before = stored_areas(&store).await;
+    let moved = placed_at(46.0);
+    store
+        .write(move |tx| Box::pin(async move { landmarks::update(tx, MAP, "p2", |_| moved).await }))
+        .await
+        .unwrap();
+    let edited = store.snapshots().with_visibility(MAP).await.unwrap();
+    assert!(
+        edited.visibility[&p1] == first.visibility[&p1] && edited.visibility[&p2] != first.visibility[&p2]
+    );
+    assert_eq!(derive::planting::computed_of(MAP), 1, "areas that an edit computes");
+    let after = once_stored(&store, |rows| rows.len() == 2 && rows[1] != before[1]).await;
+    assert_eq!(after[0], before[0]);
+
+    // A damaged row is computed again; so is one that is gone.
+    store
+        .write(|tx| {
+            Box::pin(async move {
+                let damage = "UPDATE visibility_areas SET area = x'0102'";
+                sqlx::query(damage).execute(tx.conn()).await.map_err(StoreError::during("damage"))?;
+                Ok(())
+            })
+        })
+        .await
+        .unwrap();
+    tasks.close().await;
+    let (store, _tasks) = Catalogue::open(&config).await.unwrap();
+    assert_eq!(store.snapshots().with_visibility(MAP).await.unwrap().visibility, edited.visibility);
+    assert_eq!(derive::planting::computed_of(MAP), 2);
+    once_stored(&store, |rows| rows == after).await;
+    // They go with their landmark.
+    store.write(|tx| Box::pin(landmarks::delete(tx, MAP, "p1"))).await.unwrap();
+    assert_eq!(stored_areas(&store).await.iter().map(|(id, _)| *id as u64).collect::<Vec<_>>(), [p2.0]);
 }

@@ -111,8 +111,8 @@ statements! {
                   " f WHERE f.parent_id IS NOT NULL AND f.parent_id NOT IN (SELECT id FROM maps)");
     OLDEST_WALLS = "SELECT min(id) FROM commits WHERE map_id = ?1 AND id > ?2 AND id <= ?3 AND walls = 1";
     CLEAR_WALLS = "DELETE FROM laser_segments WHERE map_id = ?1";
-    RESTORE_WALLS = "INSERT INTO laser_segments (map_id, ordinal, ax_m, ay_m, bx_m, by_m) \
-                     SELECT ?1, ordinal, ax_m, ay_m, bx_m, by_m FROM past_walls WHERE commit_id = ?2";
+    RESTORE_WALLS = "INSERT INTO laser_segments (map_id, ordinal, ax_m, ay_m, bx_m, by_m, covariance) \
+                     SELECT ?1, ordinal, ax_m, ay_m, bx_m, by_m, covariance FROM past_walls WHERE commit_id = ?2";
     COUNT_WALLS = "UPDATE maps SET walls_version = walls_version + 1 WHERE id = ?1";
     IS_OPEN = "SELECT count(*) FROM commits WHERE map_id = ?1 AND open = 1";
     OPEN_JOB = "SELECT id FROM jobs WHERE map = ?1 AND state IN ('queued', 'running') LIMIT 1";
@@ -202,7 +202,7 @@ pub(crate) async fn undo(tx: &mut Tx, map: &str, commit: i64) -> Result<(), Stor
 }
 
 /// A lesson rests on the models that it began with: what it stores would bring them back.
-async fn no_job_on(tx: &mut Tx, map: &MapRow) -> Result<(), StoreError> {
+pub(in crate::store) async fn no_job_on(tx: &mut Tx, map: &MapRow) -> Result<(), StoreError> {
     let job: Option<i64> = sqlx::query_scalar(OPEN_JOB)
         .bind(&map.name)
         .fetch_optional(&mut tx.conn)

@@ -14,7 +14,7 @@ statements! {
              JOIN pictures i ON i.sha256 = p.image_sha256 WHERE p.commit_id = ?1) + \
              (SELECT coalesce(sum(length(i.bytes)), 0) FROM past_underlays p JOIN pictures i ON i.sha256 = p.image_sha256 \
              WHERE p.commit_id = ?1) + (SELECT coalesce(sum(length(cells)), 0) FROM past_runs WHERE commit_id = ?1 \
-             AND present = 1) + (SELECT 40 * count(*) FROM past_walls WHERE commit_id = ?1) WHERE id = ?1";
+             AND present = 1) + (SELECT 64 * count(*) FROM past_walls WHERE commit_id = ?1) WHERE id = ?1";
     CLOSE_OUTSIDE = "UPDATE commits SET open = 0, created_ms = ?1, operation = 'outside' WHERE open = 1";
     FORGET = "DELETE FROM commits WHERE map_id = ?1 AND id <= (SELECT max(id) FROM (SELECT id, row_number() OVER w AS n, \
               sum(bytes) OVER w AS total FROM commits WHERE map_id = ?1 WINDOW w AS (ORDER BY id DESC)) \

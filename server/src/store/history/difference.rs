@@ -2,7 +2,7 @@
 //! Distractors are left out: nobody edits them.
 
 use super::before;
-use crate::store::{StoreError, statements::statements, walls::Ends};
+use crate::store::{StoreError, statements::statements, walls::StoredWall};
 use protos::api::{ChangeSummary, WallsDifference};
 use sqlx::{Row, SqliteConnection, sqlite::SqliteRow};
 use std::collections::{BTreeMap, BTreeSet};
@@ -89,8 +89,8 @@ statements! {
                f.sight IS NOT n.sight AS visibility_settings FROM f JOIN n ON n.id = f.id");
     WALLS_BEFORE = "SELECT min(id) FROM commits WHERE map_id = ?1 AND walls = 1 AND id > ?2 AND id <= ?3";
     WALLS_AFTER = "SELECT min(id) FROM commits WHERE map_id = ?1 AND walls = 1 AND id > ?2";
-    PAST_WALLS = "SELECT ax_m, ay_m, bx_m, by_m FROM past_walls WHERE commit_id = ?1";
-    NOW_WALLS = "SELECT ax_m, ay_m, bx_m, by_m FROM laser_segments WHERE map_id = ?1";
+    PAST_WALLS = "SELECT ax_m, ay_m, bx_m, by_m, covariance FROM past_walls WHERE commit_id = ?1";
+    NOW_WALLS = "SELECT ax_m, ay_m, bx_m, by_m, covariance FROM laser_segments WHERE map_id = ?1";
     NAME_AT = "SELECT coalesce((SELECT name FROM past_landmarks WHERE id = ?1 AND commit_id > ?2 AND present = 1 \
                ORDER BY commit_id LIMIT 1), (SELECT name FROM landmarks WHERE id = ?1), '')";
 }
@@ -224,27 +224,30 @@ async fn walls(
     Ok(walls_difference(&before, &after))
 }
 
-async fn segments(conn: &mut SqliteConnection, sql: &'static str, of: i64) -> Result<Vec<Ends>, StoreError> {
+async fn segments(
+    conn: &mut SqliteConnection,
+    sql: &'static str,
+    of: i64,
+) -> Result<Vec<StoredWall>, StoreError> {
     let at = || StoreError::during("compare walls");
     let rows = sqlx::query(sql).bind(of).fetch_all(conn).await.map_err(at())?;
-    let ends = |row: &SqliteRow| {
-        Ok::<_, sqlx::Error>([row.try_get(0)?, row.try_get(1)?, row.try_get(2)?, row.try_get(3)?])
-    };
-    rows.iter().map(ends).collect::<Result<_, _>>().map_err(at())
+    rows.iter().map(StoredWall::of).collect::<Result<_, _>>().map_err(at())
 }
 
 /// `None` where both have the same segments, in any order.
-fn walls_difference(before: &[Ends], after: &[Ends]) -> Option<WallsDifference> {
-    let bits = |segments: &[Ends]| -> BTreeSet<[u64; 4]> {
-        segments.iter().map(|ends| ends.map(f64::to_bits)).collect()
-    };
+pub(in crate::store) fn walls_difference(
+    before: &[StoredWall],
+    after: &[StoredWall],
+) -> Option<WallsDifference> {
+    let of = |wall: &StoredWall| (wall.ends.map(f64::to_bits), wall.covariance.map(|c| c.map(f64::to_bits)));
+    let bits = |segments: &[StoredWall]| -> BTreeSet<_> { segments.iter().map(of).collect() };
     let (old, new) = (bits(before), bits(after));
     let (added, removed) = (new.difference(&old).count(), old.difference(&new).count());
     if added + removed == 0 && before.len() == after.len() {
         return None;
     }
     let mut bounds_m = None::<[f64; 4]>;
-    for [ax, ay, bx, by] in old.symmetric_difference(&new).map(|ends| ends.map(f64::from_bits)) {
+    for [ax, ay, bx, by] in old.symmetric_difference(&new).map(|(ends, _)| ends.map(f64::from_bits)) {
         let one = [ax.min(bx), ay.min(by), ax.max(bx), ay.max(by)];
         let all = bounds_m.unwrap_or(one);
         let wider = [all[0].min(one[0]), all[1].min(one[1]), all[2].max(one[2]), all[3].max(one[3])];

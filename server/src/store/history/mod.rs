@@ -8,12 +8,12 @@ mod apply;
 mod close;
 mod difference;
 
+pub(in crate::store) use apply::no_job_on;
 pub(crate) use apply::{roll_back, undo};
 pub(crate) use close::HistoryLimits;
 pub(super) use close::{close, close_outside};
-#[cfg(test)]
-use difference::Difference;
-pub(crate) use difference::{LandmarkChange, between, names_at, summary};
+pub(in crate::store) use difference::walls_difference;
+pub(crate) use difference::{Difference, LandmarkChange, between, names_at, summary};
 
 use super::{StoreError, actor::Actor, kind::Kind, statements::statements};
 use protos::api::ChangeSummary;

@@ -108,6 +108,28 @@ async fn a_taught_landmark_is_placed_on_its_wall_and_a_place_by_hand_stays() {
     assert!((of(&store).unwrap().x_m - 2.5).abs() < 1e-12);
 }
 
+#[tokio::test]
+async fn a_wall_that_is_known_badly_gives_a_place_that_is_known_badly() {
+    let dir = tempfile::tempdir().unwrap();
+    let config = crate::publication::tests::config(dir.path());
+    let (store, _task) = Catalogue::open(&config).await.unwrap();
+    store.write(|tx| Box::pin(maps::create(tx, "a", DistanceKind::Both, 2))).await.unwrap();
+    let none = LandmarkGeometry::default();
+    store.write(move |tx| Box::pin(landmarks::create(tx, "a", "p1", none, 5))).await.unwrap();
+    let ends = [0.0, 0.0, 6.0, 0.0];
+    let mut across = Vec::new();
+    for (number, covariance) in [(1, None), (2, Some([1e-6, 0.0, 0.04])), (3, None)] {
+        let wall = walls::StoredWall { ends, covariance };
+        store.write(move |tx| Box::pin(async move { walls::replace(tx, "a", &[wall]).await })).await.unwrap();
+        assert_eq!(walls::all_of(store.reads(), 1).await.unwrap(), [wall]);
+        assert!(taught(&store, seen_from(1.0 + 0.3 * f64::from(number), number, 0.0)).await.placed);
+        let place = landmarks::get(store.reads(), "a", "p1").await.unwrap().geometry.place.unwrap();
+        across.push(place.covariance.unwrap()[(1, 1)].sqrt());
+    }
+    // 1 cm by hand, 20 cm as stated, 1 cm again: the wall's error is not reduced by views.
+    assert!(across[0] < 0.02 && (across[1] - 0.2).abs() < 0.01 && across[2] < 0.02, "{across:?}");
+}
+
 #[test]
 fn what_is_not_on_the_wall_is_refused_with_the_residual() {
     let wall = LaserSegment::by_hand(&[0.0, 0.0, 6.0, 0.0]).unwrap();

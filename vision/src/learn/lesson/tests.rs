@@ -10,7 +10,7 @@ use crate::{
     },
     model::{
         landmark_model::{Gate, MAX_EXEMPLARS},
-        model_bytes::StoredModelError,
+        model_bytes::{StoredModelError, renumbered},
         threshold::{LimitedBy, ThresholdError},
     },
     points::taught::view_points,
@@ -286,6 +286,16 @@ fn a_stored_model_is_the_same_bit_for_bit() {
     let with_points = model.clone().with_points(&[points]);
     assert!(with_points.knows_points && with_points.points.len() > 50);
     assert_eq!(LandmarkModel::from_bytes(&with_points.to_bytes(), &p).unwrap(), with_points);
+
+    // The same model under another number, and back.
+    for kept in [&bytes, &older, &with_points.to_bytes()] {
+        let other = renumbered(kept, LandmarkId(77)).unwrap();
+        let read = LandmarkModel::from_bytes(&other, &p).unwrap();
+        assert_eq!(LandmarkModel { id: model.id, ..read }, LandmarkModel::from_bytes(kept, &p).unwrap());
+        assert_eq!(&renumbered(&other, model.id).unwrap(), kept);
+    }
+    assert_eq!(renumbered(&bytes[..bytes.len() - 1], LandmarkId(77)), Err(StoredModelError::Damaged));
+    assert_eq!(renumbered(&bytes[..20], LandmarkId(77)), Err(StoredModelError::NotAModel));
 
     let mut later = bytes.clone();
     later[4] += 1;

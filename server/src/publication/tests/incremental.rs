@@ -1,0 +1,57 @@
+//! A version that is made from the one before equals one that is made from nothing.
+
+use super::*;
+use crate::{publication::build, store::history};
+use engine::snapshot::{MapSnapshot, Snapshots};
+use map::landmark_health::LandmarkHealth;
+use vision::pose::LandmarkSize;
+
+/// The map as it is built without a version before it.
+async fn from_nothing(store: &Catalogue, config: &Config, map: &MapSnapshot) -> MapSnapshot {
+    let mut conn = store.reads().acquire().await.unwrap();
+    let id = maps::get(store.reads(), &map.name).await.unwrap().id;
+    let (none, vitals) = (Snapshots::default(), engine::vitals::Vitals::default());
+    build::snapshot(&mut conn, id, &none, &config.params, vitals.panics()).await.unwrap().unwrap()
+}
+
+#[tokio::test]
+async fn a_version_made_from_the_one_before_equals_one_made_from_nothing() {
+    let dir = tempfile::tempdir().unwrap();
+    let config = config(dir.path());
+    let (store, _task) = Catalogue::open(&config).await.unwrap();
+    store.write(|tx| Box::pin(maps::create(tx, "a", DistanceKind::Both, 2))).await.unwrap();
+    let check = async |what: &str| {
+        let published = store.snapshots().get("a").unwrap();
+        let built = from_nothing(&store, &config, &published).await;
+        assert_eq!(published.landmarks, built.landmarks, "{what}");
+        assert!(build::digests(&published.learnt).eq(build::digests(&built.learnt)), "{what}");
+        published.landmarks.clone()
+    };
+    let none = landmarks::LandmarkGeometry::default();
+    for name in ["p1", "p2", "p3"] {
+        let made = store.write(move |tx| Box::pin(landmarks::create(tx, "a", name, none, 5))).await.unwrap();
+        store_model(&store, made.id, &config.params).await;
+        check(name).await;
+    }
+    let taught = history::newest(store.reads(), 1).await.unwrap();
+    let size = Some(LandmarkSize { width_m: 0.5, height_m: 0.7 });
+    let sized = move |old| landmarks::LandmarkGeometry { size, ..old };
+    store.write(move |tx| Box::pin(landmarks::update(tx, "a", "p2", sized))).await.unwrap();
+    let with_size = check("a size").await;
+    assert_eq!(with_size.values().filter(|l| l.size == size).count(), 1);
+    store.write(|tx| Box::pin(landmarks::rename(tx, "a", "p1", "door"))).await.unwrap();
+    check("a name").await;
+    // Health has no revision: robots change it.
+    let quarantined = LandmarkHealth::Quarantined;
+    let write = store.write(move |tx| Box::pin(landmarks::set_health(tx, "a", "p2", quarantined, None)));
+    write.await.unwrap();
+    assert_eq!(check("a health").await.values().filter(|l| l.health == quarantined).count(), 1);
+    store.write(|tx| Box::pin(landmarks::delete(tx, "a", "p3"))).await.unwrap();
+    assert_eq!(check("a deletion").await.len(), 2);
+    store.write(move |tx| Box::pin(landmarks::create(tx, "a", "p3", none, 5))).await.unwrap();
+    check("the name once more").await;
+    store.write(move |tx| Box::pin(history::roll_back(tx, "a", taught))).await.unwrap();
+    let back = check("a roll back").await;
+    assert_eq!(back.values().filter(|l| l.size.is_some()).count(), 0);
+    assert_eq!(back.values().map(|l| l.name.as_str()).collect::<Vec<_>>(), ["p1", "p2", "p3"]);
+}
