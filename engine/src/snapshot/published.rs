@@ -66,6 +66,11 @@ impl Snapshots {
         self.world.load().maps.values().cloned().collect()
     }
 
+    /// How many snapshots were published, those with more derived data too.
+    pub fn publications(&self) -> u64 {
+        *self.published.borrow()
+    }
+
     /// Name of the robot's map; `None` for a robot that is not registered.
     pub fn robot_map(&self, robot: &str) -> Option<String> {
         self.world.load().robots.get(robot).cloned()

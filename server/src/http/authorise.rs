@@ -17,9 +17,8 @@ use crate::{
     store::{StoreError, actor::Actor, kind::Kind, now_ms, stored_answers},
 };
 use axum::{
-    extract::{FromRequestParts, MatchedPath, RawPathParams, Request, State},
+    extract::{FromRequestParts, MatchedPath, RawPathParams, Request},
     http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, header, request::Parts},
-    middleware::Next,
     response::{IntoResponse, Response},
 };
 use protos::api::Role;
@@ -39,16 +38,18 @@ pub(super) struct Asker {
     pub(super) session: Option<String>,
 }
 
-/// The middleware.
-pub(super) async fn authorise(State(app): State<AppState>, request: Request, next: Next) -> Response {
+/// The request with its principal, and who asks for a change if it may be one. Errors: the refusal as an answer.
+pub(super) async fn authorise(
+    app: &AppState,
+    request: Request,
+) -> Result<(Request, Option<Actor>), Box<Response>> {
     let (mut parts, body) = request.into_parts();
-    if let Err(error) = admitted(&app, &mut parts).await {
-        return refused(&app, &parts, error);
+    if let Err(error) = admitted(app, &mut parts).await {
+        return Err(Box::new(refused(app, &parts, error)));
     }
     match actor(&parts) {
-        Ok(Some(actor)) => actor.scope(next.run(Request::from_parts(parts, body))).await,
-        Ok(None) => next.run(Request::from_parts(parts, body)).await,
-        Err(error) => refused(&app, &parts, error),
+        Ok(actor) => Ok((Request::from_parts(parts, body), actor)),
+        Err(error) => Err(Box::new(refused(app, &parts, error))),
     }
 }
 

@@ -10,7 +10,7 @@ use crate::{
 };
 use axum::{
     body::{Body, Bytes},
-    extract::{MatchedPath, Request, State},
+    extract::{MatchedPath, Request},
     http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, header},
     middleware::Next,
     response::{IntoResponse, Response},
@@ -51,14 +51,14 @@ fn json(limits: &Limits) -> usize {
     limits.json_bytes
 }
 
-/// The middleware, inside of the router.
-pub(super) async fn keyed(State(app): State<AppState>, request: Request, next: Next) -> Response {
+/// Answers a creation with a key once; lets everything else pass.
+pub(super) async fn keyed(app: &AppState, request: Request, next: Next) -> Response {
     let path = request.extensions().get::<MatchedPath>().and_then(|path| path.as_str().strip_prefix(API));
     let creation = CREATIONS.iter().find(|(at, _)| path == Some(*at));
     match creation {
         Some((_, max)) if request.method() == Method::POST && request.headers().contains_key(KEY) => {
             let max = max(&app.config.limits);
-            once(&app, request, max, next).await.unwrap_or_else(IntoResponse::into_response)
+            once(app, request, max, next).await.unwrap_or_else(IntoResponse::into_response)
         }
         _ => next.run(request).await,
     }

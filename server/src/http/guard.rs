@@ -25,6 +25,8 @@ const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
 pub(super) struct RequestId(pub(super) HeaderValue);
 /// Longest id taken over from a client.
 const REQUEST_ID_MAX: usize = 64;
+/// Headers of an answer with a body, about.
+const MOST_HEADERS: usize = 12;
 /// Bodies up to this size need no place, bytes.
 const SMALL_BODY: u64 = 64 << 10;
 /// The pages load only what this server serves; nothing may frame them.
@@ -41,7 +43,7 @@ static NEXT_ID: AtomicU64 = AtomicU64::new(1);
 pub(super) async fn guard(State(app): State<AppState>, mut request: Request, next: Next) -> Response {
     let id = request_id(request.headers());
     request.extensions_mut().insert(RequestId(id.clone()));
-    let (method, path) = (request.method().clone(), request.uri().path().to_owned());
+    let (method, uri) = (request.method().clone(), request.uri().clone());
     let started = Instant::now();
     let deadline = Duration::from_secs(app.config.limits.request_timeout_s);
     // With TLS, plain text comes from this machine alone, and a certificate proves the name that a page was asked by.
@@ -56,7 +58,7 @@ pub(super) async fn guard(State(app): State<AppState>, mut request: Request, nex
         },
     };
     let ms = started.elapsed().as_secs_f64() * 1e3;
-    let status = response.status();
+    let (status, path) = (response.status(), uri.path());
     if is_change(&method, status) {
         tracing::info!(id = ?id, %method, path, status = status.as_u16(), ms, "changed");
     } else {
@@ -64,6 +66,7 @@ pub(super) async fn guard(State(app): State<AppState>, mut request: Request, nex
     }
     let docs = path.starts_with("/api/docs");
     let headers = response.headers_mut();
+    headers.reserve(MOST_HEADERS);
     headers.insert(REQUEST_ID, id);
     headers
         .insert(header::CONTENT_SECURITY_POLICY, HeaderValue::from_static(if docs { CSP_DOCS } else { CSP }));

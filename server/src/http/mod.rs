@@ -38,6 +38,7 @@ mod recognise;
 mod reference_runs;
 mod relocalisation;
 mod replay;
+mod reused_answers;
 mod revision;
 mod robot_certificates;
 mod robots;
@@ -69,6 +70,7 @@ use engine::{
     workers::Engine,
 };
 use error::ApiError;
+use reused_answers::ReusedAnswers;
 pub(crate) use robot_certificates::Enrolment;
 use std::{
     path::PathBuf,
@@ -110,6 +112,8 @@ pub(crate) struct App {
     pub(crate) enrolment: Option<Enrolment>,
     /// Becomes true when the server stops; ends event streams.
     pub(crate) stopping: watch::Receiver<bool>,
+    /// Answers to reads of maps.
+    reused: ReusedAnswers,
     /// Places for vision work asked for over HTTP: as many as there are vision threads.
     vision: Arc<Semaphore>,
     /// Places for event streams.
@@ -161,6 +165,7 @@ impl App {
             backups,
             enrolment,
             stopping,
+            reused: ReusedAnswers::default(),
             vision,
             streams,
             uploads,

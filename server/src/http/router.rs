@@ -6,21 +6,23 @@ use super::{
     events,
     examples::with_examples,
     gathering, guard, health, history, landmark_models, landmarks, learning, live, localise, mapping, maps,
-    modalities, page_session, pages, recognise, reference_runs, relocalisation, replay, revision,
-    robot_certificates, robots, ros2,
+    modalities, page_session, pages, recognise, reference_runs, relocalisation, replay, reused_answers,
+    revision, robot_certificates, robots, ros2,
     security::with_security,
     stored_answers, tokens, underlay, views, visibility, visibility_settings, walls,
 };
 use crate::config::Limits;
 use axum::{
     Json, Router,
+    extract::{Request, State},
     http::StatusCode,
-    middleware::from_fn_with_state,
+    middleware::{Next, from_fn_with_state},
     response::{IntoResponse, Response},
     routing::get,
 };
 use engine::panics::{Edge, Panics};
 use std::{any::Any, sync::Arc};
+use tower::ServiceBuilder;
 use tower_http::catch_panic::CatchPanicLayer;
 use utoipa::{OpenApi, openapi};
 use utoipa_axum::router::OpenApiRouter;
@@ -90,9 +92,8 @@ pub(crate) fn router(app: App) -> Router {
     let (health, _) = health::router().split_for_parts();
     let config = utoipa_swagger_ui::Config::from(format!("{API}/openapi.json"));
     let docs: Router<AppState> = SwaggerUi::new("/api/docs").config(config).into();
-    routes
-        .route_layer(from_fn_with_state(app.clone(), creation::keyed))
-        .route_layer(from_fn_with_state(app.clone(), authorise::authorise))
+    let router = routes
+        .route_layer(from_fn_with_state(app.clone(), operation))
         .route(&format!("{API}/openapi.json"), get(move || async move { Json(document) }))
         .merge(health)
         .merge(pages::router())
@@ -100,9 +101,23 @@ pub(crate) fn router(app: App) -> Router {
         .merge(docs)
         .fallback(async || not_found())
         .method_not_allowed_fallback(async || method_not_allowed())
+        .with_state(app.clone());
+    let guarded = ServiceBuilder::new()
+        .layer(from_fn_with_state(app, guard::guard))
         .layer(CatchPanicLayer::custom(move |cause: Box<dyn Any + Send>| panicked(&panics, cause.as_ref())))
-        .layer(from_fn_with_state(app.clone(), guard::guard))
-        .with_state(app)
+        .service(router);
+    // Around the router as a whole: a layer of the router is copied with its route, for each request.
+    Router::new().fallback_service(guarded)
+}
+
+/// Around every operation. One layer and not three: each layer copies all that is below it, for each request.
+async fn operation(State(app): State<AppState>, request: Request, next: Next) -> Response {
+    let (request, actor) = match authorise::authorise(&app, request).await {
+        Ok(admitted) => admitted,
+        Err(refused) => return *refused,
+    };
+    let Some(actor) = actor else { return reused_answers::reused(&app, request, next).await };
+    actor.scope(creation::keyed(&app, request, next)).await
 }
 
 fn panicked(panics: &Panics, cause: &(dyn Any + Send)) -> Response {

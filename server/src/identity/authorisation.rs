@@ -3,6 +3,7 @@
 
 use super::Principal;
 use protos::api::Role::{self, Admin, Operator, Robot, Teacher, Viewer};
+use std::{collections::HashMap, sync::LazyLock};
 
 /// What a request must be allowed to see besides the role.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -182,9 +183,18 @@ pub(crate) const TABLE: &[Rule] = &[
     job("GET", "/jobs/{job}/events", Viewer),
 ];
 
+/// The table by path: it is read for every request.
+static BY_PATH: LazyLock<HashMap<&str, Vec<&Rule>>> = LazyLock::new(|| {
+    let mut by_path: HashMap<&str, Vec<&Rule>> = HashMap::new();
+    for rule in TABLE {
+        by_path.entry(rule.path).or_default().push(rule);
+    }
+    by_path
+});
+
 /// What an operation needs; `None` for one that has no row.
 pub(crate) fn access(method: &str, path: &str) -> Option<Access> {
-    TABLE.iter().find(|rule| rule.method == method && rule.path == path).map(|rule| rule.access)
+    BY_PATH.get(path)?.iter().find(|rule| rule.method == method).map(|rule| rule.access)
 }
 
 /// Why a principal may not do what it asks for. What it may not see looks to it as what does not exist, which is not

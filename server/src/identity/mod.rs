@@ -22,7 +22,7 @@ use protos::api::Role;
 use std::collections::BTreeSet;
 
 /// Which token a principal has shown.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) enum TokenId {
     /// That of the file in the data directory.
     Local,

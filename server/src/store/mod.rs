@@ -53,7 +53,14 @@ use futures::future::BoxFuture;
 use protos::api::AuditHead;
 use sha2::{Digest as _, Sha256};
 use sqlx::{SqliteConnection, SqlitePool};
-use std::{fmt::Write as _, sync::Arc, time::SystemTime};
+use std::{
+    fmt::Write as _,
+    sync::{
+        Arc,
+        atomic::{AtomicU64, Ordering},
+    },
+    time::SystemTime,
+};
 use tokio::sync::{Mutex, MutexGuard, Notify, mpsc, oneshot};
 
 /// The open store. Cheap to clone.
@@ -63,6 +70,7 @@ pub(crate) struct Store {
     reads: SqlitePool,
     vitals: Arc<Vitals>,
     jobs: Arc<Notify>,
+    commits: Arc<AtomicU64>,
     /// Held while a write is prepared and made.
     turn: Arc<Mutex<()>>,
     keys: kept_answers::KeysAtWork,
@@ -120,14 +128,16 @@ impl Store {
         };
         note_head(&mut conn, "start").await.map_err(OpenError::Load)?;
         let (commands, received) = mpsc::channel(config.limits.write_queue);
-        let writer = writer::Writer::new(conn, received, history, on_commit, vitals.clone(), jobs.clone());
+        let commits = Arc::<AtomicU64>::default();
+        let parts = (on_commit, vitals.clone(), jobs.clone(), commits.clone());
+        let writer = writer::Writer::new(conn, received, history, parts);
         let (close, closed) = oneshot::channel();
         let task = tokio::spawn(writer.run(closed, vitals.begin(WRITER)));
         let task = WriterTask { task, close, reads: opened.reads.clone(), _lock: opened.lock };
         let (turn, keys) = (Arc::default(), kept_answers::KeysAtWork::default());
         let (kept_answers, audit_entries) = (config.limits.kept_answers, config.limits.audit_entries);
         let reads = opened.reads;
-        Ok((Self { commands, reads, vitals, jobs, turn, keys, kept_answers, audit_entries }, task))
+        Ok((Self { commands, reads, vitals, jobs, commits, turn, keys, kept_answers, audit_entries }, task))
     }
 
     /// Runs `write` in its own transaction. When this returns `Ok`, it is committed and visible. A caller that drops this
@@ -164,6 +174,11 @@ impl Store {
     /// The read-only pool.
     pub(crate) fn reads(&self) -> &SqlitePool {
         &self.reads
+    }
+
+    /// How many writes were committed since the store was opened. A write is counted before it is acknowledged.
+    pub(crate) fn commits(&self) -> u64 {
+        self.commits.load(Ordering::Acquire)
     }
 
     /// Which parts of the server run; the writer is one of them.

@@ -27,7 +27,10 @@ use sqlx::SqliteConnection;
 use std::{
     any::Any,
     panic::AssertUnwindSafe,
-    sync::{Arc, Weak},
+    sync::{
+        Arc, Weak,
+        atomic::{AtomicU64, Ordering},
+    },
 };
 use tokio::sync::{Notify, mpsc, oneshot};
 
@@ -163,6 +166,8 @@ pub(super) struct Writer {
     vitals: Arc<Vitals>,
     /// Notified of every queued job.
     jobs: Arc<Notify>,
+    /// Counts what was committed.
+    commits: Arc<AtomicU64>,
 }
 
 /// Its name among the parts of the server.
@@ -173,12 +178,10 @@ impl Writer {
         conn: SqliteConnection,
         commands: mpsc::Receiver<Command>,
         history: HistoryLimits,
-        on_commit: Arc<dyn OnCommit>,
-        vitals: Arc<Vitals>,
-        jobs: Arc<Notify>,
+        (on_commit, vitals, jobs, commits): (Arc<dyn OnCommit>, Arc<Vitals>, Arc<Notify>, Arc<AtomicU64>),
     ) -> Self {
         let tx = Tx { conn, author: Author::default(), history, changes: Vec::new(), after: Vec::new() };
-        Self { tx, commands, on_commit, vitals, jobs }
+        Self { tx, commands, on_commit, vitals, jobs, commits }
     }
 
     /// Runs until told to close and what is queued is done, or until an error after which nothing may be written.
@@ -251,6 +254,7 @@ impl Writer {
                 return Err(error);
             }
         }
+        self.commits.fetch_add(1, Ordering::Release);
         let published = self.publish().await;
         for then in std::mem::take(&mut self.tx.after) {
             let follows = "the write stands; the next start makes up for it";

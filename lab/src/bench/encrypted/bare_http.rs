@@ -128,15 +128,13 @@ impl Connection {
             let more = self.stream.read(&mut self.buffer[read..]).await?;
             anyhow::ensure!(more > 0, "the server has ended the connection");
             read += more;
-            let Some(end) = self.buffer[..read].windows(4).position(|part| part == b"\r\n\r\n") else {
-                continue;
-            };
-            let head = std::str::from_utf8(&self.buffer[..end])?;
+            // The bodies are text, too.
+            let text = std::str::from_utf8(&self.buffer[..read])?;
+            let Some(end) = text.find("\r\n\r\n") else { continue };
+            let head = &text[..end];
             anyhow::ensure!(head.starts_with("HTTP/1.1 200"), "{head}");
-            let length = head.lines().find_map(|line| {
-                line.to_ascii_lowercase().strip_prefix("content-length:").map(str::to_owned)
-            });
-            let length: usize = length.context("an answer without a length")?.trim().parse()?;
+            let (_, length) = head.split_once("content-length: ").context("an answer without a length")?;
+            let length: usize = length.lines().next().unwrap_or_default().parse()?;
             if read >= end + 4 + length {
                 return Ok(self.buffer[end + 4..end + 4 + length].to_vec());
             }
