@@ -94,6 +94,8 @@ const OPTIONS: [(&str, &[&str], &[&str]); 56] = [
             "--picture",
         ],
     ),
+    ("map save", SERVER, &["<MAP>", "<FILE>"]),
+    ("map load", SERVER, &["<FILE>", "--name", "--without-link"]),
     ("map walls", SERVER, &["<MAP>", "--draw"]),
     ("map export", SERVER, &["<MAP>", "--out", "--resolution-m"]),
     ("map convert", &[], &["<FILE>", "--out", "--metres-per-unit", "--picture", "--json"]),

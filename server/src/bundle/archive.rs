@@ -46,11 +46,6 @@ impl Writer {
         self.files.len()
     }
 
-    /// Whether a file of this name is there.
-    pub(super) fn has(&self, name: &str) -> bool {
-        self.files.contains_key(name)
-    }
-
     /// Adds a file.
     pub(super) fn add(&mut self, name: &str, bytes: &[u8]) -> io::Result<()> {
         self.put(name, bytes)?;
@@ -149,11 +144,6 @@ impl Reader {
     /// The bytes of a file.
     pub(super) fn read(&mut self, name: &str) -> Result<Vec<u8>, BundleError> {
         read(&mut self.zip, name)
-    }
-
-    /// Whether there is a file of this name.
-    pub(super) fn has(&self, name: &str) -> bool {
-        self.manifest.files.contains_key(name)
     }
 }
 
