@@ -36,7 +36,7 @@ async fn a_loaded_map_answers_as_the_saved_one() {
     assert!(refused.as_ref().is_err_and(|e| e.contains("bundle_damaged")), "{refused:?}");
     assert!(second.maps().maps().await.expect("maps").is_empty(), "nothing is left of it");
     // With one key it is loaded once.
-    let keyed = second.maps().key("once");
+    let keyed = second.maps().with_idempotency_key("once");
     let made = keyed.load_map(bundle.clone(), &query).await.expect("loaded");
     assert_eq!(keyed.load_map(bundle.clone(), &query).await.expect("the same"), made);
     assert_eq!((made.name.as_str(), made.landmarks), (MAP, 2));
@@ -47,13 +47,11 @@ async fn a_loaded_map_answers_as_the_saved_one() {
         inside.maps().put_robot("r1", MAP).await.expect("robot");
         let robot = connect(&inside.server.zenoh_endpoint, "r1").await;
         let readings = find_itself(inside, &building, &robot, "r1").await;
-        let photo = readings.image.as_ref().map(|_| capture(&readings));
-        let answer = robot.recognise("front", photo.expect("an image"), SOON).await.expect("an answer");
-        let quads: Vec<_> = answer.quads.iter().map(|quad| (quad.landmark.clone(), quad.corners.clone())).collect();
-        answers.push((answer.status(), quads, answer.camera_pose.clone()));
+        let answer = robot.recognise("front", capture(&readings), SOON).await.expect("an answer");
+        answers.push((answer.status(), answer.quads, answer.map_from_robot, answer.pose_landmarks));
     }
-    assert!(answers[0].1.iter().any(|(landmark, _)| !landmark.is_empty()), "{answers:?}");
-    assert_eq!(answers[0], answers[1], "names, corners and poses to the last bit");
+    assert!(answers[0].2.is_some() && answers[0].3 == ["poster-0"], "{answers:?}");
+    assert_eq!(answers[0], answers[1], "names, distances and poses, to the last bit");
     first.server.stop().await;
     second.server.stop().await;
 }

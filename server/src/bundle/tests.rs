@@ -73,10 +73,12 @@ async fn a_bundle_of_a_loaded_map_is_the_first_one_byte_for_byte() {
         assert_eq!(new.bytes[22..new.bytes.len() - 8], old.bytes[22..old.bytes.len() - 8]);
         assert_eq!((new.params_hash, &new.summary.reasons), (old.params_hash, &old.summary.reasons));
     }
-    let commits: i64 = sqlx::query_scalar("SELECT count(*) FROM commits c JOIN maps m ON m.id = c.map_id WHERE m.name = 'a'")
-        .fetch_one(other.reads())
-        .await
-        .unwrap();
+    let commits: i64 = sqlx::query_scalar(
+        "SELECT count(*) FROM commits c JOIN maps m ON m.id = c.map_id WHERE m.name = 'a'",
+    )
+    .fetch_one(other.reads())
+    .await
+    .unwrap();
     assert_eq!(commits, 1);
 }
 
@@ -159,11 +161,23 @@ async fn a_sealed_bundle_with_a_wrong_file_is_refused_by_its_name() {
         (renamed("landmarks.geojson", "extra.geojson"), (Fault::BadPath, "extra.geojson")),
         (text("map.json", "\"correlation\"", "\"other\""), (Fault::InvalidValue, "map.json: distance")),
         (text("landmarks.json", "\"p1\"", "\"P 1\""), (Fault::InvalidValue, "landmarks.json: [0].name")),
-        (text("landmarks.json", "\"number\": 2", "\"number\": 3"), (Fault::InvalidValue, "landmarks.json: [1]")),
-        (text("landmarks.json", "1.model", "2.model"), (Fault::InvalidValue, "landmarks.json: [0].model.file")),
-        (text("views.json", "\"landmark\": 2", "\"landmark\": 9"), (Fault::InvalidValue, "views.json: [0].landmark")),
+        (
+            text("landmarks.json", "\"number\": 2", "\"number\": 3"),
+            (Fault::InvalidValue, "landmarks.json: [1]"),
+        ),
+        (
+            text("landmarks.json", "1.model", "2.model"),
+            (Fault::InvalidValue, "landmarks.json: [0].model.file"),
+        ),
+        (
+            text("views.json", "\"landmark\": 2", "\"landmark\": 9"),
+            (Fault::InvalidValue, "views.json: [0].landmark"),
+        ),
         (text("underlay.json", "0.05", "50.0"), (Fault::InvalidValue, "underlay.json: metres_per_pixel")),
-        (text("modalities.json", "12.5", "-1.0"), (Fault::InvalidValue, "modalities.json: reference_runs[0].way_m")),
+        (
+            text("modalities.json", "12.5", "-1.0"),
+            (Fault::InvalidValue, "modalities.json: reference_runs[0].way_m"),
+        ),
     ] {
         let (is, file) = fault(loaded(&other, &bundle, None).await);
         assert_eq!((is, file.as_str()), expected);
