@@ -7,7 +7,7 @@ use crate::{
     store::{
         StoreError,
         contents::{contents_of, tests::filled},
-        maps,
+        maps, pictures,
     },
 };
 use std::{
@@ -16,6 +16,29 @@ use std::{
     path::Path,
 };
 use vision::recognise::DistanceKind;
+
+/// Map `a` of [`filled`], with pictures that are some.
+async fn filled_with_pictures(store: &Catalogue) {
+    filled(store).await;
+    let png = |side: [u32; 2]| {
+        let [width, height] = side.map(|n| n as usize);
+        engine::picture::png(width, height, &vec![90; width * height]).unwrap()
+    };
+    let (photograph, floor) = (png([640, 480]), png([2, 3]));
+    let write = store.write(move |tx| {
+        Box::pin(async move {
+            for (table, picture) in [("views", photograph), ("underlays", floor)] {
+                let sha256 = pictures::digest(&picture);
+                pictures::put(tx, &sha256, &picture).await?;
+                let sql = format!("UPDATE {table} SET image_sha256 = ?1");
+                let done = sqlx::query(sqlx::AssertSqlSafe(sql)).bind(&sha256[..]).execute(tx.conn()).await;
+                done.map_err(StoreError::during("give a picture"))?;
+            }
+            Ok(())
+        })
+    });
+    write.await.unwrap();
+}
 
 async fn saved(store: &Catalogue, map: &str, folder: &Path) -> Vec<u8> {
     let mut bytes = Vec::new();
@@ -55,7 +78,7 @@ async fn empty(folder: &Path) -> Catalogue {
 async fn a_bundle_of_a_loaded_map_is_the_first_one_byte_for_byte() {
     let (here, there) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     let (store, _task) = Catalogue::open(&config(here.path())).await.unwrap();
-    filled(&store).await;
+    filled_with_pictures(&store).await;
     let first = saved(&store, "a", here.path()).await;
     assert_eq!(saved(&store, "a", here.path()).await, first, "the same map gives the same bytes");
     let other = empty(there.path()).await;
@@ -86,7 +109,7 @@ async fn a_bundle_of_a_loaded_map_is_the_first_one_byte_for_byte() {
 async fn every_changed_byte_is_refused_and_nothing_is_left() {
     let (here, there) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     let (store, _task) = Catalogue::open(&config(here.path())).await.unwrap();
-    filled(&store).await;
+    filled_with_pictures(&store).await;
     let first = saved(&store, "a", here.path()).await;
     let other = empty(there.path()).await;
     // Places all over the file, and each byte of its end.
@@ -136,7 +159,7 @@ fn rebuilt(bundle: &[u8], change: impl Fn(&str, Vec<u8>) -> Option<(String, Vec<
 async fn a_sealed_bundle_with_a_wrong_file_is_refused_by_its_name() {
     let (here, there) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     let (store, _task) = Catalogue::open(&config(here.path())).await.unwrap();
-    filled(&store).await;
+    filled_with_pictures(&store).await;
     let first = saved(&store, "a", here.path()).await;
     let other = empty(there.path()).await;
     let text = |file: &'static str, from: &'static str, to: &'static str| {

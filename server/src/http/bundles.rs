@@ -94,11 +94,7 @@ async fn load(
 ) -> Result<Response, ApiError> {
     let new_name = query.name.map(|text| name("name", text)).transpose()?;
     let (head, body) = request.into_parts();
-    if head.headers.get(header::CONTENT_TYPE).is_none_or(|kind| kind != ZIP) {
-        let detail = "the body must be application/zip";
-        let status = StatusCode::UNSUPPORTED_MEDIA_TYPE;
-        return Err(ApiError::new(status, "not_zip", detail).field("content-type"));
-    }
+    let is_zip = head.headers.get(header::CONTENT_TYPE).is_some_and(|kind| kind == ZIP);
     let uri = head.uri.to_string();
     let (file, digest) = received(&app, body, &uri).await?;
     let request = bundle::Request {
@@ -107,6 +103,10 @@ async fn load(
     };
     let work = app.clone();
     let answer = async move {
+        if !is_zip {
+            let (status, detail) = (StatusCode::UNSUPPORTED_MEDIA_TYPE, "the body must be application/zip");
+            return Err(ApiError::new(status, "not_zip", detail).field("content-type"));
+        }
         let _place = work.bundle_place().await?;
         let shown = move |made: &Written| {
             (StatusCode::CREATED, map_shown(made.map.clone(), made.location.clone(), &principal))
