@@ -28,7 +28,7 @@ async fn a_loaded_map_answers_as_the_saved_one() {
     let building = Arc::new(Building::corridor_with(&params, 3));
     first.maps().create_map(&NewMap::new(MAP)).await.expect("map");
     teach(&first, &building, &["poster-0", "poster-1"], 6).await;
-    let bundle = saved(first.maps(), MAP).await;
+    let bundle = saved(&first.maps(), MAP).await;
     let mut damaged = bundle.clone();
     damaged[bundle.len() / 2] ^= 1;
     let query = BundleQuery::default();
@@ -40,7 +40,7 @@ async fn a_loaded_map_answers_as_the_saved_one() {
     let made = keyed.load_map(bundle.clone(), &query).await.expect("loaded");
     assert_eq!(keyed.load_map(bundle.clone(), &query).await.expect("the same"), made);
     assert_eq!((made.name.as_str(), made.landmarks), (MAP, 2));
-    assert_eq!(saved(second.maps(), MAP).await, bundle, "saved again it is the same");
+    assert_eq!(saved(&second.maps(), MAP).await, bundle, "saved again it is the same");
 
     let mut answers = Vec::new();
     for inside in [&first, &second] {
