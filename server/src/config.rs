@@ -129,6 +129,8 @@ pub struct Limits {
     pub frame_pixels: usize,
     /// Largest uploaded image, in bytes.
     pub upload_bytes: usize,
+    /// Largest bundle of a map that is taken, in bytes.
+    pub bundle_bytes: usize,
     /// Largest uploaded image, in pixels.
     pub upload_pixels: usize,
     /// Largest JSON request, in bytes.
@@ -155,6 +157,8 @@ pub struct Limits {
     pub header_timeout_s: u64,
     /// Seconds until a request must be answered; event streams are not bound by it.
     pub request_timeout_s: u64,
+    /// Longest time for a request that brings or takes the bundle of a map, in seconds.
+    pub bundle_timeout_s: u64,
     /// Seconds for which a client may leave an answer unread before its connection is closed; event streams that have
     /// nothing to send are not bound by it.
     pub write_timeout_s: u64,
@@ -191,6 +195,7 @@ impl Default for Limits {
             frame_bytes: 4 << 20,
             frame_pixels: 2_304_000,
             upload_bytes: 16 << 20,
+            bundle_bytes: 1 << 30,
             upload_pixels: vision::frame::MAX_AREA_PX,
             json_bytes: 2 << 20,
             frame_deadline_ms: 500,
@@ -204,6 +209,7 @@ impl Default for Limits {
             streams: 64,
             header_timeout_s: 5,
             request_timeout_s: 30,
+            bundle_timeout_s: 600,
             write_timeout_s: 20,
             uploads: 16,
             upload_wait_s: 5,
@@ -223,11 +229,13 @@ impl Default for Limits {
 
 impl Limits {
     /// Name and value of every bound that must not be 0.
-    fn counts(&self) -> [(&'static str, usize); 27] {
+    fn counts(&self) -> [(&'static str, usize); 29] {
         [
             ("limits.frame_bytes", self.frame_bytes),
             ("limits.frame_pixels", self.frame_pixels),
             ("limits.upload_bytes", self.upload_bytes),
+            ("limits.bundle_bytes", self.bundle_bytes),
+            ("limits.bundle_timeout_s", self.bundle_timeout_s as usize),
             ("limits.upload_pixels", self.upload_pixels),
             ("limits.json_bytes", self.json_bytes),
             ("limits.frame_deadline_ms", self.frame_deadline_ms as usize),

@@ -11,6 +11,7 @@ pub mod backup;
 pub mod bus;
 pub mod ros2;
 mod store;
+mod bundle;
 mod publication;
 mod failed_gates;
 mod recording_answers;

@@ -14,7 +14,7 @@ const SERVER: &[&str] = &["--server", "--token", "--json"];
 const MAP: &[&str] = &["--map", "--server", "--token", "--json"];
 
 /// Options that each command must name in its help, beside those of its group.
-const OPTIONS: [(&str, &[&str], &[&str]); 56] = [
+const OPTIONS: [(&str, &[&str], &[&str]); 58] = [
     ("", &[], &["--log", "--version", "Exit status"]),
     ("demo", &[], &["--robots", "--rate-hz", "--legs", "--seed", "--http", "--data", "--stay", "--json"]),
     ("serve", &[], &["--config", "--data", "--http", "--zenoh", "--fleet", "--workers", "--insecure"]),
@@ -94,6 +94,8 @@ const OPTIONS: [(&str, &[&str], &[&str]); 56] = [
             "--picture",
         ],
     ),
+    ("map save", SERVER, &["<MAP>", "<FILE>"]),
+    ("map load", SERVER, &["<FILE>", "--name", "--without-link"]),
     ("map walls", SERVER, &["<MAP>", "--draw"]),
     ("map export", SERVER, &["<MAP>", "--out", "--resolution-m"]),
     ("map convert", &[], &["<FILE>", "--out", "--metres-per-unit", "--picture", "--json"]),

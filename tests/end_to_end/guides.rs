@@ -84,6 +84,11 @@ fn the_commands_of_back_up_and_restore_work() {
 }
 
 #[test]
+fn the_commands_of_move_a_map_work() {
+    run("move-a-map");
+}
+
+#[test]
 fn the_commands_of_take_a_change_back_work() {
     run("history");
 }

@@ -4,6 +4,7 @@ mod administration;
 mod api_client;
 mod audit;
 mod backups;
+mod bundles;
 mod bad_frames;
 mod certificates;
 mod clocks;

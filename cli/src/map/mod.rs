@@ -1,6 +1,7 @@
 //! `waymark map`: maps of a server, and their walls from laser logs, grids and plans.
 
 pub mod build;
+mod bundle;
 mod convert;
 mod difference;
 mod export;
@@ -107,6 +108,18 @@ enum Verb {
         #[command(flatten)]
         server: ServerArgs,
     },
+    /// Save a map to one file: landmarks with photographs and models, walls, floor plan, runs, settings
+    ///
+    /// The file is a zip that other programs read without Waymark. For example:
+    ///   waymark map save office office.zip
+    #[command(verbatim_doc_comment)]
+    Save(bundle::SaveArgs),
+    /// Make a new map of a file of `waymark map save`, on this or another server
+    ///
+    /// A file of which one byte has changed is refused. For example:
+    ///   waymark map load office.zip --name office-2
+    #[command(verbatim_doc_comment)]
+    Load(bundle::LoadArgs),
     /// Delete a map with its landmarks, walls and runs. This cannot be undone.
     Delete {
         /// The map.
@@ -181,6 +194,8 @@ pub(crate) async fn run(args: &Args) -> anyhow::Result<()> {
         Verb::Import(args) => import::run(args).await,
         Verb::Export(args) => export::run(args).await,
         Verb::Fusion(args) => fusion::run(args).await,
+        Verb::Save(args) => bundle::save(args).await,
+        Verb::Load(args) => bundle::load(args).await,
         Verb::Walls(args) => walls::run(args).await,
         Verb::Create { server, .. }
         | Verb::List { server }

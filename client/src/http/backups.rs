@@ -6,7 +6,7 @@ use super::{
 };
 use crate::ClientError;
 use protos::api::{Backup, BackupState};
-use reqwest::Response;
+use reqwest::{RequestBuilder, Response};
 use std::time::Duration;
 
 operations! {
@@ -24,14 +24,14 @@ const SILENCE: Duration = Duration::from_mins(1);
 /// Time between two looks at a backup that is being made.
 const POLL: Duration = Duration::from_millis(200);
 
-/// The file of a backup, as it comes.
+/// A file of the server, as it comes.
 #[derive(Debug)]
-pub struct BackupFile {
+pub struct FileDownload {
     response: Response,
     length: Option<u64>,
 }
 
-impl BackupFile {
+impl FileDownload {
     /// Length of the whole, bytes.
     pub fn length(&self) -> Option<u64> {
         self.length
@@ -75,10 +75,15 @@ impl MapClient {
     }
 
     /// The file of a complete backup.
-    pub async fn backup_file(&self, backup: &str) -> Result<BackupFile, ClientError> {
+    pub async fn backup_file(&self, backup: &str) -> Result<FileDownload, ClientError> {
         let request = self.ask(&FILE, &[&backup])?.timeout(DOWNLOAD_TIMEOUT);
+        self.download(request).await
+    }
+
+    /// Sends, and gives the body as it comes.
+    pub(super) async fn download(&self, request: RequestBuilder) -> Result<FileDownload, ClientError> {
         let response = self.checked(request).await?;
-        Ok(BackupFile { length: response.content_length(), response })
+        Ok(FileDownload { length: response.content_length(), response })
     }
 
     /// Deletes a complete backup.

@@ -132,8 +132,19 @@ impl MapClient {
         operation: &Operation,
         at: &[PathValue<'_>],
     ) -> Result<RequestBuilder, ClientError> {
+        self.ask_at(operation, at, "")
+    }
+
+    /// The same with a query, `?` first.
+    pub(super) fn ask_at(
+        &self,
+        operation: &Operation,
+        at: &[PathValue<'_>],
+        query: &str,
+    ) -> Result<RequestBuilder, ClientError> {
         let path = path_of(operation.path, at)?;
-        let mut request = self.http.request(operation.method.clone(), format!("{}/api/v1{path}", self.base));
+        let url = format!("{}/api/v1{path}{query}", self.base);
+        let mut request = self.http.request(operation.method.clone(), url);
         if operation.takes_key() {
             request = request.header(KEY, self.key.clone().unwrap_or_else(fresh_key));
         }

@@ -3,6 +3,7 @@
 
 mod audit;
 mod backups;
+mod bundles;
 mod cameras;
 mod creation;
 mod events;
@@ -36,7 +37,7 @@ mod visibility;
 mod visibility_settings;
 mod walls;
 
-pub use backups::BackupFile;
+pub use backups::FileDownload;
 pub use cameras::CameraFrame;
 pub use learning::JobEvents;
 pub use live::LiveEvents;
@@ -51,6 +52,7 @@ pub fn operations() -> impl Iterator<Item = &'static Operation> {
     let all = [
         audit::OPERATIONS,
         backups::OPERATIONS,
+        bundles::OPERATIONS,
         cameras::OPERATIONS,
         gathering::OPERATIONS,
         health::OPERATIONS,

@@ -20,11 +20,12 @@ pub struct Operation {
 }
 
 /// Operations that create, and take a key.
-const CREATIONS: [&str; 11] = [
+const CREATIONS: [&str; 12] = [
     "/maps/{map}/bulk/create-landmarks",
     "/maps",
     "/maps/{map}/copies",
     "/maps/{map}/drafts",
+    "/bundles",
     "/maps/{map}/landmarks",
     "/maps/{map}/landmarks/{landmark}/views",
     "/maps/{map}/landmarks/{landmark}/learn",

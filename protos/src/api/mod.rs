@@ -10,6 +10,7 @@
 pub mod audit;
 pub mod backups;
 pub mod cameras;
+pub mod bundles;
 pub mod drafts;
 mod events;
 pub mod failed_gates;
@@ -44,6 +45,7 @@ pub mod walls;
 
 pub use audit::*;
 pub use backups::*;
+pub use bundles::*;
 pub use cameras::*;
 pub use drafts::*;
 pub use events::*;

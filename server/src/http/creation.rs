@@ -1,7 +1,8 @@
 //! `Idempotency-Key`: a creation that is repeated with its key is answered as the first time, and made once.
 
 use super::{
-    API, AppState, error::ApiError, extract::too_large, reference_runs::PATH_BYTES, upload::FORM_OVERHEAD,
+    API, AppState, bundles, error::ApiError, extract::too_large, reference_runs::PATH_BYTES,
+    upload::FORM_OVERHEAD,
 };
 use crate::{
     config::Limits,
@@ -11,7 +12,7 @@ use crate::{
 use axum::{
     body::{Body, Bytes},
     extract::{MatchedPath, Request},
-    http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, header},
+    http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, header, request::Parts},
     middleware::Next,
     response::{IntoResponse, Response},
 };
@@ -37,6 +38,7 @@ pub(super) const CREATIONS: &[(&str, LargestBody)] = &[
     ("/maps", json),
     ("/maps/{map}/copies", json),
     ("/maps/{map}/drafts", json),
+    (bundles::LOAD, |limits| limits.bundle_bytes),
     ("/maps/{map}/landmarks", json),
     ("/maps/{map}/bulk/create-landmarks", json),
     ("/maps/{map}/landmarks/{landmark}/views", |limits| limits.upload_bytes + FORM_OVERHEAD),
@@ -56,6 +58,8 @@ pub(super) async fn keyed(app: &AppState, request: Request, next: Next) -> Respo
     let path = request.extensions().get::<MatchedPath>().and_then(|path| path.as_str().strip_prefix(API));
     let creation = CREATIONS.iter().find(|(at, _)| path == Some(*at));
     match creation {
+        // A bundle goes to a file before its digest is known.
+        Some((bundles::LOAD, _)) => next.run(request).await,
         Some((_, max)) if request.method() == Method::POST && request.headers().contains_key(KEY) => {
             let max = max(&app.config.limits);
             once(app, request, max, next).await.unwrap_or_else(IntoResponse::into_response)
@@ -65,21 +69,37 @@ pub(super) async fn keyed(app: &AppState, request: Request, next: Next) -> Respo
 }
 
 async fn once(app: &AppState, request: Request, max: usize, next: Next) -> Result<Response, ApiError> {
-    let key = key(request.headers())?;
-    // Everybody has keys of his own.
-    let key = match request.extensions().get::<Principal>().map(|principal| principal.token) {
-        Some(TokenId::Stored(number)) => format!("{number} {key}"),
-        _ => format!("local {key}"),
-    };
     let (head, body) = request.into_parts();
+    key(&head.headers)?;
     let body = axum::body::to_bytes(body, max).await.map_err(|_too_long| too_large(max))?;
     let kind = head.headers.get(header::CONTENT_TYPE).and_then(|v| v.to_str().ok()).unwrap_or_default();
     let (path, kind, bytes) = (head.uri.path().to_owned(), kind.to_owned(), body.clone());
     // Off the runtime: a picture takes a tenth of a second.
     let digest = tokio::task::spawn_blocking(move || digest(&path, &kind, &bytes)).await;
     let digest = digest.map_err(|e| ApiError::internal(&e))?;
+    let again = head.clone();
+    under_key(app, &again, digest, async { Ok(next.run(Request::from_parts(head, Body::from(body))).await) })
+        .await
+}
+
+/// The answer to a creation, of `work` or of an earlier request. Without a key that is always `work`.
+pub(super) async fn under_key(
+    app: &AppState,
+    head: &Parts,
+    digest: RequestDigest,
+    work: impl Future<Output = Result<Response, ApiError>>,
+) -> Result<Response, ApiError> {
+    if !head.headers.contains_key(KEY) {
+        return work.await;
+    }
+    let key = key(&head.headers)?;
+    // Everybody has keys of his own.
+    let key = match head.extensions.get::<Principal>().map(|principal| principal.token) {
+        Some(TokenId::Stored(number)) => format!("{number} {key}"),
+        _ => format!("local {key}"),
+    };
     match app.store.creation(&key, digest).await? {
-        Creation::First(key) => Ok(key.scope(next.run(Request::from_parts(head, Body::from(body)))).await),
+        Creation::First(key) => key.scope(work).await,
         Creation::Repeat(Answer { status, body }) => {
             let status = StatusCode::from_u16(status).map_err(|e| ApiError::internal(&e))?;
             let kind = (header::CONTENT_TYPE, HeaderValue::from_static("application/json"));

@@ -48,7 +48,9 @@ fn add_errors(operation: &mut Operation, is_changing: bool) {
     if let Some(RefOr::T(body)) = &operation.request_body {
         errors.extend(WITH_BODY);
         let is_form = body.content.contains_key("multipart/form-data");
-        errors.extend(if is_form {
+        errors.extend(if body.content.contains_key("application/zip") {
+            [("400", "bad_body"), ("415", "not_zip")]
+        } else if is_form {
             [("400", "bad_multipart, bad_json"), ("415", "not_multipart")]
         } else {
             [("400", "bad_json"), ("415", "not_json")]

@@ -27,8 +27,9 @@ pub(super) fn with_examples(mut document: OpenApi, root: &str) -> OpenApi {
 fn request_body(operation: &mut Operation) -> Option<&mut Content> {
     let RefOr::T(body) = operation.request_body.as_mut()? else { return None };
     let mut contents = body.content.iter_mut();
-    let content =
-        contents.find(|(kind, _)| ["application/json", "multipart/form-data"].contains(&kind.as_str()));
+    let content = contents.find(|(kind, _)| {
+        ["application/json", "multipart/form-data", "application/zip"].contains(&kind.as_str())
+    });
     let RefOr::T(content) = content?.1 else { return None };
     Some(content)
 }

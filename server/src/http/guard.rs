@@ -4,6 +4,7 @@
 //! changes anything, come from its own pages or from no page at all. Who asks is the matter of `authorise`.
 
 use super::{AppState, error::ApiError, peer::Peer};
+use crate::config::Limits;
 use axum::{
     body::HttpBody,
     extract::{Request, State},
@@ -45,7 +46,7 @@ pub(super) async fn guard(State(app): State<AppState>, mut request: Request, nex
     request.extensions_mut().insert(RequestId(id.clone()));
     let (method, uri) = (request.method().clone(), request.uri().clone());
     let started = Instant::now();
-    let deadline = Duration::from_secs(app.config.limits.request_timeout_s);
+    let deadline = Duration::from_secs(deadline_s(&app.config.limits, &path));
     // With TLS, plain text comes from this machine alone, and a certificate proves the name that a page was asked by.
     let is_encrypted = request.extensions().get::<Peer>().is_some_and(|peer| peer.is_encrypted);
     let is_loopback = app.config.tls.is_some() || app.config.http_addr.ip().to_canonical().is_loopback();
@@ -74,6 +75,12 @@ pub(super) async fn guard(State(app): State<AppState>, mut request: Request, nex
     headers.insert(header::REFERRER_POLICY, HeaderValue::from_static("no-referrer"));
     headers.insert("cross-origin-resource-policy", HeaderValue::from_static("same-origin"));
     response
+}
+
+/// A bundle of a map is large: its way takes longer than that of other requests.
+fn deadline_s(limits: &Limits, path: &str) -> u64 {
+    let is_bundle = path.ends_with("/bundle") || path.ends_with("/bundles");
+    if is_bundle { limits.bundle_timeout_s } else { limits.request_timeout_s }
 }
 
 /// Whether something was changed. Some questions are put by POST: they are answered with 200, creations are not.

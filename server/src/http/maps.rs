@@ -66,7 +66,7 @@ fn parent_shown(link: &MapLink<String>) -> Parent {
 }
 
 /// A map and where it is. The map that it lies in is named only to those who may see that.
-fn map_shown(row: MapRow, found: MapLocation, principal: &Principal) -> Map {
+pub(super) fn map_shown(row: MapRow, found: MapLocation, principal: &Principal) -> Map {
     let link = found.link.filter(|link| principal.may_see(&link.parent));
     Map {
         name: row.name,
@@ -97,7 +97,7 @@ fn word(field: &'static str, text: Option<String>) -> Result<Option<String>, Api
 }
 
 /// The field of a parent that does not exist is not the map of the path.
-fn unknown_parent(error: ApiError) -> ApiError {
+pub(super) fn unknown_parent(error: ApiError) -> ApiError {
     if error.code == "unknown_map" { error.field("parent.map") } else { error }
 }
 

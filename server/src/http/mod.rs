@@ -8,6 +8,7 @@ mod audit;
 mod authorise;
 mod backups;
 mod bulk;
+mod bundles;
 mod cameras;
 mod cookie;
 mod creation;
@@ -120,6 +121,8 @@ pub(crate) struct App {
     streams: Arc<Semaphore>,
     /// Places for requests with large bodies.
     uploads: Semaphore,
+    /// The place for a bundle that is written or read: its map is in memory as a whole.
+    bundles: Semaphore,
 }
 
 /// Who works on what is asked for.
@@ -169,6 +172,7 @@ impl App {
             vision,
             streams,
             uploads,
+            bundles: Semaphore::new(1),
         }
     }
 
@@ -188,6 +192,11 @@ impl App {
         let follows = "the request is refused as internal";
         let done = vitals.panics().joined(Edge::Request, "vision work of a request", follows, done.await);
         done.map_err(|e| ApiError::internal(&e))
+    }
+
+    /// The place for a bundle.
+    async fn bundle_place(&self) -> Result<SemaphorePermit<'_>, ApiError> {
+        self.bundles.acquire().await.map_err(|closed| ApiError::internal(&closed))
     }
 
     /// A place for a request with a large body, or 503.

@@ -1,7 +1,7 @@
 //! Every route, with the layers around them and the OpenAPI document made from them.
 
 use super::{
-    API, App, AppState, audit, authorise, backups, bulk, cameras, creation, documented, drafts,
+    API, App, AppState, audit, authorise, backups, bulk, bundles, cameras, creation, documented, drafts,
     error::{ApiError, method_not_allowed, not_found},
     events,
     examples::with_examples,
@@ -50,6 +50,7 @@ fn api(limits: &Limits) -> OpenApiRouter<AppState> {
         .merge(mapping::router())
         .merge(landmarks::router())
         .merge(bulk::router())
+        .merge(bundles::router())
         .merge(landmark_models::router())
         .merge(views::router(limits.upload_bytes))
         .merge(learning::router())

@@ -91,6 +91,9 @@ pub(crate) const TABLE: &[Rule] = &[
     map("PATCH", "/maps/{map}", Operator),
     map("DELETE", "/maps/{map}", Admin),
     server("POST", "/maps/{map}/copies", Operator),
+    // All photographs of a place at once, with what surrounds the landmarks, and much work: more than looking at one.
+    map("GET", "/maps/{map}/bundle", Teacher),
+    server("POST", "/bundles", Operator),
     map("GET", "/maps/{map}/transform", Viewer),
     map("GET", "/maps/{map}/walls", Viewer),
     map("PUT", "/maps/{map}/walls", Teacher),

@@ -49,7 +49,7 @@ pub(crate) fn hex(bytes: &[u8]) -> String {
 }
 
 /// Stores a picture, if it is not there. One that is known to be damaged gets its bytes again.
-pub(super) async fn put(tx: &mut Tx, sha256: &Digest, bytes: &[u8]) -> Result<(), StoreError> {
+pub(crate) async fn put(tx: &mut Tx, sha256: &Digest, bytes: &[u8]) -> Result<(), StoreError> {
     let done = sqlx::query(PUT).bind(&sha256[..]).bind(bytes).execute(&mut tx.conn).await;
     let done = done.map_err(|error| not_readable(sha256, error))?;
     if done.rows_affected() == 1 {

@@ -31,7 +31,7 @@ statements! {
 const SAME_SIZE_M: f64 = 1e-6;
 
 /// How often a write is prepared before its caller is told to try again.
-pub(super) const ATTEMPTS: usize = 5;
+pub(crate) const ATTEMPTS: usize = 5;
 
 /// What a landmark's place and the novelty of its views rest on (optimistic locking). The revision changes with the views, and
 /// never comes back.

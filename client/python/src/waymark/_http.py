@@ -94,6 +94,8 @@ OPERATIONS: dict[str, tuple[str, str]] = {
     "finish_mapping": ("POST", "/maps/{map}/mapping/finish"),
     "create_map": ("POST", "/maps"),
     "copy_map": ("POST", "/maps/{map}/copies"),
+    "save_map": ("GET", "/maps/{map}/bundle"),
+    "load_map": ("POST", "/bundles"),
     "maps": ("GET", "/maps"),
     "map": ("GET", "/maps/{map}"),
     "locate_map": ("PATCH", "/maps/{map}"),
@@ -155,6 +157,7 @@ CREATIONS = frozenset(
     {
         "create_map",
         "copy_map",
+        "load_map",
         "begin_draft",
         "add_landmark",
         "add_landmarks",
@@ -214,6 +217,8 @@ def headers_of(call: str, key: str | None, revision: str | None, why: str | None
         headers["waymark-why"] = quote(why, safe="")
     if call in CREATIONS:
         headers["idempotency-key"] = key if key is not None else uuid.uuid4().hex
+    if call == "load_map":
+        headers["content-type"] = "application/zip"
     if call in CHANGES:
         headers["if-match"] = "*" if revision is None else f'"{revision}"'
     return headers

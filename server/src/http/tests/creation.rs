@@ -1,6 +1,10 @@
 //! Creations with a key: a repeat gets the first answer and changes nothing.
 
-use super::{openapi::prepared, teaching::blocks, *};
+use super::{
+    openapi::{bundle, prepared},
+    teaching::blocks,
+    *,
+};
 use crate::http::creation::CREATIONS;
 use axum::http::HeaderMap;
 use serde_json::json;
@@ -11,7 +15,7 @@ type Answered = (u16, HeaderMap, Vec<u8>);
 
 impl Service {
     /// A POST with a key.
-    async fn keyed(&self, path: &str, key: &str, (kind, body): (&str, Vec<u8>)) -> Answered {
+    pub(super) async fn keyed(&self, path: &str, key: &str, (kind, body): (&str, Vec<u8>)) -> Answered {
         let request = Request::builder().method("POST").uri(path).header(header::HOST, "localhost");
         let request = request.header(header::CONTENT_TYPE, kind).header("idempotency-key", key);
         let response = self.ask(request.body(Body::from(body)).unwrap()).await;
@@ -61,13 +65,19 @@ fn body(path: &str, examples: &BTreeMap<String, Value>, boundary: &str) -> (Stri
 #[tokio::test(flavor = "multi_thread")]
 async fn every_creation_is_made_once_under_its_key() {
     let examples: BTreeMap<String, Value> = serde_json::from_str(include_str!("../examples.json")).unwrap();
-    for (path, _) in CREATIONS {
+    for &(path, _) in CREATIONS {
         let (service, gathering) = prepared(path).await;
         let at =
             [("{map}", "hall"), ("{landmark}", "poster"), ("{robot}", "r1"), ("{gathering}", &gathering)]
                 .iter()
                 .fold(format!("/api/v1{path}"), |at, (name, value)| at.replace(name, value));
-        let (kind, sent) = body(path, &examples, "one");
+        let at = if path == "/bundles" { format!("{at}?name=new") } else { at };
+        let packed = if path == "/bundles" { bundle(&service).await } else { Vec::new() };
+        let body = |boundary| match path {
+            "/bundles" => ("application/zip".to_owned(), packed.clone()),
+            path => body(path, &examples, boundary),
+        };
+        let (kind, sent) = body("one");
         let (status, headers, first) = service.keyed(&at, "k", (&kind, sent)).await;
         let text = String::from_utf8_lossy(&first);
         assert!(
@@ -76,7 +86,7 @@ async fn every_creation_is_made_once_under_its_key() {
         );
         let rows = service.rows().await;
         assert_eq!(rows["kept_answers"], 1, "{path}: the answer is not kept");
-        let (kind, sent) = body(path, &examples, "other");
+        let (kind, sent) = body("other");
         let (again, headers, repeat) = service.keyed(&at, "k", (&kind, sent)).await;
         assert_eq!((again, String::from_utf8_lossy(&repeat)), (status, text), "{path}");
         assert_eq!(headers["idempotency-replayed"], "true", "{path}");

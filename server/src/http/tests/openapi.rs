@@ -68,6 +68,13 @@ pub(super) async fn read_long(service: &Service, path: &str) -> (u16, Value) {
     (status, serde_json::from_slice(&bytes).unwrap())
 }
 
+/// A bundle of map `hall`.
+pub(super) async fn bundle(service: &Service) -> Vec<u8> {
+    let response = service.ask(request("GET", "/api/v1/maps/hall/bundle", "")).await;
+    assert_eq!(response.status().as_u16(), 200);
+    to_bytes(response.into_body(), 8 << 20).await.unwrap().to_vec()
+}
+
 /// A picture of a poster: PNG.
 fn poster(seed: u64) -> Vec<u8> {
     let poster = sim::posters::poster_of_size(seed, 120, 1.0);
@@ -127,6 +134,10 @@ async fn every_body_has_an_example_and_the_server_takes_it() {
                 let (files, texts): (Vec<_>, Vec<_>) = parts.partition(|(_, value)| value.starts_with('@'));
                 assert_eq!(files.iter().map(|(name, _)| *name).collect::<Vec<_>>(), ["image"], "{name}");
                 service.send_form(&method, &at, poster(2), &texts).await
+            } else if kind == "application/zip" {
+                let (status, _, answer) =
+                    service.keyed(&format!("{at}?name=new"), "z", (kind, bundle(&service).await)).await;
+                (status, serde_json::from_slice(&answer).unwrap())
             } else {
                 assert_eq!(kind, "application/json", "{name}");
                 read(service.ask(request(&method, &at, body["example"].to_string())).await).await

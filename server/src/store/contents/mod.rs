@@ -9,7 +9,7 @@ mod read;
 mod write;
 
 pub(crate) use copy::{contents_of, copy};
-pub(in crate::store) use numbers::{Numbers, in_other_map};
+pub(crate) use numbers::{Numbers, in_other_map};
 pub(crate) use read::read;
 pub(crate) use write::{Written, write};
 pub(in crate::store) use write::{distractor, landmark, model, run, settings, view};

@@ -9,11 +9,7 @@ use vision::model::{LandmarkId, renumbered};
 pub(crate) type Numbers = BTreeMap<LandmarkId, LandmarkId>;
 
 /// The same model for the landmark `of` of another map. Bytes that are no model stay what they are: no map uses them.
-pub(in crate::store) fn in_other_map(
-    model: &ModelContents,
-    of: LandmarkId,
-    numbers: &Numbers,
-) -> ModelContents {
+pub(crate) fn in_other_map(model: &ModelContents, of: LandmarkId, numbers: &Numbers) -> ModelContents {
     let mut made = model.clone();
     if let Ok(bytes) = renumbered(&model.bytes, of) {
         made.bytes = bytes;

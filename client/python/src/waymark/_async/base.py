@@ -129,7 +129,7 @@ class AsyncBase:
 
     async def _find_local_token(self, parts: dict[str, Any]) -> None:
         """Finds the token of the server on this machine before a body is sent: a refusal may break off a large one."""
-        is_large = "files" in parts or (self._token is None and "json" in parts)
+        is_large = "files" in parts or "content" in parts or (self._token is None and "json" in parts)
         if self._local_port is not None and is_large:
             response = await self._sent(*request_of("whoami", ()), headers={}, is_stream=False, parts={})
             with contextlib.suppress(_local_token.NotUsedError):

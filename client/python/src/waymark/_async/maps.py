@@ -7,7 +7,7 @@ from os import PathLike
 
 from waymark._async.base import AsyncBase, AsyncEvents, AsyncStream
 from waymark._events import live_event
-from waymark._http import Revised, picture_part
+from waymark._http import Revised, picture_part, query_of
 from waymark._values import UNSET, Unset, given, present, to_json
 from waymark.api import (
     Backup,
@@ -127,6 +127,16 @@ class AsyncMaps(AsyncBase):
     async def copy_map(self, map: str, name: str) -> Map:
         """Makes a new map of all that a map has."""
         return await self._send(Map, "copy_map", map, json={"name": name})
+
+    async def save_map(self, map: str, path: str | PathLike[str]) -> int:
+        """Writes the whole map to a new file, a bundle (docs/BUNDLE.md); returns its size."""
+        return await self._save(path, "save_map", map)
+
+    async def load_map(self, bundle: bytes, name: str | None = None, *, without_link: bool = False) -> Map:
+        """Makes a new map of a bundle, with its name or another one. `without_link` leaves out the link to the map that
+        it lies in; otherwise a map of that name must be there."""
+        query = query_of({"name": name, "without_link": without_link})
+        return await self._send(Map, "load_map", content=bundle, params=query)
 
     async def rename_map(self, map: str, new_name: str) -> Map:
         """Gives a map another name; no robot may be on it."""

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from os import PathLike
 
 from waymark._events import live_event
-from waymark._http import Revised, picture_part
+from waymark._http import Revised, picture_part, query_of
 from waymark._sync.base import Base, Events, Stream
 from waymark._values import UNSET, Unset, given, present, to_json
 from waymark.api import (
@@ -128,6 +128,16 @@ class Maps(Base):
     def copy_map(self, map: str, name: str) -> Map:
         """Makes a new map of all that a map has."""
         return self._send(Map, "copy_map", map, json={"name": name})
+
+    def save_map(self, map: str, path: str | PathLike[str]) -> int:
+        """Writes the whole map to a new file, a bundle (docs/BUNDLE.md); returns its size."""
+        return self._save(path, "save_map", map)
+
+    def load_map(self, bundle: bytes, name: str | None = None, *, without_link: bool = False) -> Map:
+        """Makes a new map of a bundle, with its name or another one. `without_link` leaves out the link to the map that
+        it lies in; otherwise a map of that name must be there."""
+        query = query_of({"name": name, "without_link": without_link})
+        return self._send(Map, "load_map", content=bundle, params=query)
 
     def rename_map(self, map: str, new_name: str) -> Map:
         """Gives a map another name; no robot may be on it."""

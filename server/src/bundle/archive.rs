@@ -1,0 +1,220 @@
+//! The zip of a bundle. Files are stored as they are, in the order in which they are written, without times. The comment at the
+//! end is the seal: the SHA-256 of all bytes before it, 64 hexadecimal digits. So no byte of it changes unseen, not even one that
+//! readers of zip files skip.
+
+use super::{
+    BundleError, Fault, MANIFEST, MAX_FILES, MAX_RECORD_BYTES,
+    manifest::{FileDigest, Manifest},
+    refused,
+};
+use crate::store::pictures::hex;
+use sha2::{Digest as _, Sha256};
+use std::{
+    collections::BTreeMap,
+    fs::File,
+    io::{self, BufWriter, Read as _, Seek as _, SeekFrom, Write as _},
+};
+use zip::{CompressionMethod, ZipArchive, ZipWriter, result::ZipError, write::SimpleFileOptions};
+
+/// Length of the seal.
+const SEAL_BYTES: u64 = 64;
+/// Length of the record of a zip's end, before its comment.
+const END_BYTES: u64 = 22;
+/// Bytes read at a time.
+const BUFFER: usize = 1 << 20;
+
+fn io_of(error: ZipError) -> io::Error {
+    match error {
+        ZipError::Io(error) => error,
+        other => io::Error::other(other),
+    }
+}
+
+/// A bundle that is being written.
+pub(super) struct Writer {
+    zip: ZipWriter<BufWriter<File>>,
+    files: BTreeMap<String, FileDigest>,
+}
+
+impl Writer {
+    pub(super) fn new(file: File) -> Self {
+        Self { zip: ZipWriter::new(BufWriter::with_capacity(BUFFER, file)), files: BTreeMap::new() }
+    }
+
+    /// How many files there are.
+    pub(super) fn len(&self) -> usize {
+        self.files.len()
+    }
+
+    /// Adds a file.
+    pub(super) fn add(&mut self, name: &str, bytes: &[u8]) -> io::Result<()> {
+        self.put(name, bytes)?;
+        let digest = FileDigest { bytes: bytes.len() as u64, sha256: hex(&Sha256::digest(bytes)) };
+        self.files.insert(name.to_owned(), digest);
+        Ok(())
+    }
+
+    fn put(&mut self, name: &str, bytes: &[u8]) -> io::Result<()> {
+        let options = SimpleFileOptions::default()
+            .compression_method(CompressionMethod::Stored)
+            .last_modified_time(zip::DateTime::default())
+            .unix_permissions(0o644);
+        self.zip.start_file(name, options).map_err(io_of)?;
+        self.zip.write_all(bytes)
+    }
+
+    /// Adds the manifest and the seal. The file stands at its beginning.
+    pub(super) fn finish(mut self, map: &str) -> io::Result<File> {
+        let manifest = Manifest::new(map, std::mem::take(&mut self.files));
+        self.put(MANIFEST, &serde_json::to_vec_pretty(&manifest)?)?;
+        self.zip.set_raw_comment(vec![b'0'; SEAL_BYTES as usize].into_boxed_slice()).map_err(io_of)?;
+        let mut file = self.zip.finish().map_err(io_of)?.into_inner()?;
+        let sealed = file.metadata()?.len() - SEAL_BYTES;
+        let seal = digest(&mut file, sealed)?;
+        file.seek(SeekFrom::Start(sealed))?;
+        file.write_all(seal.as_bytes())?;
+        file.rewind()?;
+        Ok(file)
+    }
+}
+
+/// SHA-256 of the first bytes of a file, hexadecimal.
+fn digest(file: &mut File, length: u64) -> io::Result<String> {
+    file.rewind()?;
+    let (mut hash, mut buffer, mut rest) = (Sha256::new(), vec![0; BUFFER], length);
+    while rest > 0 {
+        let part = rest.min(BUFFER as u64) as usize;
+        file.read_exact(&mut buffer[..part])?;
+        hash.update(&buffer[..part]);
+        rest -= part as u64;
+    }
+    Ok(hex(&hash.finalize()))
+}
+
+/// A bundle that is read: every byte is that of a digest.
+pub(super) struct Reader {
+    zip: ZipArchive<File>,
+    pub(super) manifest: Manifest,
+}
+
+fn not_a_zip(error: ZipError) -> BundleError {
+    match error {
+        ZipError::Io(error) if error.kind() != io::ErrorKind::UnexpectedEof => error.into(),
+        other => refused(Fault::NotABundle, "bundle", other.to_string()),
+    }
+}
+
+impl Reader {
+    /// Opens a bundle and checks its seal, its names, sizes and digests. Nothing is unpacked.
+    pub(super) fn open(mut file: File) -> Result<Self, BundleError> {
+        sealed(&mut file)?;
+        let length = file.metadata()?.len();
+        file.rewind()?;
+        let mut zip = ZipArchive::new(file).map_err(not_a_zip)?;
+        let declared = entries(&mut zip, length)?;
+        let manifest = match declared.get(MANIFEST) {
+            Some(bytes) if *bytes <= MAX_RECORD_BYTES => read(&mut zip, MANIFEST)?,
+            Some(_) => return Err(refused(Fault::TooLarge, MANIFEST, "it is too large")),
+            None => return Err(refused(Fault::Missing, MANIFEST, "the bundle has no such file")),
+        };
+        let mut reader = Self { zip, manifest: Manifest::parse(&manifest)? };
+        reader.check(&declared)?;
+        Ok(reader)
+    }
+
+    /// Manifest and zip name the same files, and each has its digest.
+    fn check(&mut self, declared: &BTreeMap<String, u64>) -> Result<(), BundleError> {
+        for name in declared.keys().filter(|name| *name != MANIFEST) {
+            if !self.manifest.files.contains_key(name) {
+                return Err(refused(Fault::BadPath, name, format!("{MANIFEST} does not name this file")));
+            }
+        }
+        let files = self.manifest.files.clone();
+        for (name, file) in files {
+            let Some(bytes) = declared.get(&name) else {
+                return Err(refused(Fault::Missing, name, "the bundle has no such file"));
+            };
+            if *bytes != file.bytes || hex(&Sha256::digest(self.read(&name)?)) != file.sha256 {
+                return Err(refused(Fault::Damaged, name, format!("it is not what {MANIFEST} says")));
+            }
+        }
+        Ok(())
+    }
+
+    /// The bytes of a file.
+    pub(super) fn read(&mut self, name: &str) -> Result<Vec<u8>, BundleError> {
+        read(&mut self.zip, name)
+    }
+}
+
+/// Checks the seal, and that the record of the end, from which the number of files is read, has no more than fit.
+fn sealed(file: &mut File) -> Result<(), BundleError> {
+    let none = || refused(Fault::NotABundle, "bundle", "it is no bundle of a map, or its end is missing");
+    let length = file.metadata()?.len();
+    let sealed = length.checked_sub(SEAL_BYTES).filter(|n| *n >= END_BYTES).ok_or_else(none)?;
+    file.seek(SeekFrom::Start(sealed - END_BYTES))?;
+    let (mut end, mut seal) = ([0; END_BYTES as usize], [0; SEAL_BYTES as usize]);
+    file.read_exact(&mut end)?;
+    file.read_exact(&mut seal)?;
+    if !end.starts_with(b"PK\x05\x06") || end[20..] != (SEAL_BYTES as u16).to_le_bytes() {
+        return Err(none());
+    }
+    if digest(file, sealed)?.as_bytes() != seal {
+        return Err(refused(
+            Fault::Damaged,
+            "bundle",
+            "its bytes are not those that were saved: copy it again",
+        ));
+    }
+    let files = u16::from_le_bytes([end[10], end[11]]);
+    if usize::from(files) > MAX_FILES + 1 {
+        return Err(refused(Fault::TooLarge, "bundle", format!("it has more than {MAX_FILES} files")));
+    }
+    Ok(())
+}
+
+/// Name and size of each file. No file is packed, so that together they are no larger than the bundle.
+fn entries(zip: &mut ZipArchive<File>, length: u64) -> Result<BTreeMap<String, u64>, BundleError> {
+    let (mut found, mut sum) = (BTreeMap::new(), 0_u64);
+    if zip.has_duplicate_names() {
+        return Err(refused(Fault::BadPath, "bundle", "two of its files have the same name"));
+    }
+    for index in 0..zip.len() {
+        let entry = zip.by_index_raw(index).map_err(not_a_zip)?;
+        let name = String::from_utf8_lossy(entry.name_raw()).into_owned();
+        if !is_plain(&name) || !entry.is_file() {
+            return Err(refused(Fault::BadPath, name, "a bundle has no file of such a name"));
+        }
+        if entry.encrypted()
+            || entry.compression() != CompressionMethod::Stored
+            || entry.size() != entry.compressed_size()
+        {
+            return Err(refused(
+                Fault::TooLarge,
+                name,
+                "files of a bundle are stored as they are, not packed",
+            ));
+        }
+        sum = sum.saturating_add(entry.size());
+        if sum > length {
+            return Err(refused(Fault::TooLarge, name, "its files are larger than the bundle"));
+        }
+        found.insert(name, entry.size());
+    }
+    Ok(found)
+}
+
+/// A relative path of plain segments.
+fn is_plain(name: &str) -> bool {
+    let plain = |b: u8| b.is_ascii_lowercase() || b.is_ascii_digit() || b"._-".contains(&b);
+    name.len() <= 128
+        && name.split('/').all(|part| !part.is_empty() && !part.starts_with('.') && part.bytes().all(plain))
+}
+
+fn read(zip: &mut ZipArchive<File>, name: &str) -> Result<Vec<u8>, BundleError> {
+    let mut entry = zip.by_name(name).map_err(not_a_zip)?;
+    let mut bytes = Vec::new();
+    let damaged = |e: io::Error| refused(Fault::Damaged, name, e.to_string());
+    (&mut entry).take(u64::MAX).read_to_end(&mut bytes).map_err(damaged)?;
+    Ok(bytes)
+}
