@@ -32,6 +32,7 @@ mod maps;
 mod modalities;
 mod page_session;
 mod pages;
+mod pose_by_hand;
 mod peer;
 mod pictures;
 mod recognise;
@@ -39,6 +40,7 @@ mod reference_runs;
 mod relocalisation;
 mod replay;
 mod revision;
+mod robot_activity;
 mod robot_certificates;
 mod robots;
 mod ros2;
@@ -59,8 +61,14 @@ mod tests;
 pub(crate) use router::router;
 
 use crate::{
-    backup::Backups, config::Config, gather::Gatherer, identity::Sessions, jobs::Jobs,
-    publication::Catalogue, ros2::Ros2, store::now_ms,
+    backup::Backups,
+    config::Config,
+    gather::Gatherer,
+    identity::Sessions,
+    jobs::Jobs,
+    publication::Catalogue,
+    ros2::{Ros2, Ros2Publisher},
+    store::now_ms,
 };
 use authorise::Asker;
 use axum::http::StatusCode;
@@ -100,6 +108,8 @@ pub(crate) struct App {
     pub(crate) searches: Arc<Relocalisers>,
     /// Robots of ROS 2.
     pub(crate) ros2: Arc<Ros2>,
+    /// Where poses go that were not asked for by a message; absent without a bus.
+    pub(crate) publisher: Option<Arc<Ros2Publisher>>,
     /// Sessions of the page.
     pub(crate) sessions: Arc<Sessions>,
     /// Where the local token is, absolute.
@@ -124,6 +134,7 @@ pub(crate) struct Services {
     pub(crate) jobs: Arc<Jobs>,
     pub(crate) gatherer: Arc<Gatherer>,
     pub(crate) ros2: Arc<Ros2>,
+    pub(crate) publisher: Option<Arc<Ros2Publisher>>,
     pub(crate) sessions: Arc<Sessions>,
     pub(crate) local_token_file: Option<PathBuf>,
     pub(crate) backups: Arc<Backups>,
@@ -137,7 +148,7 @@ impl App {
     pub(crate) fn new(
         config: Arc<Config>,
         store: Catalogue,
-        Services { jobs, gatherer, ros2, sessions, local_token_file, backups, enrolment }: Services,
+        Services { jobs, gatherer, ros2, publisher, sessions, local_token_file, backups, enrolment }: Services,
         engine: &Engine,
         stopping: watch::Receiver<bool>,
     ) -> Self {
@@ -156,6 +167,7 @@ impl App {
             kept_frames,
             searches,
             ros2,
+            publisher,
             sessions,
             local_token_file,
             backups,
