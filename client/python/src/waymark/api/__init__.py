@@ -32,6 +32,7 @@ from waymark.api.history import (
     ReplayedPose,
     RobotReplay,
     RollbackOutcome,
+    SizeAndPlace,
     WallsDifference,
 )
 from waymark.api.landmark_models import (
@@ -285,6 +286,7 @@ __all__ = [
     "Ros2Status",
     "ServerEvent",
     "Size",
+    "SizeAndPlace",
     "StoredAnswer",
     "StoredAnswerSummary",
     "StoredQuad",
