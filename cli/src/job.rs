@@ -143,6 +143,10 @@ mod tests {
             progress: 0.25,
             message: "poster".into(),
             result: None,
+            by: "local".into(),
+            created_ms: 1,
+            started_ms: Some(2),
+            ended_ms: None,
         };
         assert_eq!(line(&job), "7  learn on office: running, 25 %, poster");
     }

@@ -12,6 +12,8 @@ pub mod intake;
 pub mod guided;
 pub mod landmark_checks;
 pub mod limits;
+pub mod robot_activity;
+pub mod unknown_robots;
 pub mod live;
 pub mod scan_job;
 pub mod motion;

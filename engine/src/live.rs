@@ -5,22 +5,27 @@
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 use map::pose2::{Pose2, Pose2Covariance};
 use protos::{
-    Name,
+    Code, Name,
     convert::{EncodedImage, Encoding, Pixels, geometry::pose2_wire},
     prost::bytes::Bytes,
     v1,
 };
-use serde::{Serialize, Serializer};
 use std::{
     collections::{BTreeMap, VecDeque},
     sync::{Arc, Mutex, MutexGuard, PoisonError},
+    time::Instant,
 };
 use tokio::sync::broadcast;
+
+mod live_event;
+pub use live_event::LiveEvent;
 
 use super::{
     cameras::CameraRegistry,
     decode::{ImageLimits, mosaic::mosaic},
+    robot_activity::{RobotActivities, RobotActivity},
     slots::SlotKey,
+    unknown_robots::{UnknownRobot, UnknownRobots},
 };
 use crate::limits::MAX_ROBOTS;
 
@@ -104,104 +109,6 @@ pub enum TrajectoryKind {
     Truth,
 }
 
-/// Something happened. In JSON: the fields of the variant, without its name; [`LiveEvent::kind`] is the event's name.
-#[derive(Debug, Clone, Serialize)]
-#[serde(untagged)]
-pub enum LiveEvent {
-    /// A frame was answered.
-    Answer {
-        /// Robot.
-        robot: Name,
-        /// Its camera.
-        camera: Name,
-        /// What was answered, the map's name included.
-        answer: Arc<v1::Answer>,
-    },
-    /// A fused pose.
-    Pose {
-        /// Robot.
-        robot: Name,
-        /// In this map.
-        map: String,
-        /// Where it is.
-        pose: v1::Pose2,
-        /// Over (x, y, theta), row-major.
-        covariance: Vec<f64>,
-        /// Corrections by landmarks so far.
-        corrections: u64,
-        /// From the capture of what supports it to its publication.
-        age_ms: f64,
-        /// How far it is trusted.
-        #[serde(serialize_with = "trust_word")]
-        trust: v1::PoseTrust,
-    },
-    /// Odometry, put on the map.
-    Odometry {
-        /// Robot.
-        robot: Name,
-        /// In this map.
-        map: String,
-        /// Where odometry alone says it is.
-        pose: v1::Pose2,
-    },
-    /// A simulator's truth.
-    Truth {
-        /// Robot.
-        robot: Name,
-        /// In this map.
-        map: String,
-        /// Where it really is.
-        pose: v1::Pose2,
-    },
-    /// A robot came or went.
-    Presence {
-        /// Robot.
-        robot: Name,
-        /// Its map, if it has one.
-        map: String,
-        /// Came, or went.
-        alive: bool,
-    },
-    /// A map has a new version, or is gone.
-    MapChanged {
-        /// Map.
-        map: String,
-        /// New version; absent when deleted.
-        version: Option<u64>,
-    },
-}
-
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
-fn trust_word<S: Serializer>(trust: &v1::PoseTrust, to: S) -> Result<S::Ok, S::Error> {
-    protos::json::pose_trust::serialize(&i32::from(*trust), to)
-}
-
-impl LiveEvent {
-    /// Name of the event in a stream of events.
-    pub fn kind(&self) -> &'static str {
-        match self {
-            Self::Answer { .. } => "answer",
-            Self::Pose { .. } => "pose",
-            Self::Odometry { .. } => "odometry",
-            Self::Truth { .. } => "truth",
-            Self::Presence { .. } => "presence",
-            Self::MapChanged { .. } => "map_changed",
-        }
-    }
-
-    /// The map it belongs to.
-    pub fn map(&self) -> &str {
-        match self {
-            Self::Answer { answer, .. } => &answer.map,
-            Self::Pose { map, .. }
-            | Self::Odometry { map, .. }
-            | Self::Truth { map, .. }
-            | Self::Presence { map, .. }
-            | Self::MapChanged { map, .. } => map,
-        }
-    }
-}
-
 #[derive(Debug, Default)]
 struct State {
     /// Each with the tick of its last frame.
@@ -218,6 +125,7 @@ pub struct LiveHub {
     state: Mutex<State>,
     events: broadcast::Sender<Arc<LiveEvent>>,
     cameras: CameraRegistry,
+    robots: Mutex<(RobotActivities, UnknownRobots)>,
 }
 
 impl Default for LiveHub {
@@ -226,6 +134,7 @@ impl Default for LiveHub {
             state: Mutex::default(),
             events: broadcast::channel(MAX_EVENTS).0,
             cameras: CameraRegistry::default(),
+            robots: Mutex::default(),
         }
     }
 }
@@ -264,9 +173,37 @@ impl LiveHub {
         state.trust.get(robot).filter(|(on, _)| on == map).map(|(_, trust)| *trust)
     }
 
+    /// What a robot has done since the start; `None` before its first message.
+    pub fn activity(&self, robot: &Name, now: Instant) -> Option<RobotActivity> {
+        self.robots().0.get(robot, now)
+    }
+
+    /// A message of a registered robot came.
+    pub fn heard(&self, robot: &Name, now: Instant) {
+        self.robots().0.heard(robot, now);
+    }
+
+    /// Forgets what a robot has done.
+    pub fn forget_activity(&self, robot: &Name) {
+        self.robots().0.forget(robot);
+    }
+
+    /// A message was refused because its robot is not registered.
+    pub fn refused_unknown(&self, robot: &Name, camera: Option<&Name>, now: Instant) {
+        if self.robots().1.refused(robot, camera, now) {
+            tracing::warn!(%robot, camera = camera.map(Name::as_str), "unknown_robot_refused");
+        }
+    }
+
+    /// The robots that send messages and are not registered.
+    pub fn unknown_robots(&self, now: Instant, is_registered: impl Fn(&Name) -> bool) -> Vec<UnknownRobot> {
+        self.robots().1.list(now, is_registered)
+    }
+
     /// Stores the frame as its camera's last and sends its answer as an event.
-    pub fn publish_answer(&self, key: &SlotKey, frame: LiveFrame) {
+    pub fn publish_answer(&self, key: &SlotKey, frame: LiveFrame, now: Instant) {
         let answer = frame.answer.clone();
+        self.robots().0.answered(&key.robot, &answer, now);
         {
             let mut guard = self.lock();
             let state = &mut *guard;
@@ -281,7 +218,14 @@ impl LiveHub {
     }
 
     /// Sends the answer to a refused frame as an event; the frame is not stored.
-    pub fn publish_refusal(&self, key: &SlotKey, answer: Arc<v1::Answer>) {
+    pub fn publish_refusal(&self, key: &SlotKey, answer: Arc<v1::Answer>, now: Instant) {
+        match &answer.rejection {
+            Some(rejection) if rejection.code == Code::UnknownRobot.as_str() => {
+                self.refused_unknown(&key.robot, Some(&key.camera), now);
+            }
+            Some(rejection) => self.robots().0.refused(&key.robot, rejection, now),
+            None => {}
+        }
         self.send(LiveEvent::Answer { robot: key.robot.clone(), camera: key.camera.clone(), answer });
     }
 
@@ -362,6 +306,10 @@ impl LiveHub {
     fn send(&self, event: LiveEvent) {
         // An error means that nobody listens.
         drop(self.events.send(Arc::new(event)));
+    }
+
+    fn robots(&self) -> MutexGuard<'_, (RobotActivities, UnknownRobots)> {
+        self.robots.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {

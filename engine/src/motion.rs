@@ -114,6 +114,7 @@ impl MotionTracker {
     /// counted.
     pub fn odometry(&self, robot: &Name, message: Bytes, received: Instant) -> Option<v1::RobotPose> {
         let taken = self.checked_odometry(robot, message, received);
+        self.note_message(robot, &taken, received);
         let (map, odometry, state) = self.lock().odometry.count("odometry", robot, taken)?;
         let mut state = lock_robot(&state);
         state.apply_odometry(odometry.captured_ns, odometry.odom_from_robot, received);
@@ -148,11 +149,23 @@ impl MotionTracker {
     /// or for the mapping if the robot makes a map.
     pub fn scan(&self, robot: &Name, message: Bytes, received: Instant) {
         let taken = self.checked_scan(robot, message, received);
+        self.note_message(robot, &taken, received);
         let Some(Some(job)) = self.lock().scans.count("scan", robot, taken) else { return };
         if self.scans.offer(robot, job)
             && let Ok(state) = self.lock().robot(robot)
         {
             lock_robot(&state).log.count(LASER, "superseded");
+        }
+    }
+
+    /// Tells pages that a message came, or that an unknown robot sent it.
+    fn note_message<T>(&self, robot: &Name, taken: &Result<T, Rejection>, received: Instant) {
+        match taken {
+            Ok(_) => self.live.heard(robot, received),
+            Err(rejection) if rejection.code == Code::UnknownRobot => {
+                self.live.refused_unknown(robot, None, received);
+            }
+            Err(_) => {}
         }
     }
 

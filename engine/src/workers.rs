@@ -355,16 +355,16 @@ impl Engine {
         answer.clock_suspect = job.clock_suspect;
         answer.latency_ms = job.received.elapsed().as_secs_f64() * 1e3;
         publish.answer(key, &answer);
-        let answer = Arc::new(answer);
+        let (answer, now) = (Arc::new(answer), Instant::now());
         if let Some(icons) = icons {
             self.kept_frames.keep_answered(key, &answer, frame);
             self.records.send(AnswerRecord { key: key.clone(), answer: answer.clone(), icons });
         }
         if answer.rejection.is_none() {
             let (width_px, height_px, pixels) = (frame.width_px, frame.height_px, frame.pixels.clone());
-            self.live.publish_answer(key, LiveFrame { width_px, height_px, pixels, answer });
+            self.live.publish_answer(key, LiveFrame { width_px, height_px, pixels, answer }, now);
         } else {
-            self.live.publish_refusal(key, answer);
+            self.live.publish_refusal(key, answer, now);
         }
     }
 }

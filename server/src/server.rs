@@ -117,6 +117,7 @@ impl Server {
             jobs: teaching.jobs,
             gatherer: teaching.gatherer,
             ros2: ros2.clone(),
+            publisher: Some(publisher.clone()),
             sessions: sessions.clone(),
             backups,
             enrolment: enrolment(certificates.as_ref(), bus.endpoint()),

@@ -22,7 +22,12 @@ async fn changes_have_their_maker_and_survive_a_kill() {
     kim.upload_view("hall", "poster", picture(1), LandmarkRegion::WholeImage).await.expect("view");
     assert!(kim.add_landmark("hall", "poster", None, None).await.is_err(), "there is one already");
     let job = kim.learn_landmark("hall", "poster", None).await.expect("a job");
+    assert_eq!((job.by.as_str(), job.ended_ms), ("kim", None));
+    let id = job.id;
     kim.wait_for_job(job, SOON, |_| ()).await.expect("learnt");
+    let learnt = maps.job(id).await.expect("the job");
+    let (Some(started), Some(ended)) = (learnt.started_ms, learnt.ended_ms) else { panic!("{learnt:?}") };
+    assert!(learnt.by == "kim" && learnt.created_ms <= started && started <= ended, "{learnt:?}");
     let of = async |query: AuditQuery| {
         let page = server.maps().audit(&query).await.expect("the log");
         page.items.into_iter().map(|entry| (entry.actor, entry.action)).collect::<Vec<_>>()
@@ -31,6 +36,7 @@ async fn changes_have_their_maker_and_survive_a_kill() {
     assert_eq!(
         of(AuditQuery { actor: Some("kim".into()), ..AuditQuery::default() }).await,
         [
+            entry("kim", "learn"),
             entry("kim", "POST /maps/{map}/landmarks/{landmark}/learn"),
             entry("kim", "POST /maps/{map}/landmarks/{landmark}/views"),
             entry("kim", "POST /maps/{map}/landmarks"),
@@ -38,7 +44,7 @@ async fn changes_have_their_maker_and_survive_a_kill() {
     );
     assert_eq!(
         of(AuditQuery { target: Some("/jobs/".into()), ..AuditQuery::default() }).await[0],
-        entry("server", "learn")
+        entry("kim", "learn")
     );
     let noted = maps.check_audit(None).await.expect("a check");
     assert_eq!(noted.fault, None);

@@ -3,7 +3,7 @@
 
 use client::{
     RobotClient,
-    api::{LandmarkPatch, NewMap, Place, ReplayedPose},
+    api::{LandmarkPatch, NewMap, PageQuery, Place, ReplayedPose},
     v1,
 };
 use server::config::Limits;
@@ -46,6 +46,10 @@ async fn a_draft_is_tried_with_the_frames_of_a_robot_that_does_not_see_it() {
     };
     let patch = LandmarkPatch { place: Some(Some(aside)), ..LandmarkPatch::default() };
     maps.update_landmark(DRAFT, "poster-0", &patch).await.expect("moved");
+    let shown = maps.draft_difference(MAP, DRAFT, &PageQuery::default()).await.expect("a difference");
+    let [poster] = shown.landmarks.items.as_slice() else { panic!("{shown:?}") };
+    let places = [poster.before, poster.after].map(|side| side.and_then(|side| side.place));
+    assert_eq!((poster.fields.as_slice(), places), (&["place".to_owned()][..], [Some(here), Some(aside)]));
     let before = told(&robot, &readings).await;
     assert_eq!(before.map, MAP);
     let moved = eventually("the draft's version", async || {

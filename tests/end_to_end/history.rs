@@ -3,7 +3,9 @@
 
 use client::{
     ClientError, LandmarkRegion, MapClient,
-    api::{ChangeKind, DifferenceQuery, Landmark, NewMap, NewToken, PageQuery, Place, Role, Size},
+    api::{
+        ChangeKind, DifferenceQuery, Landmark, NewMap, NewToken, PageQuery, Place, Role, Size, SizeAndPlace,
+    },
 };
 use server::config::Limits;
 use std::time::Duration;
@@ -84,6 +86,10 @@ async fn a_wrong_view_is_undone_with_all_that_followed_from_it() {
     assert_eq!(all, [("atlas", changed), ("birch", changed), ("comet", removed)]);
     assert!(first.landmarks.items[0].views_added == 1 && rest[0].model_changed && rest[0].views_added == 0);
 
+    let x_m = |side: Option<SizeAndPlace>| side.map(|side| side.place.map(|place| place.x_m));
+    let shown: Vec<_> = rest.iter().map(|l| [x_m(l.before), x_m(l.after)]).collect();
+    assert_eq!(shown, [[Some(Some(2.0)), Some(Some(2.0))], [Some(Some(4.0)), None]]);
+    assert_eq!(rest[1].before.and_then(|side| side.size), Some(Size { width_m: 0.8, height_m: 0.6 }));
     let commits = maps.commits(MAP, &PageQuery::default()).await.expect("commits").items;
     let told: Vec<_> =
         commits.iter().take(3).map(|c| (c.author.as_str(), c.operation.as_str(), c.why.as_deref())).collect();

@@ -34,6 +34,7 @@ mod promises;
 mod recordings;
 mod repeated_creations;
 mod restart;
+mod robot_activity;
 mod ros2_robots;
 mod several_maps;
 mod stored_answers;

@@ -24,8 +24,10 @@ async fn the_picture_under_a_map_is_kept_with_it() {
     let maps = inside.maps();
     hall(&maps).await;
     assert_eq!(code(maps.underlay("hall").await), "unknown_underlay");
+    assert!(!maps.maps().await.expect("maps")[0].has_underlay);
     let place = UnderlayPlace { metres_per_pixel: 0.05, x_m: -1.5, y_m: 2.0, theta_rad: 0.1 };
     let set = maps.set_underlay("hall", picture(1), &place).await.expect("underlay");
+    assert!(maps.map("hall").await.expect("map").has_underlay);
     assert_eq!((set.place, set.width_px, set.height_px), (place, 160, 120));
     assert_eq!(maps.underlay("hall").await.expect("underlay"), set);
     assert_eq!(maps.underlay_image("hall").await.expect("image"), picture(1));

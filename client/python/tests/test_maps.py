@@ -211,12 +211,12 @@ def test_refused_photographs_say_what_to_do(server: Server) -> None:
 
 
 def test_jobs_that_do_not_end_well_are_errors(server: Server) -> None:
-    failed = Job(3, "learn", "hall", "failed", 0.5, "the disk is full")
+    failed = Job(3, "learn", "hall", "failed", 0.5, "the disk is full", "kim", 1)
     with pytest.raises(JobFailed, match="the disk is full"):
         job_ended(failed)
     with server.maps() as maps:
         hall(maps, "slow")
-        running = Job(3, "learn", "slow", "running", 0.5, "")
+        running = Job(3, "learn", "slow", "running", 0.5, "", "kim", 1)
         with pytest.raises(JobTimeout):
             maps.wait_for_job(running, 0.0)
 

@@ -3,18 +3,20 @@
 use super::{map_client::MapClient, operation::operations};
 use crate::ClientError;
 use protos::api::{
-    CorrectionsBody, ListQuery, Page, RelocalisationStatus, Robot, RobotAssignment, Ros2Status,
-    TrajectoriesBody,
+    CorrectionsBody, ListQuery, Page, PoseByHand, RelocalisationStatus, Robot, RobotAssignment, RobotPose,
+    Ros2Status, TrajectoriesBody, UnknownRobots,
 };
 
 operations! {
     PUT: PUT "/robots/{robot}" => put_robot,
     LIST: GET "/robots" => robots,
     GET: GET "/robots/{robot}" => robot,
+    SET_POSE: PUT "/robots/{robot}/pose" => set_robot_pose,
     DELETE: DELETE "/robots/{robot}" => delete_robot,
     CORRECTIONS: GET "/robots/{robot}/corrections" => corrections,
     RELOCALISATION: GET "/robots/{robot}/relocalisation" => relocalisation,
     ROS2: GET "/robots/{robot}/ros2" => ros2_status,
+    UNKNOWN: GET "/unknown-robots" => unknown_robots,
     TRAJECTORIES: GET "/robots/{robot}/trajectories" => trajectories,
 }
 
@@ -38,6 +40,16 @@ impl MapClient {
     /// One robot: whether it is connected, its pose and how old that is, and whether a second program uses its name.
     pub async fn robot(&self, robot: &str) -> Result<Robot, ClientError> {
         self.send(self.ask(&GET, &[&robot])?).await
+    }
+
+    /// Robots that send messages and are refused because they are not registered.
+    pub async fn unknown_robots(&self) -> Result<UnknownRobots, ClientError> {
+        self.send(self.ask(&UNKNOWN, &[])?).await
+    }
+
+    /// Puts a robot where a person says it is. It has to send odometry; the pose is unsupported until a landmark agrees.
+    pub async fn set_robot_pose(&self, robot: &str, pose: &PoseByHand) -> Result<RobotPose, ClientError> {
+        self.send(self.ask(&SET_POSE, &[&robot])?.json(pose)).await
     }
 
     /// Deletes a robot; its frames are rejected from now on.

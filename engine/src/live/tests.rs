@@ -19,11 +19,11 @@ fn frame(seq: u64) -> LiveFrame {
 fn the_camera_with_the_oldest_frame_is_replaced() {
     let hub = LiveHub::default();
     for c in 0..MAX_CAMERAS {
-        hub.publish_answer(&key(c), frame(1));
+        hub.publish_answer(&key(c), frame(1), Instant::now());
     }
-    hub.publish_answer(&key(0), frame(2));
+    hub.publish_answer(&key(0), frame(2), Instant::now());
     assert_eq!(hub.cameras(&name("r1")).len(), MAX_CAMERAS);
-    hub.publish_answer(&key(MAX_CAMERAS), frame(1));
+    hub.publish_answer(&key(MAX_CAMERAS), frame(1), Instant::now());
     assert_eq!(hub.cameras(&name("r1")).len(), MAX_CAMERAS);
     assert!(hub.frame(&name("r1"), &name("c1")).is_none());
     assert_eq!(hub.frame(&name("r1"), &name("c0")).unwrap().answer.seq, 2);
@@ -69,7 +69,7 @@ fn raw_colour_becomes_png_of_the_same_colours() {
 fn events_read_as_the_page_expects() {
     let hub = LiveHub::default();
     let mut events = hub.events();
-    hub.publish_answer(&key(0), frame(7));
+    hub.publish_answer(&key(0), frame(7), Instant::now());
     hub.odometry(&name("r1"), "hall", Pose2::new(1.0, 2.0, 0.5));
     hub.presence(&name("r1"), Some("hall".into()), true);
     let event = events.try_recv().unwrap();

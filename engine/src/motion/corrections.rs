@@ -15,13 +15,13 @@ pub struct Correction {
     pub captured_ns: i64,
     /// The map it is a pose in.
     pub map: String,
-    /// `landmarks` (named without the pose), `guided` (landmarks named by the pose), `laser` or `relocalisation`; `map_change`
-    /// when the robot came from another map.
+    /// `landmarks` (named without the pose), `guided` (landmarks named by the pose), `laser` or `relocalisation`; `by_hand` when
+    /// a person said where it is; `map_change` when the robot came from another map.
     pub modality: &'static str,
     /// Names of the landmarks it rests on; empty for the laser.
     pub landmarks: Vec<String>,
     /// `started` (it gave the first pose), `applied`, `gated_out` (it contradicts the pose and was left out), `reset` (the
-    /// last of several that contradict the pose and agree with one another: it replaced the pose), `excluded_by_mode` (it
+    /// last of several that contradict the pose and agree with one another, or a person: it replaced the pose), `excluded_by_mode` (it
     /// agrees, but reference runs have shown another modality to be better here, and the map's fusion mode leaves this one
     /// out), `too_old`, `waiting` (newer than the last odometry), `carried_over` (the pose on another map, in the frame of
     /// this one).
@@ -48,7 +48,7 @@ pub(super) struct CorrectionLog {
 /// The log, for readers.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Corrections {
-    /// What the pose rests on now: `odometry`, `landmarks`, `guided`, `laser`, `relocalisation`; empty without a pose.
+    /// What the pose rests on now: `odometry`, `landmarks`, `guided`, `laser`, `relocalisation`, `by_hand`; empty without a pose.
     pub modalities: Vec<String>,
     /// For each modality how many fixes had which outcome. For the laser also why scans gave no fix: `no_pose` (there is
     /// none to correct), `no_walls` (the map has none), `few_points`, `poor_match` (it shows something else than the map),
@@ -73,6 +73,14 @@ impl CorrectionLog {
         }
         self.taken += 1;
         latest.push_back((self.taken, correction));
+    }
+
+    /// Notes by how much the last correction of a modality moved the pose.
+    pub(super) fn moved(&mut self, modality: &'static str, step: Option<Pose2>) {
+        let Some((_, last)) = self.latest.get_mut(modality).and_then(VecDeque::back_mut) else { return };
+        last.along_m = step.map(|s| s.x_m);
+        last.across_m = step.map(|s| s.y_m);
+        last.turn_rad = step.map(|s| s.theta_rad);
     }
 
     /// Everything, in the order of arrival.

@@ -5,7 +5,7 @@
 //! [`MotionTracker::start_from_hypothesis`] and [`MotionTracker::update_landmark_health`]. [`map::guided::Schedule`] decides in
 //! which role a fix goes to the fusion: landmarks that the prior pose named correct it and do nothing else.
 
-use super::{MotionTracker, lock_robot, robot::RobotState, timebase::Stream};
+use super::{MAX_POSE_AGE, MotionTracker, lock_robot, robot::RobotState, timebase::Stream};
 use map::{
     fuse::{FixRole, FusedPose},
     guided::{Decision, FramePlan, FrameReport},
@@ -14,7 +14,10 @@ use map::{
     pose2::{Pose2, Pose2Covariance},
 };
 use protos::{CheckedFrame, Name, v1};
-use std::time::Instant;
+use std::{
+    sync::{Arc, Mutex},
+    time::Instant,
+};
 use vision::model::LandmarkId;
 
 /// Identifies a frame of a robot.
@@ -124,6 +127,9 @@ impl MotionTracker {
         let state = self.robot_state(robot, at.map, at.epoch)?;
         let mut state = lock_robot(&state);
         self.catch_up(&mut state, at);
+        if state.is_before_by_hand(at.captured_ns) {
+            return None;
+        }
         let motion = state.since_last_frame(at.odometry);
         let camera = state.camera_number(camera);
         let decision = state.schedule.finish(&FrameReport {
@@ -170,6 +176,40 @@ impl MotionTracker {
         let stated = state.state_pose(fused, at.now);
         drop(state);
         self.announce(robot, at.map, at.epoch, stated)
+    }
+
+    /// Whether a robot on this map says how it moves: its newest odometry is not older than [`MAX_POSE_AGE`].
+    pub fn hears_odometry(&self, robot: &Name, map: &str, now: Instant) -> bool {
+        self.moving(robot, map, now).is_some()
+    }
+
+    /// Puts a robot where a person says it is, and gives its pose to publish. It is unsupported until a landmark agrees with
+    /// it. `None` if no odometry of the robot on this map is heard: nothing would carry the pose on.
+    pub fn set_pose_by_hand(
+        &self,
+        robot: &Name,
+        map: &str,
+        pose: &Pose2Covariance,
+        now: Instant,
+    ) -> Option<v1::RobotPose> {
+        let (epoch, state) = self.moving(robot, map, now)?;
+        let mut state = lock_robot(&state);
+        let fused = state.start_by_hand(pose)?;
+        let stated = state.state_pose(fused, now);
+        drop(state);
+        self.announce(robot, map, epoch, stated)
+    }
+
+    /// The live epoch and the state of a robot whose odometry is heard.
+    fn moving(&self, robot: &Name, map: &str, now: Instant) -> Option<(u64, Arc<Mutex<RobotState>>)> {
+        let epoch = self.epochs.current(robot)?;
+        let shared = self.robot_state(robot, map, epoch)?;
+        let mut state = lock_robot(&shared);
+        state.switch_epoch_or_map(epoch, map, &self.snapshots);
+        let (at_ns, _) = state.newest?;
+        let is_heard = state.age(at_ns, now) <= MAX_POSE_AGE;
+        drop(state);
+        is_heard.then_some((epoch, shared))
     }
 
     /// Updates the health of landmarks by a frame's checks against this prior pose. Gives the changes to be stored.

@@ -1,6 +1,7 @@
 //! The state of one robot: its clock, its fused pose and what that rests on, the health monitor of its landmarks. A new epoch
 //! resets the state; `epochs.rs` decides which epoch is live.
 
+mod given_pose;
 mod trust;
 pub(super) use trust::StatedPose;
 
@@ -56,8 +57,10 @@ pub(super) struct RobotState {
     landmarks_at_m: Option<f64>,
     guided_at_m: Option<f64>,
     laser_at_m: Option<f64>,
-    /// The pose started from the last hypothesis, and no global fix has confirmed it yet.
-    from_hypothesis: bool,
+    /// Who gave the pose as a whole, while no global fix has confirmed it yet.
+    given_by: Option<&'static str>,
+    /// Capture time of the odometry at which a person last gave the pose, ns.
+    by_hand_ns: Option<i64>,
     /// The landmarks that the pose rests on.
     pub(super) supporting_landmarks: Vec<LandmarkId>,
     /// Health of the landmarks by this robot's frames...
@@ -94,7 +97,8 @@ impl Default for RobotState {
             landmarks_at_m: None,
             guided_at_m: None,
             laser_at_m: None,
-            from_hypothesis: false,
+            given_by: None,
+            by_hand_ns: None,
             supporting_landmarks: Vec::new(),
             health_monitor: HealthMonitor::new(HealthParams::default()),
             pending_changes: Vec::new(),
@@ -139,6 +143,7 @@ impl RobotState {
         let moved_at = self.moved_at.take();
         self.invalidate_odometry();
         self.pending_changes.clear();
+        self.by_hand_ns = None;
         if let (Some(pose), Some((at_ns, odometry)), Some(moved_at)) = (converted, newest, moved_at) {
             self.apply_odometry(at_ns, odometry, moved_at);
             self.start_filter(at_ns, &pose, ("map_change", "carried_over"), Vec::new());
@@ -176,7 +181,7 @@ impl RobotState {
     }
 
     fn clock_set(&mut self, captured_ns: i64, odometry: Option<Pose2>, received: Instant) {
-        self.last_message = None;
+        (self.last_message, self.by_hand_ns) = (None, None);
         if let Some(recording) = &mut self.recording {
             recording.end("the robot's clock was set");
         }
@@ -355,32 +360,6 @@ impl RobotState {
         };
         let fused = if self.newest.is_some() { after? } else { alone };
         Some((result, fused))
-    }
-
-    /// Starts the filter from the pose of a hypothesis at a frame, if there is no pose yet.
-    pub(super) fn start_from_hypothesis(
-        &mut self,
-        captured_ns: i64,
-        odometry: &Pose2,
-        pose: &Pose2Covariance,
-        (landmarks, names): (&[LandmarkId], Vec<String>),
-        now: Instant,
-    ) -> Option<FusedPose> {
-        if self.fuser.pose().is_some() {
-            return None;
-        }
-        self.apply_odometry(captured_ns, *odometry, now);
-        // The fuser starts at the newest odometry; the frame is older.
-        let motion = odometry.between(&self.newest?.1);
-        let covariance = FuseParams::default().motion_noise(&motion);
-        let at_newest = pose.compose(&Pose2Covariance { pose: motion, covariance });
-        self.invalidate_pose();
-        if !self.start_filter(captured_ns, &at_newest, ("relocalisation", "started"), names) {
-            return None;
-        }
-        self.schedule.relocalised(landmarks);
-        self.from_hypothesis = true;
-        self.fuser.pose()
     }
 
     /// Odometry alone on the map; the first fused pose puts it there.

@@ -18,6 +18,7 @@ use sim::{
 use std::sync::LazyLock;
 use vision::model::LandmarkId;
 
+mod by_hand;
 mod guided;
 mod recordings;
 mod stamps;

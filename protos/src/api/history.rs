@@ -1,6 +1,6 @@
 //! `/maps/{map}/commits`, `/difference`, `/rollback`: maps as versions.
 
-use super::Page;
+use super::{Page, Place, Size};
 use serde::{Deserialize, Serialize};
 
 /// A commit: what one request or job changed of a map.
@@ -74,8 +74,18 @@ pub struct Difference {
     pub landmarks: Page<LandmarkDifference>,
 }
 
+/// Size and place of a landmark, as far as they are known.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct SizeAndPlace {
+    /// Its size.
+    pub size: Option<Size>,
+    /// Where it is, in the map.
+    pub place: Option<Place>,
+}
+
 /// How a landmark differs.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct LandmarkDifference {
     /// Its name after the change, or before it if it is gone.
@@ -86,6 +96,10 @@ pub struct LandmarkDifference {
     pub change: ChangeKind,
     /// Of one that stays: name, size, place.
     pub fields: Vec<String>,
+    /// Its size and place before; absent if it is new.
+    pub before: Option<SizeAndPlace>,
+    /// Its size and place after; absent if it is gone.
+    pub after: Option<SizeAndPlace>,
     /// Training views that are new.
     pub views_added: u64,
     /// Training views that are gone.

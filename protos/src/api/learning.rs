@@ -93,4 +93,14 @@ pub struct Job {
     pub message: String,
     /// What came of it.
     pub result: Option<Value>,
+    /// Name of the token that asked for it; `server` for what the server does by itself.
+    #[serde(default)]
+    pub by: String,
+    /// When it was asked for, ms since the Unix epoch.
+    #[serde(default)]
+    pub created_ms: i64,
+    /// When it was begun last; absent while it waits, and for jobs of earlier builds.
+    pub started_ms: Option<i64>,
+    /// When it ended.
+    pub ended_ms: Option<i64>,
 }

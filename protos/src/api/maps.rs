@@ -51,6 +51,9 @@ pub struct Map {
     pub revision: String,
     /// Landmarks in it, learnt or not.
     pub landmarks: u64,
+    /// A picture is shown under it: `GET /maps/{map}/underlay`.
+    #[serde(default)]
+    pub has_underlay: bool,
     /// Which distance decides.
     pub distance: Distance,
     /// The map that it is a draft of.

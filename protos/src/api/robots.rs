@@ -1,5 +1,6 @@
 //! `/robots`: robots, their poses, and what became of their fixes.
 
+use super::RobotActivity;
 use crate::v1;
 use serde::{
     Deserialize, Deserializer, Serialize,
@@ -23,6 +24,8 @@ pub struct Robot {
     pub conflict: Option<EpochConflictBody>,
     /// Its fused pose; absent if it is unknown, or nothing newer than 2 s supports it.
     pub pose: Option<RobotPose>,
+    /// What it has done since the server started; absent before its first message.
+    pub activity: Option<RobotActivity>,
 }
 
 /// A second epoch speaks under the name of a robot while the first is live.
@@ -103,6 +106,45 @@ pub struct RobotAssignment {
     pub map: String,
 }
 
+/// Where a person says that a robot is.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+#[serde(deny_unknown_fields)]
+pub struct PoseByHand {
+    /// Metres, in the robot's map.
+    pub x_m: f64,
+    /// Metres, in the robot's map.
+    pub y_m: f64,
+    /// Heading in the map, -2 pi to 2 pi.
+    pub theta_rad: f64,
+    /// Standard deviation of each coordinate; 0.5 by default, 0.01 to 10.
+    #[serde(default = "sigma_m")]
+    pub sigma_m: f64,
+    /// Standard deviation of the heading; 0.35 by default, 0.01 to 3.15.
+    #[serde(default = "sigma_rad")]
+    pub sigma_rad: f64,
+}
+
+fn sigma_m() -> f64 {
+    PoseByHand::SIGMA_M
+}
+
+fn sigma_rad() -> f64 {
+    PoseByHand::SIGMA_RAD
+}
+
+impl PoseByHand {
+    /// Standard deviation of a coordinate if nothing is said: a person who points at a map.
+    pub const SIGMA_M: f64 = 0.5;
+    /// That of the heading: 20 degrees.
+    pub const SIGMA_RAD: f64 = 0.35;
+
+    /// A pose as exactly as a person says it without more words.
+    pub fn new(x_m: f64, y_m: f64, theta_rad: f64) -> Self {
+        Self { x_m, y_m, theta_rad, sigma_m: Self::SIGMA_M, sigma_rad: Self::SIGMA_RAD }
+    }
+}
+
 /// A fix, what became of it, and by how much it moved the pose.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
@@ -113,13 +155,13 @@ pub struct CorrectionBody {
     pub captured_ns: i64,
     /// The map it is a pose in.
     pub map: String,
-    /// `landmarks` (named without the pose), `guided` (landmarks named by the pose), `laser` or `relocalisation`; `map_change`
-    /// when the robot came from another map.
+    /// `landmarks` (named without the pose), `guided` (landmarks named by the pose), `laser` or `relocalisation`; `by_hand` when
+    /// a person said where it is; `map_change` when the robot came from another map.
     pub modality: String,
     /// The landmarks it rests on, by name; empty for the laser.
     pub landmarks: Vec<String>,
     /// `started` (it gave the first pose), `applied`, `gated_out` (it contradicts the pose and was left out), `reset` (the
-    /// last of several that contradict the pose and agree with one another: it replaced the pose), `excluded_by_mode` (it
+    /// last of several that contradict the pose and agree with one another, or a person: it replaced the pose), `excluded_by_mode` (it
     /// agrees, but reference runs have shown another modality to be better here, and the map's fusion mode leaves this one
     /// out), `too_old`, `waiting` (newer than the last odometry), `carried_over` (the pose on another map, in the frame of
     /// this one).
@@ -139,7 +181,7 @@ pub struct CorrectionBody {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct CorrectionsBody {
-    /// What the pose rests on now: `odometry`, `landmarks`, `guided`, `laser`, `relocalisation`; empty without a pose.
+    /// What the pose rests on now: `odometry`, `landmarks`, `guided`, `laser`, `relocalisation`, `by_hand`; empty without a pose.
     pub modalities: Vec<String>,
     /// For each modality how many fixes came to which end. For the laser also why scans gave no fix: `no_pose` (there is
     /// none to correct), `no_walls` (the map has none), `few_points`, `poor_match` (it shows something else than the

@@ -118,7 +118,7 @@ pub(crate) fn take_frame(to: &Receivers, outbox: &Outbox, kind: FrameKind, slot:
     if let Err(answer) = received.unwrap_or_else(|| Err(internal(kind, message))) {
         tracing::debug!(?slot, rejection = ?answer.rejection, "frame_refused");
         outbox.answer(slot, &answer);
-        to.live.publish_refusal(slot, answer.into());
+        to.live.publish_refusal(slot, answer.into(), Instant::now());
     }
 }
 

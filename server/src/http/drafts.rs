@@ -5,14 +5,13 @@ use super::{
     answers::created,
     error::ApiError,
     extract::{Body, PathParams, QueryParams, after_number, name, page_limit},
-    history::{landmark, newest, page_of},
+    history::{newest, page_of},
     revision::IfMatch,
 };
 use crate::store::{
     StoreError,
     drafts::{self, DraftRow},
-    history::{self, LandmarkChange},
-    maps,
+    history, maps,
 };
 use axum::{Json, extract::State, http::StatusCode};
 use protos::api::{Draft, DraftDifference, NewDraft, Page, PageQuery, Problem, RollbackOutcome};
@@ -96,16 +95,12 @@ async fn difference(
     let summary = history::summary(&mut conn, &of, i64::MAX).await?;
     let total = of.landmarks.len() as u64;
     let rows = of.landmarks.into_iter().filter(|(id, _)| *id > after).take(limit + 1).collect();
-    let item = |(_, change): (i64, LandmarkChange)| {
-        let name = change.names[1].clone().unwrap_or_default();
-        landmark(change, name)
-    };
     Ok(Json(DraftDifference {
         from_commit: found.from_commit as u64,
         conflicts: found.conflicts,
         summary,
         walls: of.walls,
-        landmarks: page_of(rows, limit, total, item),
+        landmarks: page_of(rows, limit, total),
     }))
 }
 

@@ -108,14 +108,11 @@ async fn difference(
         return Err(ApiError::invalid("out_of_range", "to", "the later commit has the greater number"));
     }
     let found = history::between(&mut reading, map, (from, to)).await?;
-    let rows: Vec<(i64, LandmarkChange)> =
-        found.landmarks.iter().filter(|(id, _)| **id > after).map(|(id, c)| (*id, c.clone())).collect();
-    let ids: Vec<i64> = rows.iter().take(limit).map(|(id, _)| *id).collect();
-    let mut names = history::names_at(&mut reading, &found, &ids, to).await?.into_iter();
-    let rows = rows.into_iter().take(limit + 1).collect();
+    let later = found.landmarks.iter().filter(|(id, _)| **id > after).take(limit + 1);
+    let mut rows: Vec<(i64, LandmarkChange)> = later.map(|(id, change)| (*id, change.clone())).collect();
+    history::fill_unchanged(&mut reading, &mut rows, to).await?;
     let total = found.landmarks.len() as u64;
-    let item = |(_, change): (i64, LandmarkChange)| landmark(change, names.next().unwrap_or_default());
-    let landmarks = page_of(rows, limit, total, item);
+    let landmarks = page_of(rows, limit, total);
     let summary = history::summary(&mut reading, &found, to).await?;
     let (from_commit, to_commit) = (from as u64, to as u64);
     Ok(Json(Difference { from_commit, to_commit, summary, walls: found.walls, landmarks }))
@@ -125,14 +122,13 @@ pub(super) fn page_of(
     rows: Vec<(i64, LandmarkChange)>,
     limit: usize,
     total: u64,
-    mut item: impl FnMut((i64, LandmarkChange)) -> LandmarkDifference,
 ) -> Page<LandmarkDifference> {
-    let Page { items, next, total } = page(rows, limit, total, |(id, _)| id.to_string(), |row| row);
-    Page { items: items.into_iter().map(&mut item).collect(), next, total }
+    page(rows, limit, total, |(id, _)| id.to_string(), |(_, change)| landmark(change))
 }
 
-pub(super) fn landmark(change: LandmarkChange, name: String) -> LandmarkDifference {
-    let LandmarkChange { present, names: [old, _], fields, views, model } = change;
+fn landmark(change: LandmarkChange) -> LandmarkDifference {
+    let name = change.name().to_owned();
+    let LandmarkChange { present, names: [old, _], geometry: [before, after], fields, views, model } = change;
     LandmarkDifference {
         old_name: old.filter(|old| *old != name),
         name,
@@ -141,6 +137,8 @@ pub(super) fn landmark(change: LandmarkChange, name: String) -> LandmarkDifferen
             [true, false] => ChangeKind::Removed,
             [true, true] => ChangeKind::Changed,
         },
+        before,
+        after,
         fields: fields.into_iter().map(str::to_owned).collect(),
         views_added: views[0],
         views_removed: views[1],

@@ -26,6 +26,7 @@ use nalgebra::Vector3;
 use protos::api::{
     FailedGate, Landmark, LandmarkHealthBody, LandmarkModelBody, LandmarkPatch, LandmarkQuery,
     LandmarkStatus, ListOrder, ListQuery, LookAlikeBody, NewLandmark, Page, Place, PlaceSigma, Problem, Size,
+    SizeAndPlace,
 };
 use serde_json::{Map, Value, json};
 use utoipa_axum::{router::OpenApiRouter, routes};
@@ -156,8 +157,8 @@ fn landmark_shown(row: LandmarkRow, context: &Context<'_>) -> Landmark {
         Some(_) if is_active => LandmarkStatus::Active,
         Some(_) => LandmarkStatus::Inactive,
     };
-    let LandmarkGeometry { size, place, .. } = row.geometry;
-    let sigma = place.and_then(|p| p.covariance).map(|c| c.diagonal().map(f64::sqrt));
+    let SizeAndPlace { size, place } = row.geometry.shown();
+    let sigma = row.geometry.place.and_then(|p| p.covariance).map(|c| c.diagonal().map(f64::sqrt));
     Landmark {
         health: health_shown(row.health),
         finding: row.finding.and_then(|f| serde_json::from_str(&f).ok()),
@@ -166,15 +167,8 @@ fn landmark_shown(row: LandmarkRow, context: &Context<'_>) -> Landmark {
         status,
         failed_gates,
         views: row.views,
-        size: size.map(|s| Size { width_m: s.width_m, height_m: s.height_m }),
-        place: place.map(|p| Place {
-            x_m: p.x_m,
-            y_m: p.y_m,
-            z_m: p.z_m,
-            theta_rad: p.theta_rad,
-            roll_rad: p.roll_rad,
-            tilt_rad: p.tilt_rad,
-        }),
+        size,
+        place,
         place_sigma: sigma.map(|s| PlaceSigma {
             x_m: s[0],
             y_m: s[1],

@@ -51,6 +51,10 @@ pub(super) fn job_shown(row: JobRow, progress: Option<&JobProgress>) -> Job {
         progress: progress.map_or(if state == JobState::Done { 1.0 } else { 0.0 }, |p| p.share),
         message: progress.map_or(row.message, |p| p.message.clone()),
         result: row.result.and_then(|text| serde_json::from_str(&text).ok()),
+        by: row.author,
+        created_ms: row.created_ms,
+        started_ms: row.started_ms,
+        ended_ms: row.ended_ms,
     }
 }
 

@@ -73,6 +73,7 @@ pub(super) fn map_shown(row: MapRow, found: MapLocation, principal: &Principal) 
         version: row.version,
         revision: row.revision,
         landmarks: row.landmarks,
+        has_underlay: row.has_underlay,
         distance: row.distance.into(),
         draft_of: row.draft_of,
         parent: link.as_ref().map(parent_shown),

@@ -33,6 +33,7 @@ mod maps;
 mod modalities;
 mod page_session;
 mod pages;
+mod pose_by_hand;
 mod peer;
 mod pictures;
 mod recognise;
@@ -41,6 +42,7 @@ mod relocalisation;
 mod replay;
 mod reused_answers;
 mod revision;
+mod robot_activity;
 mod robot_certificates;
 mod robots;
 mod ros2;
@@ -61,8 +63,14 @@ mod tests;
 pub(crate) use router::router;
 
 use crate::{
-    backup::Backups, config::Config, gather::Gatherer, identity::Sessions, jobs::Jobs,
-    publication::Catalogue, ros2::Ros2, store::now_ms,
+    backup::Backups,
+    config::Config,
+    gather::Gatherer,
+    identity::Sessions,
+    jobs::Jobs,
+    publication::Catalogue,
+    ros2::{Ros2, Ros2Publisher},
+    store::now_ms,
 };
 use authorise::Asker;
 use axum::http::StatusCode;
@@ -103,6 +111,8 @@ pub(crate) struct App {
     pub(crate) searches: Arc<Relocalisers>,
     /// Robots of ROS 2.
     pub(crate) ros2: Arc<Ros2>,
+    /// Where poses go that were not asked for by a message; absent without a bus.
+    pub(crate) publisher: Option<Arc<Ros2Publisher>>,
     /// Sessions of the page.
     pub(crate) sessions: Arc<Sessions>,
     /// Where the local token is, absolute.
@@ -131,6 +141,7 @@ pub(crate) struct Services {
     pub(crate) jobs: Arc<Jobs>,
     pub(crate) gatherer: Arc<Gatherer>,
     pub(crate) ros2: Arc<Ros2>,
+    pub(crate) publisher: Option<Arc<Ros2Publisher>>,
     pub(crate) sessions: Arc<Sessions>,
     pub(crate) local_token_file: Option<PathBuf>,
     pub(crate) backups: Arc<Backups>,
@@ -144,7 +155,7 @@ impl App {
     pub(crate) fn new(
         config: Arc<Config>,
         store: Catalogue,
-        Services { jobs, gatherer, ros2, sessions, local_token_file, backups, enrolment }: Services,
+        Services { jobs, gatherer, ros2, publisher, sessions, local_token_file, backups, enrolment }: Services,
         engine: &Engine,
         stopping: watch::Receiver<bool>,
     ) -> Self {
@@ -163,6 +174,7 @@ impl App {
             kept_frames,
             searches,
             ros2,
+            publisher,
             sessions,
             local_token_file,
             backups,

@@ -6,6 +6,7 @@ use super::{
     authorise::check_map,
     error::ApiError,
     extract::{Body, PathParams, QueryParams, name},
+    robot_activity::activity_shown,
     robot_certificates::access_control,
 };
 use crate::{
@@ -25,8 +26,8 @@ use map::pose2::Pose2;
 use protos::{
     Name,
     api::{
-        CorrectionBody, CorrectionsBody, EpochConflictBody, ListQuery, Page, Problem, Robot, RobotAssignment,
-        RobotPose,
+        CorrectionBody, CorrectionsBody, EpochConflictBody, ListQuery, Page, PoseTrust, Problem, Robot,
+        RobotAssignment, RobotPose,
     },
 };
 use std::{collections::BTreeMap, time::Instant};
@@ -42,18 +43,24 @@ fn robot_shown(row: RobotRow, motion: &MotionTracker, live: &LiveHub) -> Robot {
     let robot = Name::new(row.name.as_str()).ok();
     let status = robot.as_ref().map(|robot| motion.epochs().status(robot, now)).unwrap_or_default();
     let known = robot.as_ref().and_then(|robot| motion.known_pose(robot, now));
-    let pose = known.filter(|known| known.map == row.map).map(|KnownPose { fused, age, .. }| {
-        let Pose2 { x_m, y_m, theta_rad } = fused.pose.pose;
-        let covariance = row_major(&fused.pose.covariance);
-        let trust = robot.and_then(|robot| live.trust(&robot, &row.map)).unwrap_or_default().into();
-        RobotPose { x_m, y_m, theta_rad, covariance, age_ms: age.as_secs_f64() * 1e3, trust }
+    let pose = known.filter(|known| known.map == row.map).map(|known| {
+        let trust = robot.as_ref().and_then(|robot| live.trust(robot, &row.map)).unwrap_or_default().into();
+        pose_shown(&known, trust)
     });
     let conflict = status.conflict.map(|Conflict { epoch, refused, last_ms }| EpochConflictBody {
         epoch,
         refused,
         last_ms,
     });
-    Robot { name: row.name, map: row.map, alive: status.alive, epoch: status.epoch, conflict, pose }
+    let activity = robot.and_then(|robot| activity_shown(live, &robot, now));
+    Robot { name: row.name, map: row.map, alive: status.alive, epoch: status.epoch, conflict, pose, activity }
+}
+
+/// A fused pose.
+pub(super) fn pose_shown(KnownPose { fused, age, .. }: &KnownPose, trust: PoseTrust) -> RobotPose {
+    let Pose2 { x_m, y_m, theta_rad } = fused.pose.pose;
+    let covariance = row_major(&fused.pose.covariance);
+    RobotPose { x_m, y_m, theta_rad, covariance, age_ms: age.as_secs_f64() * 1e3, trust }
 }
 
 fn correction_shown(correction: Correction) -> CorrectionBody {
@@ -139,13 +146,16 @@ async fn delete(
     PathParams(robot): PathParams<String>,
 ) -> Result<StatusCode, ApiError> {
     robots::get(app.store.reads(), &robot).await?;
-    let (gone, motion) = (name("robot", robot)?, app.motion.clone());
+    let (gone, motion, live) = (name("robot", robot)?, app.motion.clone(), app.live.clone());
     let write = app.store.write(move |tx| {
         Box::pin(async move {
             robots::delete(tx, gone.as_str()).await?;
             robot_certificates::revoke_all(tx, gone.as_str()).await?;
             // A run of it that is being recorded would keep its place for ever.
-            tx.after(move || drop(motion.take_recording(&gone)));
+            tx.after(move || {
+                drop(motion.take_recording(&gone));
+                live.forget_activity(&gone);
+            });
             Ok(())
         })
     });

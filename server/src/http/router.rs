@@ -6,8 +6,8 @@ use super::{
     events,
     examples::with_examples,
     gathering, guard, health, history, landmark_models, landmarks, learning, live, localise, mapping, maps,
-    modalities, page_session, pages, recognise, reference_runs, relocalisation, replay, reused_answers,
-    revision, robot_certificates, robots, ros2,
+    modalities, page_session, pages, pose_by_hand, recognise, reference_runs, relocalisation, replay,
+    reused_answers, revision, robot_activity, robot_certificates, robots, ros2,
     security::with_security,
     stored_answers, tokens, underlay, views, visibility, visibility_settings, walls,
 };
@@ -63,6 +63,8 @@ fn api(limits: &Limits) -> OpenApiRouter<AppState> {
         .merge(localise::router(limits.upload_bytes))
         .merge(stored_answers::router())
         .merge(robots::router())
+        .merge(robot_activity::router())
+        .merge(pose_by_hand::router())
         .merge(robot_certificates::router())
         .merge(relocalisation::router())
         .merge(ros2::router())

@@ -87,6 +87,7 @@ impl Service {
                 jobs,
                 gatherer,
                 ros2: Arc::default(),
+                publisher: None,
                 sessions: Arc::default(),
                 local_token_file: Some("/data/local-token".into()),
                 backups,

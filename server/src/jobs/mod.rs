@@ -342,6 +342,7 @@ impl Jobs {
         }
         self.tell(row, JobState::Running);
         let actor = Actor {
+            name: row.author.clone(),
             job: Some((id, row.author.clone())),
             why: row.why.clone(),
             ..Actor::server(&row.kind, format!("/jobs/{id}"))

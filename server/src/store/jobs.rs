@@ -7,15 +7,15 @@ statements! {
     COUNT_OPEN = "SELECT count(*) FROM jobs WHERE state IN ('queued', 'running')";
     INSERT = "INSERT INTO jobs (kind, map, request, state, created_ms, author, why) \
               VALUES (?1, ?2, ?3, 'queued', ?4, ?5, ?6) RETURNING id";
-    GET = "SELECT id, kind, map, request, state, message, result, attempts, author, why FROM jobs WHERE id = ?1";
-    LIST = "SELECT id, kind, map, request, state, message, result, attempts, author, why FROM jobs WHERE id < ?1 \
+    GET = "SELECT id, kind, map, request, state, message, result, attempts, author, why, created_ms, started_ms, ended_ms FROM jobs WHERE id = ?1";
+    LIST = "SELECT id, kind, map, request, state, message, result, attempts, author, why, created_ms, started_ms, ended_ms FROM jobs WHERE id < ?1 \
             AND (?2 IS NULL OR state = ?2) AND (?3 IS NULL OR map IN (SELECT value FROM json_each(?3))) ORDER BY id DESC LIMIT ?4";
     COUNT = "SELECT count(*) FROM jobs WHERE (?1 IS NULL OR state = ?1) AND (?2 IS NULL OR map IN (SELECT value FROM json_each(?2)))";
-    OPEN = "SELECT id, kind, map, request, state, message, result, attempts, author, why FROM jobs \
+    OPEN = "SELECT id, kind, map, request, state, message, result, attempts, author, why, created_ms, started_ms, ended_ms FROM jobs \
             WHERE state IN ('queued', 'running') ORDER BY id";
-    BEGIN = "UPDATE jobs SET state = 'running', attempts = attempts + 1 \
+    BEGIN = "UPDATE jobs SET state = 'running', attempts = attempts + 1, started_ms = ?2 \
              WHERE id = ?1 AND state IN ('queued', 'running')";
-    PUT_BACK = "UPDATE jobs SET state = 'queued', attempts = attempts - 1 WHERE id = ?1 AND state = 'running'";
+    PUT_BACK = "UPDATE jobs SET state = 'queued', attempts = attempts - 1, started_ms = NULL WHERE id = ?1 AND state = 'running'";
     END = "UPDATE jobs SET state = ?2, message = ?3, result = ?4, ended_ms = ?5 \
            WHERE id = ?1 AND state IN ('queued', 'running')";
     RENAME_LANDMARK = "UPDATE jobs SET request = json_set(request, '$.landmarks', json((SELECT \
@@ -45,6 +45,10 @@ pub(crate) struct JobRow {
     pub(crate) author: String,
     /// The reason given then.
     pub(crate) why: Option<String>,
+    pub(crate) created_ms: i64,
+    /// When it was begun last; absent while it waits.
+    pub(crate) started_ms: Option<i64>,
+    pub(crate) ended_ms: Option<i64>,
 }
 
 /// How a job ended.
@@ -69,6 +73,9 @@ fn job_row(row: &SqliteRow) -> Result<JobRow, sqlx::Error> {
         attempts: row.try_get("attempts")?,
         author: row.try_get("author")?,
         why: row.try_get("why")?,
+        created_ms: row.try_get("created_ms")?,
+        started_ms: row.try_get("started_ms")?,
+        ended_ms: row.try_get("ended_ms")?,
     })
 }
 
@@ -92,11 +99,12 @@ pub(crate) async fn create(
         .execute(&mut tx.conn)
         .await
         .map_err(StoreError::during("delete old jobs"))?;
+    let created_ms = now_ms();
     let id = sqlx::query_scalar(INSERT)
         .bind(kind)
         .bind(map)
         .bind(request)
-        .bind(now_ms())
+        .bind(created_ms)
         .bind(&tx.author.name)
         .bind(&tx.author.why)
         .fetch_one(&mut tx.conn)
@@ -119,6 +127,9 @@ pub(crate) async fn create(
         attempts: 0,
         author: tx.author.name.clone(),
         why: tx.author.why.clone(),
+        created_ms,
+        started_ms: None,
+        ended_ms: None,
     })
 }
 
@@ -164,7 +175,7 @@ pub(crate) async fn open(db: impl SqliteExecutor<'_>) -> Result<Vec<JobRow>, Sto
 
 /// Begins with an open job and counts the attempt. False when it has ended meanwhile.
 pub(crate) async fn begin(tx: &mut Tx, id: i64) -> Result<bool, StoreError> {
-    let done = sqlx::query(BEGIN).bind(id).execute(&mut tx.conn).await;
+    let done = sqlx::query(BEGIN).bind(id).bind(now_ms()).execute(&mut tx.conn).await;
     Ok(done.map_err(StoreError::during("begin job"))?.rows_affected() == 1)
 }
 

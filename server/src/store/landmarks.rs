@@ -6,6 +6,7 @@ use map::{
     place::{LandmarkPlace, PlaceSigmas},
 };
 use nalgebra::{Matrix6, Vector3};
+use protos::api::{Place, Size, SizeAndPlace};
 use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
 use vision::{model::LandmarkId, pose::LandmarkSize};
 
@@ -61,6 +62,20 @@ pub(crate) struct LandmarkGeometry {
 }
 
 impl LandmarkGeometry {
+    /// Size and place as they are shown.
+    pub(crate) fn shown(&self) -> SizeAndPlace {
+        let size = self.size.map(|s| Size { width_m: s.width_m, height_m: s.height_m });
+        let place = self.place.map(|p| Place {
+            x_m: p.x_m,
+            y_m: p.y_m,
+            z_m: p.z_m,
+            theta_rad: p.theta_rad,
+            roll_rad: p.roll_rad,
+            tilt_rad: p.tilt_rad,
+        });
+        SizeAndPlace { size, place }
+    }
+
     /// The place with its covariance. `None` without a size, or where stored numbers are out of range.
     pub(crate) fn landmark_place(&self) -> Option<LandmarkPlace> {
         let (size, place) = self.size.zip(self.place)?;

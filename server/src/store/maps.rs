@@ -9,10 +9,12 @@ statements! {
     COUNT = "SELECT count(*) FROM maps WHERE draft_of IS NULL";
     INSERT = "INSERT INTO maps (name, distance, created_ms) VALUES (?1, ?2, ?3) RETURNING id";
     GET = "SELECT id, name, version, id || '.' || revision AS revision, changed_ms, distance, \
-           (SELECT o.name FROM maps o WHERE o.id = maps.draft_of) AS draft_of, (SELECT count(*) FROM landmarks WHERE map_id = maps.id) AS landmarks \
+           (SELECT o.name FROM maps o WHERE o.id = maps.draft_of) AS draft_of, (SELECT count(*) FROM landmarks WHERE map_id = maps.id) AS landmarks, \
+           EXISTS (SELECT 1 FROM underlays WHERE map_id = maps.id) AS has_underlay \
            FROM maps WHERE name = ?1";
     PAGE = "SELECT id, name, version, id || '.' || revision AS revision, changed_ms, distance, \
-           (SELECT o.name FROM maps o WHERE o.id = maps.draft_of) AS draft_of, (SELECT count(*) FROM landmarks WHERE map_id = maps.id) AS landmarks \
+           (SELECT o.name FROM maps o WHERE o.id = maps.draft_of) AS draft_of, (SELECT count(*) FROM landmarks WHERE map_id = maps.id) AS landmarks, \
+           EXISTS (SELECT 1 FROM underlays WHERE map_id = maps.id) AS has_underlay \
             FROM maps WHERE name > ?1 ORDER BY name LIMIT ?2";
     BUMP = "UPDATE maps SET version = version + 1 WHERE id = ?1";
     DELETE = "DELETE FROM maps WHERE id = ?1";
@@ -42,6 +44,8 @@ pub(crate) struct MapRow {
     pub(crate) draft_of: Option<String>,
     /// How many landmarks it has.
     pub(crate) landmarks: u64,
+    /// A picture is shown under it.
+    pub(crate) has_underlay: bool,
 }
 
 fn map_row(row: &SqliteRow) -> Result<MapRow, sqlx::Error> {
@@ -55,6 +59,7 @@ fn map_row(row: &SqliteRow) -> Result<MapRow, sqlx::Error> {
         distance: distance_of(&distance),
         draft_of: row.try_get("draft_of")?,
         landmarks: row.try_get::<i64, _>("landmarks")? as u64,
+        has_underlay: row.try_get("has_underlay")?,
     })
 }
 

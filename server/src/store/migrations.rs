@@ -40,6 +40,7 @@ const FILES: &[(&str, &str)] = files![
     "0031_wall_covariance",
     "0032_visibility_areas",
     "0033_drafts",
+    "0035_job_times",
 ];
 
 /// The steps in order.

@@ -10,6 +10,7 @@ statements! {
     GET = "SELECT r.name, m.name AS map FROM robots r JOIN maps m ON m.id = r.map_id WHERE r.name = ?1";
     PAGE = "SELECT r.name, m.name AS map FROM robots r JOIN maps m ON m.id = r.map_id \
             WHERE r.name > ?1 ORDER BY r.name LIMIT ?2";
+    TOUCH = "UPDATE robots SET map_id = map_id WHERE name = ?1";
     DELETE = "DELETE FROM robots WHERE name = ?1";
 }
 
@@ -60,6 +61,13 @@ pub(crate) async fn page(
     let rows = sqlx::query(PAGE).bind(after).bind(limit as i64).fetch_all(db).await;
     let rows = rows.map_err(StoreError::during("list robots"))?;
     rows.iter().map(robot_row).collect::<Result<_, _>>().map_err(StoreError::during("list robots"))
+}
+
+/// Notes in the audit log that a person says where a robot is. Poses are not stored: the row stays as it is.
+pub(crate) async fn note_pose(tx: &mut Tx, name: &str) -> Result<(), StoreError> {
+    get(&mut tx.conn, name).await?;
+    sqlx::query(TOUCH).bind(name).execute(&mut tx.conn).await.map_err(StoreError::during("note a pose"))?;
+    Ok(())
 }
 
 /// Deletes a robot.

@@ -114,6 +114,8 @@ OPERATIONS: dict[str, tuple[str, str]] = {
     "put_robot": ("PUT", "/robots/{robot}"),
     "robots": ("GET", "/robots"),
     "robot": ("GET", "/robots/{robot}"),
+    "set_robot_pose": ("PUT", "/robots/{robot}/pose"),
+    "unknown_robots": ("GET", "/unknown-robots"),
     "delete_robot": ("DELETE", "/robots/{robot}"),
     "corrections": ("GET", "/robots/{robot}/corrections"),
     "relocalisation": ("GET", "/robots/{robot}/relocalisation"),

@@ -25,7 +25,7 @@ impl RobotState {
     /// The pose was wrong or is unknown: forgets its support, and withdraws the health changes that rest on it.
     pub(super) fn invalidate_pose(&mut self) {
         (self.landmarks_at_m, self.guided_at_m, self.laser_at_m) = (None, None, None);
-        self.from_hypothesis = false;
+        self.given_by = None;
         self.supporting_landmarks.clear();
         let cleared = self.health_monitor.clear();
         self.pending_changes.extend(cleared);
@@ -93,7 +93,7 @@ impl RobotState {
             FixSource::Landmarks if role == FixRole::Guided => self.guided_at_m = Some(self.distance_m),
             FixSource::Landmarks => {
                 self.landmarks_at_m = Some(self.distance_m);
-                self.from_hypothesis = false;
+                self.given_by = None;
                 self.supporting_landmarks.retain(|id| !fix.landmarks.contains(id));
                 self.supporting_landmarks.extend(&fix.landmarks);
                 let excess = self.supporting_landmarks.len().saturating_sub(MAX_SUPPORTING_LANDMARKS);
@@ -111,8 +111,9 @@ impl RobotState {
             ("landmarks", is_recent(self.landmarks_at_m)),
             (GUIDED, is_recent(self.guided_at_m)),
             ("laser", is_recent(self.laser_at_m)),
-            ("relocalisation", self.from_hypothesis),
         ];
-        all.into_iter().filter(|(_, rests)| *rests).map(|(word, _)| word.to_owned()).collect()
+        let given_by = self.given_by.into_iter();
+        let resting = all.into_iter().filter(|(_, rests)| *rests).map(|(word, _)| word);
+        resting.chain(given_by).map(str::to_owned).collect()
     }
 }

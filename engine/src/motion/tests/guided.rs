@@ -13,20 +13,20 @@ fn of(landmark: LandmarkId, x_m: f64) -> Fix {
 }
 
 /// A robot whose x is 7 m more than its odometry says.
-struct Robot {
-    motion: MotionTracker,
-    r1: Name,
-    seconds: u64,
+pub(super) struct Robot {
+    pub(super) motion: MotionTracker,
+    pub(super) r1: Name,
+    pub(super) seconds: u64,
 }
 
 impl Robot {
-    fn new() -> Self {
+    pub(super) fn new() -> Self {
         let (motion, r1) = motion();
         Self { motion, r1, seconds: 0 }
     }
 
     /// One second and half a metre later, a frame with these fixes.
-    fn frame(&mut self, independent: Option<&Fix>, guided: Option<&Fix>) -> Option<v1::RobotPose> {
+    pub(super) fn frame(&mut self, independent: Option<&Fix>, guided: Option<&Fix>) -> Option<v1::RobotPose> {
         self.seconds += 1;
         let x_m = 0.5 * self.seconds as f64;
         self.motion.odometry_of(&self.r1, odometry(self.seconds, x_m));
@@ -49,7 +49,7 @@ impl Robot {
         self.motion.prior_pose(&self.r1, &front(), at).unwrap().plan.guided
     }
 
-    fn total(&self, modality: &str, outcome: &str) -> u64 {
+    pub(super) fn total(&self, modality: &str, outcome: &str) -> u64 {
         let log = self.motion.corrections(&self.r1);
         log.totals.get(modality).and_then(|ends| ends.get(outcome)).copied().unwrap_or(0)
     }

@@ -93,7 +93,7 @@ pub(super) async fn prepared(operation: &str) -> (Service, String) {
     if operation.ends_with("/accept") {
         gathering = gathered(&service.store, "hall", std::iter::once(seen_from(1.0, 1, 0.0))).await;
     }
-    if operation.ends_with("/reference") {
+    if operation.ends_with("/reference") || operation.ends_with("/{robot}/pose") {
         driven(&service);
     }
     (service, gathering.to_string())

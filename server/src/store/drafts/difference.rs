@@ -73,6 +73,7 @@ fn landmark_change(
 ) {
     change.present = [old.is_some(), new.is_some()];
     change.names = [old.map(|l| l.name.clone()), new.or(old).map(|l| l.name.clone())];
+    change.geometry = [old, new].map(|side| side.map(|landmark| landmark.geometry.shown()));
     match key {
         RowKey::Landmark(_) => {
             if let Some((old, new)) = old.zip(new) {

@@ -3,7 +3,7 @@
 
 use super::before;
 use crate::store::{StoreError, statements::statements, walls::StoredWall};
-use protos::api::{ChangeSummary, WallsDifference};
+use protos::api::{ChangeSummary, Place, Size, SizeAndPlace, WallsDifference};
 use sqlx::{Row, SqliteConnection, sqlite::SqliteRow};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -62,6 +62,11 @@ statements! {
     LANDMARKS = concat!(with_later!("landmarks", "past_landmarks", "id", "name, width_m, height_m, x_m, y_m, z_m, theta_rad, \
                 roll_rad, tilt_rad, place_covariance, size_from_views"),
                 "SELECT f.id, f.present AS was, coalesce(n.present, 0) AS is_now, f.name AS old_name, n.name AS new_name, \
+                f.width_m AS old_width_m, f.height_m AS old_height_m, f.x_m AS old_x_m, \
+                f.y_m AS old_y_m, f.z_m AS old_z_m, f.theta_rad AS old_theta_rad, \
+                f.roll_rad AS old_roll_rad, f.tilt_rad AS old_tilt_rad, n.width_m AS new_width_m, \
+                n.height_m AS new_height_m, n.x_m AS new_x_m, n.y_m AS new_y_m, n.z_m AS new_z_m, \
+                n.theta_rad AS new_theta_rad, n.roll_rad AS new_roll_rad, n.tilt_rad AS new_tilt_rad, \
                 f.name IS NOT n.name AS name, f.width_m IS NOT n.width_m OR f.height_m IS NOT n.height_m OR \
                 f.size_from_views IS NOT n.size_from_views AS size, f.x_m IS NOT n.x_m OR f.y_m IS NOT n.y_m OR \
                 f.z_m IS NOT n.z_m OR f.theta_rad IS NOT n.theta_rad OR f.roll_rad IS NOT n.roll_rad OR \
@@ -91,8 +96,11 @@ statements! {
     WALLS_AFTER = "SELECT min(id) FROM commits WHERE map_id = ?1 AND walls = 1 AND id > ?2";
     PAST_WALLS = "SELECT ax_m, ay_m, bx_m, by_m, covariance FROM past_walls WHERE commit_id = ?1";
     NOW_WALLS = "SELECT ax_m, ay_m, bx_m, by_m, covariance FROM laser_segments WHERE map_id = ?1";
-    NAME_AT = "SELECT coalesce((SELECT name FROM past_landmarks WHERE id = ?1 AND commit_id > ?2 AND present = 1 \
-               ORDER BY commit_id LIMIT 1), (SELECT name FROM landmarks WHERE id = ?1), '')";
+    ROW_AT = "SELECT * FROM (SELECT commit_id, name, width_m AS new_width_m, height_m AS new_height_m, x_m AS new_x_m, \
+              y_m AS new_y_m, z_m AS new_z_m, theta_rad AS new_theta_rad, roll_rad AS new_roll_rad, tilt_rad AS new_tilt_rad \
+              FROM past_landmarks WHERE id = ?1 AND commit_id > ?2 AND present = 1 UNION ALL SELECT 9223372036854775807, name, \
+              width_m, height_m, x_m, y_m, z_m, theta_rad, roll_rad, tilt_rad FROM landmarks WHERE id = ?1) \
+              ORDER BY commit_id LIMIT 1";
 }
 
 /// Words for settings; also the columns of `SETTINGS`.
@@ -104,12 +112,14 @@ const FIELDS: [&str; 3] = ["name", "size", "place"];
 const MAX_NAMED: usize = 8;
 
 /// What changed of a landmark.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct LandmarkChange {
     /// It was there before, it is there after.
     pub(crate) present: [bool; 2],
     /// Name before and after, where they are known from its row.
     pub(crate) names: [Option<String>; 2],
+    /// Size and place before and after; of one whose row has not changed, absent until [`fill_unchanged`].
+    pub(crate) geometry: [Option<SizeAndPlace>; 2],
     /// Of a landmark that stays: which of [`FIELDS`] differ.
     pub(crate) fields: Vec<&'static str>,
     /// Views added, views removed.
@@ -118,10 +128,25 @@ pub(crate) struct LandmarkChange {
     pub(crate) model: bool,
 }
 
+impl LandmarkChange {
+    /// Its name after the change, or before it if it is gone; empty where it is not known.
+    pub(crate) fn name(&self) -> &str {
+        let [before, after] = &self.names;
+        after.as_deref().or(before.as_deref()).unwrap_or_default()
+    }
+}
+
 impl Default for LandmarkChange {
     /// A landmark whose row has not changed is there all the time.
     fn default() -> Self {
-        Self { present: [true; 2], names: [None, None], fields: Vec::new(), views: [0; 2], model: false }
+        Self {
+            present: [true; 2],
+            names: [None, None],
+            geometry: [None; 2],
+            fields: Vec::new(),
+            views: [0; 2],
+            model: false,
+        }
     }
 }
 
@@ -189,7 +214,7 @@ async fn rows(
 }
 
 fn landmark_change(row: &SqliteRow) -> Result<(i64, LandmarkChange), sqlx::Error> {
-    let present = [row.try_get("was")?, row.try_get("is_now")?];
+    let present: [bool; 2] = [row.try_get("was")?, row.try_get("is_now")?];
     let mut fields = Vec::new();
     for word in FIELDS {
         if present == [true; 2] && row.try_get(word)? {
@@ -197,7 +222,23 @@ fn landmark_change(row: &SqliteRow) -> Result<(i64, LandmarkChange), sqlx::Error
         }
     }
     let names = [row.try_get("old_name")?, row.try_get("new_name")?];
-    Ok((row.try_get("id")?, LandmarkChange { present, names, fields, ..LandmarkChange::default() }))
+    let geometry = [
+        present[0].then(|| size_and_place(row, "old")).transpose()?,
+        present[1].then(|| size_and_place(row, "new")).transpose()?,
+    ];
+    Ok((row.try_get("id")?, LandmarkChange { present, names, geometry, fields, ..LandmarkChange::default() }))
+}
+
+/// Size and place in the columns that begin with `side`.
+fn size_and_place(row: &SqliteRow, side: &str) -> Result<SizeAndPlace, sqlx::Error> {
+    let of = |column: &str| row.try_get::<Option<f64>, _>(format!("{side}_{column}").as_str());
+    let size = of("width_m")?.zip(of("height_m")?).map(|(width_m, height_m)| Size { width_m, height_m });
+    let (z_m, theta_rad) = (of("z_m")?, of("theta_rad")?);
+    let (roll_rad, tilt_rad) = (of("roll_rad")?.unwrap_or(0.0), of("tilt_rad")?.unwrap_or(0.0));
+    let place = of("x_m")?.zip(of("y_m")?).zip(z_m.zip(theta_rad));
+    let place =
+        place.map(|((x_m, y_m), (z_m, theta_rad))| Place { x_m, y_m, z_m, theta_rad, roll_rad, tilt_rad });
+    Ok(SizeAndPlace { size, place })
 }
 
 async fn walls(
@@ -271,7 +312,9 @@ pub(crate) async fn summary(
 ) -> Result<ChangeSummary, StoreError> {
     let count =
         |test: &dyn Fn(&LandmarkChange) -> bool| of.landmarks.values().filter(|c| test(c)).count() as u64;
-    let named: Vec<i64> = of.landmarks.keys().copied().take(MAX_NAMED).collect();
+    let mut named: Vec<(i64, LandmarkChange)> =
+        of.landmarks.iter().take(MAX_NAMED).map(|(id, change)| (*id, change.clone())).collect();
+    fill_unchanged(conn, &mut named, to).await?;
     Ok(ChangeSummary {
         landmarks_added: count(&|c| c.present == [false, true]),
         landmarks_removed: count(&|c| c.present == [true, false]),
@@ -284,29 +327,23 @@ pub(crate) async fn summary(
         reference_runs_added: of.runs[0],
         reference_runs_removed: of.runs[1],
         settings: of.settings.iter().map(ToString::to_string).collect(),
-        landmarks: names_at(conn, of, &named, to).await?,
+        landmarks: named.iter().map(|(_, change)| change.name().to_owned()).collect(),
     })
 }
 
-/// The names of these landmarks: after the change, or before it if they are gone.
-pub(crate) async fn names_at(
+/// Fills in name, size and place of landmarks of which only views or the model have changed.
+pub(crate) async fn fill_unchanged(
     conn: &mut SqliteConnection,
-    of: &Difference,
-    ids: &[i64],
+    changes: &mut [(i64, LandmarkChange)],
     to: i64,
-) -> Result<Vec<String>, StoreError> {
-    let mut names = Vec::with_capacity(ids.len());
-    for id in ids {
-        let known = of.landmarks.get(id).and_then(|c| c.names[1].clone().or_else(|| c.names[0].clone()));
-        names.push(match known {
-            Some(name) => name,
-            None => sqlx::query_scalar(NAME_AT)
-                .bind(id)
-                .bind(to)
-                .fetch_one(&mut *conn)
-                .await
-                .map_err(StoreError::during("read the name of a landmark"))?,
-        });
+) -> Result<(), StoreError> {
+    let at = || StoreError::during("read a landmark");
+    for (id, change) in changes.iter_mut().filter(|(_, change)| change.names == [None, None]) {
+        let row = sqlx::query(ROW_AT).bind(*id).bind(to).fetch_optional(&mut *conn).await.map_err(at())?;
+        let Some(row) = row else { continue };
+        let name: String = row.try_get("name").map_err(at())?;
+        change.names = [Some(name.clone()), Some(name)];
+        change.geometry = [Some(size_and_place(&row, "new").map_err(at())?); 2];
     }
-    Ok(names)
+    Ok(())
 }

@@ -13,7 +13,7 @@ pub(crate) use apply::{roll_back, undo};
 pub(crate) use close::HistoryLimits;
 pub(super) use close::{close, close_outside};
 pub(in crate::store) use difference::walls_difference;
-pub(crate) use difference::{Difference, LandmarkChange, between, names_at, summary};
+pub(crate) use difference::{Difference, LandmarkChange, between, fill_unchanged, summary};
 
 use super::{StoreError, actor::Actor, kind::Kind, statements::statements};
 use protos::api::ChangeSummary;

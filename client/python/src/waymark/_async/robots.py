@@ -23,13 +23,16 @@ from waymark.api import (
     MappingProgressBody,
     ModalityMapBody,
     Order,
+    PoseByHand,
     RecordingStatusBody,
     ReferenceRunBody,
     RelocalisationStatus,
     Robot,
+    RobotPose,
     Ros2Status,
     TrackSummary,
     TrajectoriesBody,
+    UnknownRobots,
     UploadedViews,
 )
 from waymark.errors import Unexpected
@@ -69,6 +72,15 @@ class AsyncRobots(AsyncBase):
     async def robot(self, robot: str) -> Robot:
         """One robot: whether it is connected, its pose, and whether a second program uses its name."""
         return await self._send(Robot, "robot", robot)
+
+    async def set_robot_pose(self, robot: str, pose: PoseByHand) -> RobotPose:
+        """Puts a robot where a person says it is. It has to send odometry; the pose is unsupported until a landmark
+        agrees."""
+        return await self._send(RobotPose, "set_robot_pose", robot, json=pose)
+
+    async def unknown_robots(self) -> UnknownRobots:
+        """Robots that send messages and are refused because they are not registered."""
+        return await self._send(UnknownRobots, "unknown_robots")
 
     async def delete_robot(self, robot: str) -> None:
         """Deletes a robot; its frames are rejected from now on."""

@@ -24,13 +24,16 @@ from waymark.api import (
     MappingProgressBody,
     ModalityMapBody,
     Order,
+    PoseByHand,
     RecordingStatusBody,
     ReferenceRunBody,
     RelocalisationStatus,
     Robot,
+    RobotPose,
     Ros2Status,
     TrackSummary,
     TrajectoriesBody,
+    UnknownRobots,
     UploadedViews,
 )
 from waymark.errors import Unexpected
@@ -70,6 +73,15 @@ class Robots(Base):
     def robot(self, robot: str) -> Robot:
         """One robot: whether it is connected, its pose, and whether a second program uses its name."""
         return self._send(Robot, "robot", robot)
+
+    def set_robot_pose(self, robot: str, pose: PoseByHand) -> RobotPose:
+        """Puts a robot where a person says it is. It has to send odometry; the pose is unsupported until a landmark
+        agrees."""
+        return self._send(RobotPose, "set_robot_pose", robot, json=pose)
+
+    def unknown_robots(self) -> UnknownRobots:
+        """Robots that send messages and are refused because they are not registered."""
+        return self._send(UnknownRobots, "unknown_robots")
 
     def delete_robot(self, robot: str) -> None:
         """Deletes a robot; its frames are rejected from now on."""

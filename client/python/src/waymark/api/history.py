@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from waymark.api.landmarks import Place, Size
+
 ChangeKind = Literal["added", "removed", "changed"]
 
 
@@ -49,8 +51,16 @@ class RollbackOutcome:
 
 
 @dataclass(frozen=True, slots=True)
+class SizeAndPlace:
+    """Size and place of a landmark, as far as they are known."""
+
+    size: Size | None = None
+    place: Place | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class LandmarkDifference:
-    """How a landmark differs."""
+    """How a landmark differs; `before` is absent if it is new, `after` if it is gone."""
 
     name: str
     old_name: str | None
@@ -59,6 +69,8 @@ class LandmarkDifference:
     views_added: int
     views_removed: int
     model_changed: bool
+    before: SizeAndPlace | None = None
+    after: SizeAndPlace | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -37,6 +37,7 @@ class Map:
     revision: str
     landmarks: int
     distance: Distance
+    has_underlay: bool = False
     draft_of: str | None = None
     site: str | None = None
     building: str | None = None
@@ -106,7 +107,8 @@ class Underlay:
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """Long work. `progress` is 0 to 1; `message` says what it does, or why it failed."""
+    """Long work. `progress` is 0 to 1; `message` says what it does, or why it failed; `by` names the token that
+    asked for it. Times are ms since the Unix epoch; `started_ms` is absent while it waits."""
 
     id: int
     kind: str
@@ -114,6 +116,10 @@ class Job:
     state: JobState
     progress: float
     message: str
+    by: str
+    created_ms: int
+    started_ms: int | None = None
+    ended_ms: int | None = None
     result: Any = None
 
 

@@ -23,6 +23,17 @@ class RobotPose:
 
 
 @dataclass(frozen=True, slots=True)
+class PoseByHand:
+    """Where a person says that a robot is, with standard deviations of the coordinates and of the heading."""
+
+    x_m: float
+    y_m: float
+    theta_rad: float
+    sigma_m: float = 0.5
+    sigma_rad: float = 0.35
+
+
+@dataclass(frozen=True, slots=True)
 class EpochConflictBody:
     """A second program speaks under the name of a robot and is refused."""
 
@@ -32,8 +43,48 @@ class EpochConflictBody:
 
 
 @dataclass(frozen=True, slots=True)
+class RefusedFrame:
+    """A refused frame of a robot."""
+
+    code: str
+    field: str
+    detail: str
+    ago_ms: int
+
+
+@dataclass(frozen=True, slots=True)
+class RobotActivity:
+    """What a robot has done since the server started; `frames_per_s` is over the last ten whole seconds."""
+
+    answered: int
+    refused: dict[str, int]
+    last_message_ms: int
+    frames_per_s: float
+    last_refusal: RefusedFrame | None = None
+    last_recognised_ms: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class UnknownRobot:
+    """A robot that sends messages and is not registered."""
+
+    name: str
+    messages: int
+    first_ms: int
+    last_ms: int
+    camera: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class UnknownRobots:
+    """Robots that send messages and are not registered, by name; at most 64."""
+
+    robots: tuple[UnknownRobot, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Robot:
-    """A robot: whether its software is connected, and its pose, if that is known."""
+    """A robot: whether its software is connected, its pose, if that is known, and what it has done."""
 
     name: str
     map: str
@@ -41,6 +92,7 @@ class Robot:
     epoch: int | None = None
     conflict: EpochConflictBody | None = None
     pose: RobotPose | None = None
+    activity: RobotActivity | None = None
 
 
 @dataclass(frozen=True, slots=True)
