@@ -1,48 +1,185 @@
-//! The administrator's pages, embedded in the program.
+//! The administrator's pages, embedded in the program. `/live/` is the live view of robots and gatherings.
 
 use super::AppState;
-use axum::{Router, http::header, response::IntoResponse, routing::get};
+use axum::{
+    Router,
+    body::Bytes,
+    http::{HeaderMap, HeaderValue, StatusCode, header},
+    response::{IntoResponse, Response},
+    routing::get,
+};
+use sha2::{Digest as _, Sha256};
 
-/// Path, media type, content.
-const FILES: [(&str, &str, &str); 12] = [
-    ("/", "text/html; charset=utf-8", include_str!("../../../web/index.html")),
-    ("/app.js", "text/javascript; charset=utf-8", include_str!("../../../web/app.js")),
-    ("/first-map.js", "text/javascript; charset=utf-8", include_str!("../../../web/first-map.js")),
-    ("/frame.js", "text/javascript; charset=utf-8", include_str!("../../../web/frame.js")),
-    ("/naming.js", "text/javascript; charset=utf-8", include_str!("../../../web/naming.js")),
-    ("/corrections.js", "text/javascript; charset=utf-8", include_str!("../../../web/corrections.js")),
-    ("/gather.js", "text/javascript; charset=utf-8", include_str!("../../../web/gather.js")),
-    ("/modalities.js", "text/javascript; charset=utf-8", include_str!("../../../web/modalities.js")),
-    ("/hypotheses.js", "text/javascript; charset=utf-8", include_str!("../../../web/hypotheses.js")),
-    ("/session.js", "text/javascript; charset=utf-8", include_str!("../../../web/session.js")),
-    ("/setting.js", "text/javascript; charset=utf-8", include_str!("../../../web/setting.js")),
-    ("/style.css", "text/css; charset=utf-8", include_str!("../../../web/style.css")),
-];
+/// Path below `/`, content, content compressed by gzip.
+type File = (&'static str, &'static [u8], &'static [u8]);
+
+/// Made by `build.rs` of `web/dist` and `web/live`.
+static FILES: &[File] = &include!(concat!(env!("OUT_DIR"), "/pages.rs"));
+const INDEX: &str = "index.html";
+const LIVE_INDEX: &str = "live/index.html";
+/// Addresses that the pages themselves understand (`web/src/routes.svelte.ts`).
+const ADDRESSES: [&str; 8] =
+    ["/", "/maps/{*rest}", "/robots", "/robots/{*rest}", "/answers", "/answers/{*rest}", "/admin", "/live/"];
+/// Files with the digest of their content in their name never change.
+const FOREVER: HeaderValue = HeaderValue::from_static("public, max-age=31536000, immutable");
+/// A new program brings new pages: the browser asks again each time.
+const ASK_AGAIN: HeaderValue = HeaderValue::from_static("no-cache");
 
 pub(super) fn router() -> Router<AppState> {
-    FILES.into_iter().fold(Router::new(), |router, (path, kind, content)| {
-        // A new program brings new pages: the browser asks again each time.
-        let headers = [(header::CONTENT_TYPE, kind), (header::CACHE_CONTROL, "no-cache")];
-        router.route(path, get(move || async move { (headers, content).into_response() }))
+    let mut router = Router::new();
+    for address in ADDRESSES {
+        let path = if address == "/live/" { LIVE_INDEX } else { INDEX };
+        if let Some(file) = FILES.iter().find(|(name, ..)| *name == path) {
+            router = router.route(address, served(file));
+        }
+    }
+    for file in FILES.iter().filter(|(path, ..)| !path.ends_with(INDEX)) {
+        router = router.route(&format!("/{}", file.0), served(file));
+    }
+    router
+}
+
+fn served(file: &'static File) -> axum::routing::MethodRouter<AppState> {
+    let tag = etag(file.1);
+    get(move |headers: HeaderMap| async move { answer(file, &tag, &headers) })
+}
+
+/// The digest of a content, in quotes.
+fn etag(content: &[u8]) -> String {
+    let digest = Sha256::digest(content);
+    let hex: String = digest[..12].iter().map(|byte| format!("{byte:02x}")).collect();
+    format!("\"{hex}\"")
+}
+
+fn answer(&(path, content, packed): &File, tag: &str, asked: &HeaderMap) -> Response {
+    let has = |name: header::HeaderName, text: &str| {
+        asked.get(name).and_then(|value| value.to_str().ok()).is_some_and(|value| value.contains(text))
+    };
+    let mut headers = HeaderMap::with_capacity(12);
+    let lifetime = if path.starts_with("assets/") { FOREVER } else { ASK_AGAIN };
+    headers.insert(header::CACHE_CONTROL, lifetime);
+    headers.insert(header::VARY, HeaderValue::from_static("accept-encoding"));
+    headers.extend(HeaderValue::from_str(tag).ok().map(|tag| (header::ETAG, tag)));
+    if has(header::IF_NONE_MATCH, tag) {
+        return (StatusCode::NOT_MODIFIED, headers).into_response();
+    }
+    headers.insert(header::CONTENT_TYPE, media_type(path));
+    if !has(header::ACCEPT_ENCODING, "gzip") {
+        return (headers, Bytes::from_static(content)).into_response();
+    }
+    headers.insert(header::CONTENT_ENCODING, HeaderValue::from_static("gzip"));
+    (headers, Bytes::from_static(packed)).into_response()
+}
+
+fn media_type(path: &str) -> HeaderValue {
+    HeaderValue::from_static(match path.rsplit('.').next() {
+        Some("html") => "text/html; charset=utf-8",
+        Some("js") => "text/javascript; charset=utf-8",
+        Some("css") => "text/css; charset=utf-8",
+        Some("svg") => "image/svg+xml",
+        _ => "application/octet-stream",
     })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::collections::BTreeSet;
+    use std::{collections::BTreeSet, fs, path::Path};
+
+    fn web() -> std::path::PathBuf {
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../web")
+    }
+
+    /// What the pages are built of; the same list is in `web/tools/stamp.js`.
+    const BUILT_OF: [&str; 8] = [
+        "index.html",
+        "package-lock.json",
+        "package.json",
+        "public",
+        "src",
+        "svelte.config.js",
+        "tsconfig.json",
+        "vite.config.ts",
+    ];
+
+    fn files(path: &str, all: &mut BTreeSet<String>) {
+        let full = web().join(path);
+        if full.is_dir() {
+            for entry in fs::read_dir(full).unwrap() {
+                files(&format!("{path}/{}", entry.unwrap().file_name().to_str().unwrap()), all);
+            }
+        } else {
+            all.insert(path.to_owned());
+        }
+    }
+
+    fn hex(bytes: &[u8]) -> String {
+        bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+    }
+
+    #[test]
+    fn the_pages_that_are_served_are_built_of_their_sources() {
+        let mut all = BTreeSet::new();
+        BUILT_OF.iter().for_each(|path| files(path, &mut all));
+        let line = |path: &String| {
+            format!("{}  {path}\n", hex(&Sha256::digest(fs::read(web().join(path)).unwrap())))
+        };
+        let lines: String = all.iter().map(line).collect();
+        let built = fs::read_to_string(web().join("dist/sources.sha256")).unwrap();
+        assert_eq!(
+            built.trim(),
+            hex(&Sha256::digest(lines)),
+            "web/dist is older than its sources: npm run build in web, and commit web/dist"
+        );
+    }
 
     /// A file that a page asks for and that is not embedded leaves the whole page dead.
     #[test]
-    fn every_file_that_the_page_asks_for_is_served() {
-        let served: BTreeSet<&str> = FILES.iter().map(|(path, ..)| *path).collect();
-        let quoted = FILES.iter().flat_map(|(_, _, content)| content.split('"'));
-        let is_file = |text: &&str| {
-            text.starts_with('/') && [".js", ".css"].into_iter().any(|ending| text.ends_with(ending))
+    fn every_file_that_a_page_asks_for_is_served() {
+        let served: BTreeSet<String> = FILES.iter().map(|(path, ..)| format!("/{path}")).collect();
+        for (page, content, _) in FILES.iter().filter(|(path, ..)| !path.ends_with(".mjs")) {
+            let text = std::str::from_utf8(content).unwrap();
+            let is_file = |text: &&str| {
+                text.starts_with('/') && [".js", ".css", ".svg"].iter().any(|ending| text.ends_with(ending))
+            };
+            for asked in text.split('"').filter(is_file) {
+                assert!(served.contains(asked), "{page} asks for {asked}");
+            }
+        }
+    }
+
+    #[test]
+    fn every_address_of_the_pages_is_served() {
+        let routes = fs::read_to_string(web().join("src/routes.svelte.ts")).unwrap();
+        let patterns: Vec<&str> =
+            routes.split("route(\"").skip(1).filter_map(|rest| rest.split('"').next()).collect();
+        assert!(patterns.len() > 10, "{patterns:?}");
+        for pattern in patterns {
+            let first = pattern.split('/').nth(1).unwrap_or_default();
+            let is_served = ADDRESSES.iter().any(|address| {
+                *address == pattern
+                    || *address == format!("/{first}/{{*rest}}") && pattern.matches('/').count() > 1
+            });
+            assert!(is_served, "{pattern}");
+        }
+    }
+
+    #[test]
+    fn files_are_compressed_kept_and_asked_for_again() {
+        let file = FILES.iter().find(|(path, ..)| path.starts_with("assets/index-")).unwrap();
+        let asked = |name: header::HeaderName, value: &str| {
+            let headers = HeaderMap::from_iter([(name, HeaderValue::from_str(value).unwrap())]);
+            answer(file, &etag(file.1), &headers)
         };
-        let asked: BTreeSet<&str> = quoted.filter(is_file).collect();
-        assert!(asked.is_subset(&served), "{:?}", asked.difference(&served));
-        let pages: BTreeSet<&str> = served.into_iter().filter(|path| *path != "/").collect();
-        assert_eq!(asked, pages, "a file is served that nothing asks for");
+        let packed = asked(header::ACCEPT_ENCODING, "br, gzip");
+        assert_eq!(packed.headers()[header::CONTENT_ENCODING], "gzip");
+        assert_eq!(packed.headers()[header::CACHE_CONTROL], FOREVER);
+        assert!(file.2.len() < file.1.len() / 2);
+        let plain = asked(header::ACCEPT_ENCODING, "br");
+        assert!(!plain.headers().contains_key(header::CONTENT_ENCODING));
+        let same = asked(header::IF_NONE_MATCH, &etag(file.1));
+        assert_eq!(same.status(), StatusCode::NOT_MODIFIED);
+        let index = FILES.iter().find(|(path, ..)| *path == INDEX).unwrap();
+        assert_eq!(answer(index, "\"a\"", &HeaderMap::new()).headers()[header::CACHE_CONTROL], ASK_AGAIN);
     }
 }

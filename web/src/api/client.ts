@@ -1,0 +1,137 @@
+// Requests to the server. In: a path below /api/v1. Out: the body, or an ApiError whose text a person can act on.
+
+const ROOT = "/api/v1";
+/** Time until a request is given up, ms. Lessons and backups run as jobs, so no request takes long. */
+const DEADLINE_MS = 30_000;
+
+/** What the server, or the way to it, has refused. */
+export class ApiError extends Error {
+  constructor(
+    message: string,
+    /** HTTP status; 0 if no answer came. */
+    readonly status: number,
+    /** The stable word of the refusal. */
+    readonly code: string,
+    /** The field at fault, by its name on the wire. */
+    readonly field: string | null,
+  ) {
+    super(message);
+  }
+}
+
+/** A body with its revision. */
+export interface Revised<T> {
+  body: T;
+  revision: string;
+}
+
+export interface Options {
+  query?: Record<string, string | number | boolean | null | undefined>;
+  body?: unknown;
+  form?: FormData;
+  /** The revision that a change is meant for. */
+  ifMatch?: string;
+  /** Why something is changed, for the history of the map. */
+  why?: string;
+  /** Makes a creation once, however often it is sent. */
+  key?: string;
+  signal?: AbortSignal;
+}
+
+type Method = "GET" | "POST" | "PUT" | "PATCH" | "DELETE";
+
+let onSignedOut = () => {};
+
+/** Calls `then` when the server answers that nobody is signed in. */
+export function whenSignedOut(then: () => void): void {
+  onSignedOut = then;
+}
+
+/** The address of a read: for pictures and downloads. */
+export function address(path: string, query: Options["query"] = {}): string {
+  const pairs = Object.entries(query).filter(([, value]) => value !== undefined && value !== null && value !== "");
+  const text = new URLSearchParams(pairs.map(([name, value]) => [name, String(value)])).toString();
+  return ROOT + path + (text ? `?${text}` : "");
+}
+
+/** A path with its names escaped: path`/maps/${map}`. */
+export function path(parts: TemplateStringsArray, ...names: (string | number)[]): string {
+  return parts.reduce((made, part, i) => made + encodeURIComponent(String(names[i - 1])) + part);
+}
+
+function request(method: Method, options: Options): RequestInit {
+  const headers = new Headers({ accept: "application/json" });
+  // Pages of other sites cannot send this header, so a change with it comes from these pages.
+  if (method !== "GET") headers.set("x-waymark-page", "1");
+  if (options.ifMatch !== undefined) headers.set("if-match", options.ifMatch === "*" ? "*" : `"${options.ifMatch}"`);
+  if (options.why) headers.set("waymark-why", encodeURIComponent(options.why));
+  if (options.key) headers.set("idempotency-key", options.key);
+  if (options.body !== undefined) headers.set("content-type", "application/json");
+  const deadline = AbortSignal.timeout(DEADLINE_MS);
+  const signal = options.signal ? AbortSignal.any([options.signal, deadline]) : deadline;
+  return { method, headers, signal, body: options.form ?? (options.body === undefined ? null : JSON.stringify(options.body)) };
+}
+
+async function send(method: Method, at: string, options: Options): Promise<Response> {
+  let answer: Response;
+  try {
+    answer = await fetch(address(at, options.query), request(method, options));
+  } catch (cause) {
+    if (options.signal?.aborted) throw cause;
+    const late = cause instanceof DOMException && cause.name === "TimeoutError";
+    const text = late ? "The server has not answered within 30 s." : "The server cannot be reached. Does it run? Is the network up?";
+    throw new ApiError(text, 0, "unreachable", null);
+  }
+  if (answer.ok) return answer;
+  if (answer.status === 401) onSignedOut();
+  throw await refusal(answer);
+}
+
+async function refusal(answer: Response): Promise<ApiError> {
+  const problem = await answer.json().catch(() => ({}));
+  const { detail, code, field } = problem as { detail?: string; code?: string; field?: string };
+  const text = detail ?? `The server answers ${answer.status} ${answer.statusText}.`;
+  const next = answer.status === 412 ? " Somebody has changed it meanwhile: load it again, then repeat the change." : "";
+  return new ApiError(sentence(text) + next, answer.status, code ?? "unknown", field ?? null);
+}
+
+function sentence(text: string): string {
+  const begun = text.charAt(0).toUpperCase() + text.slice(1);
+  return /[.!?]$/.test(begun) ? begun : `${begun}.`;
+}
+
+/** The revision of an answer, without quotes. */
+const revisionOf = (answer: Response) => (answer.headers.get("etag") ?? "").replace(/^"|"$/g, "");
+
+/** Reads a body. */
+export async function get<T>(at: string, query?: Options["query"], signal?: AbortSignal): Promise<T> {
+  const answer = await send("GET", at, { ...(query && { query }), ...(signal && { signal }) });
+  return (await answer.json()) as T;
+}
+
+/** Reads a body with its revision. */
+export async function getRevised<T>(at: string): Promise<Revised<T>> {
+  const answer = await send("GET", at, {});
+  return { revision: revisionOf(answer), body: (await answer.json()) as T };
+}
+
+/** Changes something. `undefined` for an answer without a body. */
+export async function change<T>(method: Exclude<Method, "GET">, at: string, options: Options = {}): Promise<T> {
+  const answer = await send(method, at, options);
+  return (answer.status === 204 ? undefined : await answer.json()) as T;
+}
+
+/** A key for one creation. */
+export const newKey = () => crypto.randomUUID?.() ?? Array.from(crypto.getRandomValues(new Uint8Array(16)), (byte) => byte.toString(16).padStart(2, "0")).join("");
+
+/** All items of a list, page by page, at most `max`. */
+export async function all<T>(at: string, query: Options["query"] = {}, max = 5000): Promise<T[]> {
+  const items: T[] = [];
+  let cursor: string | null | undefined;
+  do {
+    const page: { items: T[]; next?: string | null } = await get(at, { limit: 500, ...query, cursor });
+    items.push(...page.items);
+    cursor = page.next;
+  } while (cursor && items.length < max);
+  return items;
+}

@@ -1,0 +1,41 @@
+// Short names of the bodies that the pages use.
+import type { components } from "./schema";
+
+type Schemas = components["schemas"];
+export type AuditEntry = Schemas["AuditEntry"];
+export type Backup = Schemas["Backup"];
+export type Camera = Schemas["Camera"];
+export type Commit = Schemas["Commit"];
+export type Draft = Schemas["Draft"];
+export type DraftDifference = Schemas["DraftDifference"];
+export type Difference = Schemas["Difference"];
+export type DistanceHistogram = Schemas["DistanceHistogram"];
+export type DuplicatePair = Schemas["DuplicatePair"];
+export type Job = Schemas["Job"];
+export type Landmark = Schemas["Landmark"];
+export type LandmarkDistances = Schemas["LandmarkDistances"];
+export type LandmarkModelDetail = Schemas["LandmarkModelDetail"];
+export type MapBody = Schemas["Map"];
+export type Place = Schemas["Place"];
+export type Readiness = Schemas["Readiness"];
+export type Replay = Schemas["Replay"];
+export type Robot = Schemas["Robot"];
+export type Role = Schemas["Role"];
+export type Size = Schemas["Size"];
+export type StoredAnswer = Schemas["StoredAnswer"];
+export type StoredAnswerSummary = Schemas["StoredAnswerSummary"];
+export type Token = Schemas["Token"];
+export type TrainingView = Schemas["TrainingView"];
+export type Underlay = Schemas["Underlay"];
+export type VisibleResponse = Schemas["VisibleResponse"];
+export type CoverageResponse = Schemas["CoverageResponse"];
+export type Walls = Schemas["WallsBody"];
+export type Whoami = Schemas["Whoami"];
+
+/** A page of a list. */
+export interface Listed<T> {
+  items: T[];
+  /** Where the next page begins; absent on the last one. */
+  next?: string | null;
+  total?: number | null;
+}

@@ -1,0 +1,21 @@
+// Points and a line that a tool has set on the floor.
+import Feature from "ol/Feature";
+import LineString from "ol/geom/LineString";
+import MultiPoint from "ol/geom/MultiPoint";
+import VectorLayer from "ol/layer/Vector";
+import VectorSource from "ol/source/Vector";
+import { Circle, Fill, Stroke, Style } from "ol/style";
+import { colours } from "./colours";
+import type { Point } from "./geometry";
+
+export function overlay(points: readonly Point[], is_line: boolean): VectorLayer {
+  const { accent, halo } = colours();
+  const features: Feature<LineString | MultiPoint>[] = [new Feature<LineString | MultiPoint>(new MultiPoint([...points]))];
+  if (is_line && points.length > 1) features.push(new Feature<LineString | MultiPoint>(new LineString([...points])));
+  const style = new Style({
+    stroke: new Stroke({ color: accent, width: 2.5 }),
+    image: new Circle({ radius: 5, fill: new Fill({ color: accent }), stroke: new Stroke({ color: halo, width: 2 }) }),
+  });
+  const source = new VectorSource<Feature<LineString | MultiPoint>>({ features });
+  return new VectorLayer({ source, style, zIndex: 9 }) as unknown as VectorLayer;
+}

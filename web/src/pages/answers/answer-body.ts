@@ -1,0 +1,28 @@
+// The parts of a stored `Answer` that the page shows (protos/waymark/v1/waymark.proto as JSON).
+import type { LiveAnswer, LiveQuad } from "../../words/quads";
+
+export interface Candidate {
+  landmark: string;
+  correlation: number;
+  hausdorff?: number;
+  distance: number;
+  threshold: number;
+  ratio: number;
+  refusal?: string;
+  gradient_similarity?: number;
+}
+
+export interface StoredQuadBody extends Omit<LiveQuad, "candidates"> {
+  candidates?: Candidate[];
+  points?: { matches: number; inliers: number; checked: number; agreeing: number; log10_false_alarms: number; agreement: string[] };
+}
+
+interface PoseBody {
+  pose?: { x_m: number; y_m: number; theta_rad: number };
+}
+
+export interface AnswerBody extends Omit<LiveAnswer, "quads"> {
+  quads: StoredQuadBody[];
+  map_from_robot?: PoseBody;
+  guided_map_from_robot?: PoseBody;
+}

@@ -1,0 +1,85 @@
+// The address of the page and what it shows. The view (filters, place on the map) lives in the query, so that an address
+// can be sent to somebody else.
+import type { Component } from "svelte";
+
+/** Names in an address, such as `map`. */
+export type Names = Record<string, string>;
+
+// eslint-disable-next-line -- pages take the names of their address
+type Page = () => Promise<{ default: Component<any> }>;
+
+interface Route {
+  pattern: RegExp;
+  page: Page;
+}
+
+function route(pattern: string, page: Page): Route {
+  const text = pattern.replace(/:(\w+)/g, "(?<$1>[^/]+)");
+  return { pattern: new RegExp(`^${text}/?$`), page };
+}
+
+const ROUTES: Route[] = [
+  route("/", () => import("./pages/maps/Maps.svelte")),
+  route("/maps/:map", () => import("./pages/maps/OneMap.svelte")),
+  route("/maps/:map/landmarks", () => import("./pages/landmarks/Landmarks.svelte")),
+  route("/maps/:map/landmarks/:landmark", () => import("./pages/landmarks/OneLandmark.svelte")),
+  route("/maps/:map/teach", () => import("./pages/teach/Teach.svelte")),
+  route("/maps/:map/history", () => import("./pages/history/History.svelte")),
+  route("/maps/:map/drafts/:draft", () => import("./pages/history/OneDraft.svelte")),
+  route("/robots", () => import("./pages/robots/Robots.svelte")),
+  route("/robots/:robot", () => import("./pages/robots/OneRobot.svelte")),
+  route("/answers", () => import("./pages/answers/Answers.svelte")),
+  route("/answers/:answer", () => import("./pages/answers/OneAnswer.svelte")),
+  route("/admin", () => import("./pages/admin/Admin.svelte")),
+];
+
+export const here = $state({ path: location.pathname, query: new URLSearchParams(location.search) });
+
+/** The page of an address and the names in it; `undefined` if there is none. */
+export function find(path: string): { page: Page; names: Names } | undefined {
+  for (const { pattern, page } of ROUTES) {
+    const found = pattern.exec(path);
+    if (!found) continue;
+    const pairs = Object.entries(found.groups ?? {}).map(([name, value]) => [name, decodeURIComponent(value)]);
+    return { page, names: Object.fromEntries(pairs) };
+  }
+  return undefined;
+}
+
+function read(): void {
+  here.path = location.pathname;
+  here.query = new URLSearchParams(location.search);
+}
+
+/** Goes to another address of these pages. */
+export function go(to: string): void {
+  history.pushState(null, "", to);
+  read();
+  scrollTo(0, 0);
+}
+
+/** Puts a part of the view into the address, without a step back for it. */
+export function remember(values: Record<string, string | undefined>): void {
+  const query = new URLSearchParams(location.search);
+  for (const [name, value] of Object.entries(values)) {
+    if (value) query.set(name, value);
+    else query.delete(name);
+  }
+  const text = query.toString();
+  history.replaceState(null, "", location.pathname + (text ? `?${text}` : ""));
+  read();
+}
+
+/** Follows links between these pages without loading everything again. */
+export function followLinks(): void {
+  addEventListener("popstate", read);
+  document.addEventListener("click", (event) => {
+    const link = event.target instanceof Element ? event.target.closest("a") : null;
+    if (!link || event.defaultPrevented || event.button !== 0) return;
+    if (event.metaKey || event.ctrlKey || event.shiftKey || link.target || link.hasAttribute("download")) return;
+    const to = new URL(link.href);
+    if (to.origin !== location.origin || !find(to.pathname)) return;
+    event.preventDefault();
+    go(to.pathname + to.search);
+  });
+}

@@ -1,0 +1,40 @@
+// What was done, in words: commits of the history, entries of the audit log, jobs.
+
+const OPERATIONS: Record<string, string> = {
+  "POST /maps": "Map created",
+  "PATCH /maps/{map}": "Map changed",
+  "DELETE /maps/{map}": "Map deleted",
+  "POST /maps/{map}/copies": "Map copied",
+  "PUT /maps/{map}/walls": "Walls replaced",
+  "PUT /maps/{map}/underlay": "Floor plan set",
+  "DELETE /maps/{map}/underlay": "Floor plan removed",
+  "POST /maps/{map}/landmarks": "Landmark created",
+  "PATCH /maps/{map}/landmarks/{landmark}": "Landmark changed",
+  "DELETE /maps/{map}/landmarks/{landmark}": "Landmark deleted",
+  "POST /maps/{map}/bulk/create-landmarks": "Landmarks created",
+  "POST /maps/{map}/bulk/delete-landmarks": "Landmarks deleted",
+  "POST /maps/{map}/landmarks/{landmark}/views": "Photograph added",
+  "DELETE /maps/{map}/landmarks/{landmark}/views/{view}": "Photograph removed",
+  "POST /maps/{map}/landmarks/{landmark}/learn": "Landmark learnt",
+  "POST /maps/{map}/learn": "Landmarks learnt",
+  "POST /maps/{map}/rollback": "Map taken back",
+  "POST /maps/{map}/commits/{commit}/undo": "Change undone",
+  "POST /maps/{map}/drafts": "Draft begun",
+  "DELETE /maps/{map}/drafts/{draft}": "Draft thrown away",
+  "POST /maps/{map}/drafts/{draft}/publish": "Draft published",
+  "POST /maps/{map}/gatherings/{gathering}/accept": "Gathered landmarks accepted",
+  "POST /maps/{map}/mapping/finish": "Walls made of scans",
+  "PUT /maps/{map}/visibility-settings": "Visibility settings changed",
+  "PUT /maps/{map}/modalities": "Choice of modalities changed",
+  "PUT /robots/{robot}": "Robot registered or moved",
+  "DELETE /robots/{robot}": "Robot removed",
+  "POST /robots/{robot}/certificates": "Certificate issued",
+  "DELETE /robots/{robot}/certificates/{serial}": "Certificate revoked",
+  "POST /tokens": "Token created",
+  "DELETE /tokens/{token}": "Token revoked",
+  "POST /backups": "Backup begun",
+  "DELETE /backups/{backup}": "Backup deleted",
+};
+
+/** An operation in words; an unknown one as it is. */
+export const operation = (name: string) => OPERATIONS[name] ?? name;

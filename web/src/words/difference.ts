@@ -1,0 +1,34 @@
+// How two versions of a map differ, in words.
+import type { components } from "../api/schema";
+import { count } from "./amounts";
+
+type Summary = components["schemas"]["ChangeSummary"];
+type LandmarkDifference = components["schemas"]["LandmarkDifference"];
+
+/** One line; "nothing" if nothing differs. */
+export function summaryText(summary: Summary): string {
+  const parts: [number, string, string][] = [
+    [summary.landmarks_added, "landmark", "added"],
+    [summary.landmarks_changed, "landmark", "changed"],
+    [summary.landmarks_removed, "landmark", "removed"],
+    [summary.models_changed, "model", "changed"],
+    [summary.views_added, "photograph", "added"],
+    [summary.views_removed, "photograph", "removed"],
+  ];
+  const words = parts.filter(([number]) => number > 0).map(([number, one, what]) => `${count(number, one)} ${what}`);
+  if (summary.walls_changed) words.push("walls changed");
+  if (summary.underlay_changed) words.push("floor plan changed");
+  if (summary.settings.length) words.push(`settings: ${summary.settings.join(", ")}`);
+  return words.join(", ") || "nothing";
+}
+
+/** What differs of one landmark. */
+export function landmarkText(difference: LandmarkDifference): string {
+  const words: string[] = [];
+  if (difference.old_name) words.push(`was ${difference.old_name}`);
+  if (difference.fields.length) words.push(difference.fields.join(", "));
+  if (difference.model_changed) words.push("learnt anew");
+  if (difference.views_added) words.push(`${count(difference.views_added, "photograph")} more`);
+  if (difference.views_removed) words.push(`${count(difference.views_removed, "photograph")} less`);
+  return words.join("; ");
+}
