@@ -46,7 +46,7 @@ pub(super) async fn guard(State(app): State<AppState>, mut request: Request, nex
     request.extensions_mut().insert(RequestId(id.clone()));
     let (method, uri) = (request.method().clone(), request.uri().clone());
     let started = Instant::now();
-    let deadline = Duration::from_secs(deadline_s(&app.config.limits, &path));
+    let deadline = Duration::from_secs(deadline_s(&app.config.limits, uri.path()));
     // With TLS, plain text comes from this machine alone, and a certificate proves the name that a page was asked by.
     let is_encrypted = request.extensions().get::<Peer>().is_some_and(|peer| peer.is_encrypted);
     let is_loopback = app.config.tls.is_some() || app.config.http_addr.ip().to_canonical().is_loopback();

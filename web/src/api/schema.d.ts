@@ -154,6 +154,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/bundles": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Makes a new map of a bundle: with landmarks, views, models, walls, underlay, reference runs and settings, as one commit. A
+         *     bundle of which anything is wrong is refused as a whole, with the file in it as `field`.
+         */
+        post: operations["load"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/events": {
         parameters: {
             query?: never;
@@ -313,6 +333,23 @@ export interface paths {
          *     fault, from 0.
          */
         post: operations["delete"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/maps/{map}/bundle": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** The whole map as one file, a bundle: a zip with JSON, GeoJSON, pictures and models (docs/BUNDLE.md). */
+        get: operations["save"];
+        put?: never;
+        post?: never;
         delete?: never;
         options?: never;
         head?: never;
@@ -1386,6 +1423,27 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/robots/{robot}/pose": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        /**
+         * Puts a robot where a person says it is on its map, in place of the pose that it may have. The pose is unsupported until
+         *     a landmark that the picture alone names agrees with it; landmarks that contradict it replace it as they would any other
+         *     pose. The robot has to send odometry, which carries the pose on.
+         */
+        put: operations["put"];
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/robots/{robot}/recording": {
         parameters: {
             query?: never;
@@ -1536,6 +1594,26 @@ export interface paths {
         post?: never;
         /** Revokes a token, and ends the sessions and event streams that it opened. */
         delete: operations["revoke"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/unknown-robots": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Robots that send messages and are refused because they are not registered, by name: at most 64, those that were heard
+         *     last. One that is registered is not among them any more.
+         */
+        get: operations["unknown"];
+        put?: never;
+        post?: never;
+        delete?: never;
         options?: never;
         head?: never;
         patch?: never;
@@ -2112,13 +2190,13 @@ export interface components {
             /** @description The map it is a pose in. */
             map: string;
             /**
-             * @description `landmarks` (named without the pose), `guided` (landmarks named by the pose), `laser` or `relocalisation`; `map_change`
-             *     when the robot came from another map.
+             * @description `landmarks` (named without the pose), `guided` (landmarks named by the pose), `laser` or `relocalisation`; `by_hand` when
+             *     a person said where it is; `map_change` when the robot came from another map.
              */
             modality: string;
             /**
              * @description `started` (it gave the first pose), `applied`, `gated_out` (it contradicts the pose and was left out), `reset` (the
-             *     last of several that contradict the pose and agree with one another: it replaced the pose), `excluded_by_mode` (it
+             *     last of several that contradict the pose and agree with one another, or a person: it replaced the pose), `excluded_by_mode` (it
              *     agrees, but reference runs have shown another modality to be better here, and the map's fusion mode leaves this one
              *     out), `too_old`, `waiting` (newer than the last odometry), `carried_over` (the pose on another map, in the frame of
              *     this one).
@@ -2134,7 +2212,7 @@ export interface components {
         CorrectionsBody: {
             /** @description The latest 200 of each modality, oldest first; without `repeated` ones, which tell nothing new. */
             corrections: components["schemas"]["CorrectionBody"][];
-            /** @description What the pose rests on now: `odometry`, `landmarks`, `guided`, `laser`, `relocalisation`; empty without a pose. */
+            /** @description What the pose rests on now: `odometry`, `landmarks`, `guided`, `laser`, `relocalisation`, `by_hand`; empty without a pose. */
             modalities: string[];
             /**
              * @description For each modality how many fixes came to which end. For the laser also why scans gave no fix: `no_pose` (there is
@@ -2675,6 +2753,18 @@ export interface components {
         };
         /** @description Long work. */
         Job: {
+            /** @description Name of the token that asked for it; `server` for what the server does by itself. */
+            by?: string;
+            /**
+             * Format: int64
+             * @description When it was asked for, ms since the Unix epoch.
+             */
+            created_ms?: number;
+            /**
+             * Format: int64
+             * @description When it ended.
+             */
+            ended_ms?: number | null;
             /**
              * Format: int64
              * @description Its number, counting up over all maps.
@@ -2693,6 +2783,11 @@ export interface components {
             progress: number;
             /** @description What came of it. */
             result?: unknown;
+            /**
+             * Format: int64
+             * @description When it was begun last; absent while it waits, and for jobs of earlier builds.
+             */
+            started_ms?: number | null;
             /** @description Where it stands. */
             state: components["schemas"]["JobState"];
         };
@@ -2746,6 +2841,8 @@ export interface components {
         };
         /** @description How a landmark differs. */
         LandmarkDifference: {
+            after?: components["schemas"]["SizeAndPlace"] | null;
+            before?: components["schemas"]["SizeAndPlace"] | null;
             /** @description Whether it is new, gone, or differs. */
             change: components["schemas"]["ChangeKind"];
             /** @description Of one that stays: name, size, place. */
@@ -2988,6 +3085,8 @@ export interface components {
             draft_of?: string | null;
             /** @description The floor it belongs to, in words. */
             floor?: string | null;
+            /** @description A picture is shown under it: `GET /maps/{map}/underlay`. */
+            has_underlay?: boolean;
             /**
              * Format: int64
              * @description Landmarks in it, learnt or not.
@@ -3502,6 +3601,18 @@ export interface components {
         Page_Job: {
             /** @description The items, in order. */
             items: {
+                /** @description Name of the token that asked for it; `server` for what the server does by itself. */
+                by?: string;
+                /**
+                 * Format: int64
+                 * @description When it was asked for, ms since the Unix epoch.
+                 */
+                created_ms?: number;
+                /**
+                 * Format: int64
+                 * @description When it ended.
+                 */
+                ended_ms?: number | null;
                 /**
                  * Format: int64
                  * @description Its number, counting up over all maps.
@@ -3520,6 +3631,11 @@ export interface components {
                 progress: number;
                 /** @description What came of it. */
                 result?: unknown;
+                /**
+                 * Format: int64
+                 * @description When it was begun last; absent while it waits, and for jobs of earlier builds.
+                 */
+                started_ms?: number | null;
                 /** @description Where it stands. */
                 state: components["schemas"]["JobState"];
             }[];
@@ -3571,6 +3687,8 @@ export interface components {
         Page_LandmarkDifference: {
             /** @description The items, in order. */
             items: {
+                after?: components["schemas"]["SizeAndPlace"] | null;
+                before?: components["schemas"]["SizeAndPlace"] | null;
                 /** @description Whether it is new, gone, or differs. */
                 change: components["schemas"]["ChangeKind"];
                 /** @description Of one that stays: name, size, place. */
@@ -3612,6 +3730,8 @@ export interface components {
                 draft_of?: string | null;
                 /** @description The floor it belongs to, in words. */
                 floor?: string | null;
+                /** @description A picture is shown under it: `GET /maps/{map}/underlay`. */
+                has_underlay?: boolean;
                 /**
                  * Format: int64
                  * @description Landmarks in it, learnt or not.
@@ -3645,6 +3765,7 @@ export interface components {
         Page_Robot: {
             /** @description The items, in order. */
             items: {
+                activity?: components["schemas"]["RobotActivity"] | null;
                 /** @description Its software is connected, or sent a message within the last 3 s. */
                 alive: boolean;
                 conflict?: components["schemas"]["EpochConflictBody"] | null;
@@ -3956,6 +4077,34 @@ export interface components {
              */
             y_m: number;
         };
+        /** @description Where a person says that a robot is. */
+        PoseByHand: {
+            /**
+             * Format: double
+             * @description Standard deviation of each coordinate; 0.5 by default, 0.01 to 10.
+             */
+            sigma_m?: number;
+            /**
+             * Format: double
+             * @description Standard deviation of the heading; 0.35 by default, 0.01 to 3.15.
+             */
+            sigma_rad?: number;
+            /**
+             * Format: double
+             * @description Heading in the map, -2 pi to 2 pi.
+             */
+            theta_rad: number;
+            /**
+             * Format: double
+             * @description Metres, in the robot's map.
+             */
+            x_m: number;
+            /**
+             * Format: double
+             * @description Metres, in the robot's map.
+             */
+            y_m: number;
+        };
         /** @description A place where a robot may be. */
         PoseHypothesisBody: {
             /** @description Over (x, y, theta), row-major. */
@@ -4115,6 +4264,20 @@ export interface components {
              */
             sigma_rad?: number | null;
         };
+        /** @description A refused frame of a robot. */
+        RefusedFrame: {
+            /**
+             * Format: int64
+             * @description Since it was refused.
+             */
+            ago_ms: number;
+            /** @description The stable code. */
+            code: string;
+            /** @description A sentence for a person. */
+            detail: string;
+            /** @description The field at fault. */
+            field: string;
+        };
         /** @description How far a robot's relocalisation has come. */
         RelocalisationStatus: {
             /**
@@ -4197,6 +4360,7 @@ export interface components {
         ReplayedPose: "same" | "gained" | "lost" | "moved";
         /** @description A robot. */
         Robot: {
+            activity?: components["schemas"]["RobotActivity"] | null;
             /** @description Its software is connected, or sent a message within the last 3 s. */
             alive: boolean;
             conflict?: components["schemas"]["EpochConflictBody"] | null;
@@ -4210,6 +4374,32 @@ export interface components {
             /** @description `[a-z0-9_-]{1,64}`, unique. */
             name: string;
             pose?: components["schemas"]["RobotPose"] | null;
+        };
+        /** @description What a robot has done since the server started. */
+        RobotActivity: {
+            /**
+             * Format: int64
+             * @description Frames that were searched for landmarks and answered.
+             */
+            answered: number;
+            /**
+             * Format: double
+             * @description Answered frames in a second, over the last ten whole seconds, or all since its first message.
+             */
+            frames_per_s: number;
+            /**
+             * Format: int64
+             * @description Since the last message: a frame, odometry or a scan.
+             */
+            last_message_ms: number;
+            /**
+             * Format: int64
+             * @description Since the last frame in which a landmark was named; absent if there was none.
+             */
+            last_recognised_ms?: number | null;
+            last_refusal?: components["schemas"]["RefusedFrame"] | null;
+            /** @description Refused frames, by code. */
+            refused: Record<string, never>;
         };
         /** @description Where a robot stands. */
         RobotAssignment: {
@@ -4456,6 +4646,11 @@ export interface components {
              * @description 0.01 to 100.
              */
             width_m: number;
+        };
+        /** @description Size and place of a landmark, as far as they are known. */
+        SizeAndPlace: {
+            place?: components["schemas"]["Place"] | null;
+            size?: components["schemas"]["Size"] | null;
         };
         /** @description A stored answer with everything that was said. */
         StoredAnswer: {
@@ -4738,6 +4933,33 @@ export interface components {
              * @description Lower left corner of the lower left pixel, y.
              */
             y_m: number;
+        };
+        /** @description A robot that sends messages and is not registered. */
+        UnknownRobot: {
+            /** @description The camera of its last frame; absent if it sent none. */
+            camera?: string | null;
+            /**
+             * Format: int64
+             * @description Since the first of them.
+             */
+            first_ms: number;
+            /**
+             * Format: int64
+             * @description Since the last of them.
+             */
+            last_ms: number;
+            /**
+             * Format: int64
+             * @description Its refused messages.
+             */
+            messages: number;
+            /** @description The name it uses. */
+            name: string;
+        };
+        /** @description Robots that send messages and are not registered. */
+        UnknownRobots: {
+            /** @description By name; at most 64, those that were heard last. */
+            robots: components["schemas"]["UnknownRobot"][];
         };
         /**
          * @description What became of an upload.
@@ -5800,6 +6022,146 @@ export interface operations {
             };
             /** @description busy, storage_failed */
             503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    load: {
+        parameters: {
+            query?: {
+                /** @description Name of the new map, `[a-z0-9_-]{1,64}`; left out, that of the bundle. */
+                name?: string;
+                /** @description Leave out the link to the map that it lies in; otherwise a map of that name must be there. */
+                without_link?: boolean;
+            };
+            header?: {
+                /** @description A fresh text of visible ASCII characters for each creation, the same one to repeat it: the repeat changes nothing and gets the first answer, for a day. */
+                "Idempotency-Key"?: string;
+            };
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /** @example @office.zip */
+                "application/zip": number[];
+            };
+        };
+        responses: {
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Map"];
+                };
+            };
+            /** @description bad_query, bad_body */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description unauthenticated: the role operator is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description host_not_allowed, origin_not_allowed; forbidden: less than the role operator, for all maps; page_header_missing */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description unknown_map: the map that it lies in */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description timeout; `may_be_done: true` if it is a change that had begun */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description exists, too_many, too_deep, in_progress */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description too_large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description not_zip */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description bad_name; not_a_bundle, newer_format, bundle_damaged, bad_path, too_large, missing, invalid_value: what is wrong with the bundle, idempotency_key_reused */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description internal; not_published, with `may_be_done: true` */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description busy, storage_failed, too_many_uploads */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description storage_full */
+            507: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -7187,6 +7549,90 @@ export interface operations {
             };
             /** @description storage_full */
             507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    save: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                map: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/zip": unknown;
+                };
+            };
+            /** @description unauthenticated: the role teacher is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description host_not_allowed, origin_not_allowed; forbidden: less than the role teacher; page_header_missing */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description not_found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description timeout; `may_be_done: true` if it is a change that had begun */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description too_many: bytes of one map, or files of a bundle */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description picture_damaged, internal; not_published, with `may_be_done: true` */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description busy, storage_failed */
+            503: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -15564,6 +16010,148 @@ export interface operations {
             };
         };
     };
+    put: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "sigma_m": 0.5,
+                 *       "sigma_rad": 0.35,
+                 *       "theta_rad": 1.57,
+                 *       "x_m": 4.2,
+                 *       "y_m": 1.5
+                 *     }
+                 */
+                "application/json": components["schemas"]["PoseByHand"];
+            };
+        };
+        responses: {
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["RobotPose"];
+                };
+            };
+            /** @description bad_json */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description unauthenticated: the role operator is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description host_not_allowed, origin_not_allowed; forbidden: less than the role operator; page_header_missing */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description not_found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description timeout; `may_be_done: true` if it is a change that had begun */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description no_odometry: none was heard for 2 s */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description too_large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description not_json */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description out_of_range, invalid_value */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description internal; not_published, with `may_be_done: true` */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description busy, storage_failed, too_many_uploads */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description storage_full */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
     get: {
         parameters: {
             query?: never;
@@ -16588,6 +17176,70 @@ export interface operations {
             };
             /** @description storage_full */
             507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    unknown: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["UnknownRobots"];
+                };
+            };
+            /** @description unauthenticated: the role operator is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description host_not_allowed, origin_not_allowed; forbidden: less than the role operator, for all maps; page_header_missing */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description timeout; `may_be_done: true` if it is a change that had begun */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description internal; not_published, with `may_be_done: true` */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description busy, storage_failed */
+            503: {
                 headers: {
                     [name: string]: unknown;
                 };

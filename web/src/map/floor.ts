@@ -43,6 +43,7 @@ export class Floor {
       keyboardEventTarget: target,
       interactions: interactions({ onFocusOnly: false }).extend([new DragRotate({ condition: altKeyOnly })]),
     });
+    this.map.updateSize();
     this.map.addLayer(this.#grid);
     this.map.on("singleclick", ({ pixel, coordinate }) => {
       const at: Point = [coordinate[0] ?? 0, coordinate[1] ?? 0];
@@ -67,7 +68,8 @@ export class Floor {
 
   /** Shows these bounds, with a margin. */
   fit(bounds: Bounds): void {
-    this.map.getView().fit(bounds, { padding: [40, 40, 40, 40], maxZoom: undefined as unknown as number, minResolution: 0.005 });
+    const [width = 0, height = 0] = this.map.getSize() ?? [];
+    this.map.getView().fit(bounds, { size: [width, height], padding: [48, 48, 48, 48], minResolution: 0.005 });
   }
 
   /** Goes back to a view of `onmove`. Whether it is one. */

@@ -33,9 +33,10 @@ export type LinkState = "connecting" | "live" | "lost";
 
 /** Follows the robots of a map. `changed` is called when the map itself has changed. Call `close` at the end. */
 export class LiveMap {
-  robots = $state.raw(new Map<string, LiveRobot>());
+  robots = $state.raw<ReadonlyMap<string, LiveRobot>>(new Map());
   link = $state<LinkState>("connecting");
   #source: EventSource;
+  #heard = new Map<string, LiveRobot>();
   #pending = false;
 
   constructor(map: string, changed: () => void) {
@@ -69,10 +70,10 @@ export class LiveMap {
   }
 
   #of(name: string): LiveRobot {
-    let robot = this.robots.get(name);
+    let robot = this.#heard.get(name);
     if (!robot) {
       robot = { name, is_connected: true, covariance: [], trust: "unspecified", posed_ms: 0, trail: [] };
-      this.robots.set(name, robot);
+      this.#heard.set(name, robot);
     }
     return robot;
   }
@@ -95,7 +96,7 @@ export class LiveMap {
     this.#pending = true;
     requestAnimationFrame(() => {
       this.#pending = false;
-      this.robots = new Map(this.robots);
+      this.robots = new Map([...this.#heard].map(([name, robot]) => [name, { ...robot }]));
     });
   }
 }

@@ -19,3 +19,11 @@ export function overlay(points: readonly Point[], is_line: boolean): VectorLayer
   const source = new VectorSource<Feature<LineString | MultiPoint>>({ features });
   return new VectorLayer({ source, style, zIndex: 9 }) as unknown as VectorLayer;
 }
+
+/** Lines from where something was to where it is. */
+export function moves(all: readonly [Point, Point][]): VectorLayer {
+  const { accent } = colours();
+  const source = new VectorSource({ features: all.map((ends) => new Feature(new LineString(ends))) });
+  const style = new Style({ stroke: new Stroke({ color: accent, width: 2, lineDash: [6, 4] }) });
+  return new VectorLayer({ source, style, zIndex: 8 }) as unknown as VectorLayer;
+}

@@ -28,6 +28,8 @@ const OPERATIONS: Record<string, string> = {
   "PUT /maps/{map}/modalities": "Choice of modalities changed",
   "PUT /robots/{robot}": "Robot registered or moved",
   "DELETE /robots/{robot}": "Robot removed",
+  "PUT /robots/{robot}/pose": "Robot's pose set by hand",
+  "POST /bundles": "Map loaded of a file",
   "POST /robots/{robot}/certificates": "Certificate issued",
   "DELETE /robots/{robot}/certificates/{serial}": "Certificate revoked",
   "POST /tokens": "Token created",

@@ -32,3 +32,20 @@ export function landmarkText(difference: LandmarkDifference): string {
   if (difference.views_removed) words.push(`${count(difference.views_removed, "photograph")} less`);
   return words.join("; ");
 }
+
+type Spot = [number, number];
+
+/** Where landmarks were and are, as far as both are known and differ. */
+export function movesOf(items: readonly LandmarkDifference[]): [Spot, Spot][] {
+  return items.flatMap(({ before, after }): [Spot, Spot][] => {
+    const [from, to] = [before?.place, after?.place];
+    if (!from || !to || (from.x_m === to.x_m && from.y_m === to.y_m)) return [];
+    return [[[from.x_m, from.y_m], [to.x_m, to.y_m]]];
+  });
+}
+
+/** By how much a landmark was moved; empty if it was not. */
+export function movedText(difference: LandmarkDifference): string {
+  const [move] = movesOf([difference]);
+  return move ? `; moved by ${Math.hypot(move[1][0] - move[0][0], move[1][1] - move[0][1]).toFixed(2)} m` : "";
+}

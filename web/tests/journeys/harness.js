@@ -1,0 +1,85 @@
+// What every journey needs: the real server with driving robots, a browser, and checks that hold on every page: no error in
+// the console, no request to another origin, nothing serious from axe-core, nothing wider than the screen.
+import assert from "node:assert/strict";
+import { spawn } from "node:child_process";
+import { mkdirSync, readFileSync } from "node:fs";
+import { createRequire } from "node:module";
+import { chromium } from "playwright-core";
+
+const PROGRAM = process.env.WAYMARK_PROGRAM ?? new URL("../../../target/debug/waymark", import.meta.url).pathname;
+const CHROMIUM = process.env.CHROMIUM ?? "/usr/bin/chromium";
+const OUTPUT = new URL("../output/", import.meta.url).pathname;
+const AXE = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
+/** Time for anything that a journey waits for, ms: two cores are shared with driving robots. */
+export const SOON = 90_000;
+
+export const DESKTOP = { width: 1280, height: 800 };
+export const PHONE = { width: 390, height: 844 };
+
+/** Starts `waymark demo --stay`: a corridor whose posters are taught, and robots that drive. */
+export async function demo() {
+  const child = spawn(PROGRAM, ["demo", "--stay", "--legs", "40", "--robots", "2", "--rate-hz", "1", "--http", "127.0.0.1:0"], {
+    stdio: ["ignore", "pipe", "pipe"],
+  });
+  let said = "";
+  const link = await new Promise((found, failed) => {
+    const hear = (text) => {
+      said += text;
+      const match = /http:\/\/[^\s/]+\/open\?code=\S+/.exec(said);
+      if (match) found(match[0]);
+    };
+    child.stdout.setEncoding("utf8").on("data", hear);
+    child.stderr.setEncoding("utf8").on("data", hear);
+    child.on("exit", (code) => failed(new Error(`the server has ended with ${code}: ${said}`)));
+    setTimeout(() => failed(new Error(`no link of the page within 5 min: ${said}`)), 300_000).unref();
+  });
+  const stop = () => new Promise((ended) => {
+    child.removeAllListeners("exit");
+    child.on("exit", ended);
+    child.kill("SIGINT");
+    setTimeout(() => child.kill("SIGKILL"), 20_000).unref();
+  });
+  return { link, origin: new URL(link).origin, stop };
+}
+
+/** A browser that is signed in by a link. */
+export async function browser({ link, origin }) {
+  const args = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync"];
+  const started = await chromium.launch({ executablePath: CHROMIUM, args });
+  const context = await started.newContext({ viewport: DESKTOP, baseURL: origin });
+  const first = await context.newPage();
+  await first.goto(link);
+  await first.close();
+  return { context, close: () => started.close() };
+}
+
+/** Opens an address, and collects what may not happen. */
+export async function open(context, origin, address, size = DESKTOP) {
+  const page = await context.newPage();
+  page.setDefaultTimeout(SOON);
+  await page.setViewportSize(size);
+  const faults = [];
+  page.on("console", (message) => message.type() === "error" && faults.push(message.text()));
+  page.on("pageerror", (error) => faults.push(String(error)));
+  page.on("request", (request) => {
+    const to = new URL(request.url());
+    if (to.origin !== origin && !["blob:", "data:"].includes(to.protocol)) faults.push(`a request to ${to.origin}`);
+  });
+  page.faults = faults;
+  await page.goto(address);
+  return page;
+}
+
+/** Checks what holds on every page, and keeps a picture of it. */
+export async function check(page, name) {
+  await page.evaluate(AXE);
+  const { violations } = await page.evaluate(() => globalThis.axe.run(document, { resultTypes: ["violations"] }));
+  const serious = violations.filter(({ impact }) => impact === "serious" || impact === "critical");
+  const told = serious.map(({ id, nodes }) => `${id}: ${nodes.map(({ html }) => html).slice(0, 3).join(" ")}`);
+  assert.deepEqual(told, [], `axe-core on ${name}`);
+  const beyond = await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth);
+  assert.ok(beyond <= 0, `${name} is ${beyond} px wider than the screen`);
+  mkdirSync(OUTPUT, { recursive: true });
+  await page.screenshot({ path: `${OUTPUT}${name}.png` });
+  assert.deepEqual(page.faults, [], `faults of ${name}`);
+}

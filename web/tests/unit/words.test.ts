@@ -1,0 +1,78 @@
+import { readFileSync } from "node:fs";
+import { expect, test } from "vitest";
+import rights from "../../src/api/rights.json";
+import { path } from "../../src/api/client";
+import type { Landmark } from "../../src/api/types";
+import { ago, bytes, count, degrees } from "../../src/words/amounts";
+import { operation } from "../../src/words/changes";
+import { summaryText } from "../../src/words/difference";
+import { gateText } from "../../src/words/gates";
+import { type LiveQuad, named, quadKind, quadText } from "../../src/words/quads";
+import { stateOf } from "../../src/words/states";
+import { area, proposals } from "../../src/pages/teach/photograph";
+
+/** Operations that change nothing that is kept, or are asked for by programs alone. */
+const WORDLESS = /recognise|localise|visible|coverage|gaze|calibrate|session|replay|recording|mapping|gatherings|jobs|reference-runs|bundle|pose/;
+
+test("every change has words", () => {
+  const wordless = Object.keys(rights).filter((name) => !name.startsWith("GET ") && !WORDLESS.test(name) && operation(name) === name);
+  expect(wordless).toEqual([]);
+});
+
+test("every gate of the wire has words", () => {
+  const proto = readFileSync("../protos/waymark/v1/waymark.proto", "utf8");
+  const listed = /the gate that refused it: ([^.]*)\./s.exec(proto)?.[1] ?? "";
+  const gates = listed.replace(/\/\/|\([^)]*\)/gs, " ").split(",").map((gate) => gate.trim()).filter(Boolean);
+  expect(gates.length).toBeGreaterThan(8);
+  for (const gate of gates) expect(gateText(gate), gate).toMatch(/ /);
+});
+
+const landmark = (fields: Partial<Landmark>): Landmark => ({
+  name: "a", status: "active", health: "sound", views: 3, failed_gates: [], size: { width_m: 1, height_m: 1 },
+  place: { x_m: 0, y_m: 0, z_m: 1, theta_rad: 0 }, ...fields,
+});
+
+test("the worst is the state of a landmark", () => {
+  expect(stateOf(landmark({}))).toBe("active");
+  expect(stateOf(landmark({ place: null }))).toBe("not-placed");
+  expect(stateOf(landmark({ size: null }))).toBe("not-placed");
+  expect(stateOf(landmark({ health: "flagged" }))).toBe("flagged");
+  expect(stateOf(landmark({ health: "quarantined", status: "learning" }))).toBe("quarantined");
+  expect(stateOf(landmark({ status: "inactive", health: "flagged" }))).toBe("inactive");
+});
+
+const quad = (fields: Partial<LiveQuad>): LiveQuad => ({ corners: [], verdict: "unknown", kind: "detected", confidence: 0, ...fields });
+
+test("a quad is called by what named it, and nothing else", () => {
+  const unique = quad({ verdict: "unique", landmark: "door", confidence: 0.97 });
+  expect([named(unique)?.landmark, quadText(unique), quadKind(unique)]).toEqual(["door", "door (97 %)", "named"]);
+  const guided = quad({ sighting: "guided", guided_landmark: "door" });
+  expect([quadText(guided), quadKind(guided)]).toEqual(["door, by the known position", "by-pose"]);
+  const unsure = quad({ verdict: "ambiguous", candidates: [{ landmark: "door", ratio: 0.9, refusal: "corners" }] });
+  expect([named(unsure), quadKind(unsure)]).toEqual([undefined, "unsure"]);
+  expect(quadText(unsure)).toContain("corners");
+  expect(quadText(quad({}))).toBe("no known landmark");
+});
+
+test("amounts are short and right", () => {
+  expect([bytes(999), bytes(64_000), bytes(2_500_000)]).toEqual(["999 B", "64 kB", "2.5 MB"]);
+  expect([count(1, "map"), count(2000, "landmark")]).toEqual(["1 map", "2,000 landmarks"]);
+  expect([degrees(-Math.PI / 2), degrees(2 * Math.PI), degrees(1e-9)]).toEqual(["270°", "0°", "0°"]);
+  expect([ago(200), ago(30_000), ago(7_200_000)]).toEqual(["now", "30 s ago", "2 h ago"]);
+});
+
+test("a difference is told in one line", () => {
+  const none = { landmarks: [], landmarks_added: 0, landmarks_changed: 0, landmarks_removed: 0, models_changed: 0, reference_runs_added: 0, reference_runs_removed: 0, settings: [], underlay_changed: false, views_added: 0, views_removed: 0, walls_changed: false };
+  expect(summaryText(none)).toBe("nothing");
+  expect(summaryText({ ...none, landmarks_added: 1, views_added: 4, walls_changed: true })).toBe("1 landmark added, 4 photographs added, walls changed");
+});
+
+test("names in addresses are encoded", () => {
+  expect(path`/maps/${"a/b"}/landmarks/${"c d"}`).toBe("/maps/a%2Fb/landmarks/c%20d");
+});
+
+test("proposals are the quads of four corners, largest first", () => {
+  const corners = (side: number) => [[0, 0], [side, 0], [side, side], [0, side]].map(([u_px = 0, v_px = 0]) => ({ u_px, v_px }));
+  const found = proposals({ seq: 1, status: "no_match", latency_ms: 1, quads: [quad({ corners: corners(2) }), quad({ corners: corners(9) }), quad({ corners: corners(3).slice(1) })] });
+  expect(found.map(area)).toEqual([81, 4]);
+});
