@@ -27,3 +27,15 @@ export function moves(all: readonly [Point, Point][]): VectorLayer {
   const style = new Style({ stroke: new Stroke({ color: accent, width: 2, lineDash: [6, 4] }) });
   return new VectorLayer({ source, style, zIndex: 8 }) as unknown as VectorLayer;
 }
+
+/** Points of a path by how many landmarks are seen from them: none, one, more. */
+export function covered(steps: readonly { x_m: number; y_m: number; landmarks: unknown[] }[]): VectorLayer {
+  const { state } = colours();
+  const features = steps.map(({ x_m, y_m, landmarks }) => {
+    const colour = landmarks.length === 0 ? state.quarantined : landmarks.length === 1 ? state.inactive : state.active;
+    const made = new Feature(new MultiPoint([[x_m, y_m]]));
+    made.setStyle(new Style({ image: new Circle({ radius: 5, fill: new Fill({ color: colour }) }), zIndex: 3 }));
+    return made;
+  });
+  return new VectorLayer({ source: new VectorSource({ features }), zIndex: 8 }) as unknown as VectorLayer;
+}

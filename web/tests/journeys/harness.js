@@ -10,6 +10,8 @@ const PROGRAM = process.env.WAYMARK_PROGRAM ?? new URL("../../../target/debug/wa
 const CHROMIUM = process.env.CHROMIUM ?? "/usr/bin/chromium";
 const OUTPUT = new URL("../output/", import.meta.url).pathname;
 const AXE = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
+const GUIDE = new URL("../../../docs/pictures/pages/", import.meta.url).pathname;
+const PICTURES = ["map-desk", "landmarks-desk", "landmark-desk", "teach", "answer-desk", "history"];
 /** Time for anything that a journey waits for, ms: two cores are shared with driving robots. */
 export const SOON = 90_000;
 
@@ -81,5 +83,7 @@ export async function check(page, name) {
   assert.ok(beyond <= 0, `${name} is ${beyond} px wider than the screen`);
   mkdirSync(OUTPUT, { recursive: true });
   await page.screenshot({ path: `${OUTPUT}${name}.png` });
+  // The pictures of docs/guides/administrator.md, when they are to be made anew.
+  if (process.env.WAYMARK_PICTURES && PICTURES.includes(name)) await page.screenshot({ path: `${GUIDE}${name}.png` });
   assert.deepEqual(page.faults, [], `faults of ${name}`);
 }

@@ -78,6 +78,11 @@ for (const [size, where] of [[undefined, "desk"], [PHONE, "phone"]]) {
     await page.waitForTimeout(400); // two clicks that follow fast are one double click, which zooms
     await page.mouse.click(box.x + box.width / 2, box.y + box.height / 2);
     await page.getByText(/Length: \d+\.\d\d m/).waitFor();
+    await page.getByRole("button", { name: "Check a path" }).click();
+    await page.mouse.click(box.x + box.width / 3, box.y + box.height / 2);
+    await page.waitForTimeout(400);
+    await page.mouse.click(box.x + box.width / 2, box.y + box.height / 2);
+    await page.getByText(/a landmark is seen\. \d+ blind parts?/).waitFor();
     await check(page, `map-${where}`);
   });
 
