@@ -104,7 +104,7 @@ pub struct LandmarkModelDetail {
     pub saliency: f64,
     /// Keypoints of the mean icon that are found in the other views, too.
     pub stable_points: usize,
-    /// Spread of the viewpoints of all views, 0 to 1.
+    /// Spread of the viewpoints of all views (visibility confidence), 0 to 10.
     pub visibility_confidence: f64,
     /// The same of photographed views only; 0 with fewer than two.
     pub photographed_visibility_confidence: f64,

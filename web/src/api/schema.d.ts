@@ -2963,7 +2963,7 @@ export interface components {
             views: number;
             /**
              * Format: double
-             * @description Spread of the viewpoints of all views, 0 to 1.
+             * @description Spread of the viewpoints of all views (visibility confidence), 0 to 10.
              */
             visibility_confidence: number;
         };
