@@ -24,6 +24,7 @@ const ROUTES: Route[] = [
   route("/maps/:map/landmarks", () => import("./pages/landmarks/Landmarks.svelte")),
   route("/maps/:map/landmarks/:landmark", () => import("./pages/landmarks/OneLandmark.svelte")),
   route("/maps/:map/teach", () => import("./pages/teach/Teach.svelte")),
+  route("/maps/:map/gather", () => import("./pages/gather/Gather.svelte")),
   route("/maps/:map/history", () => import("./pages/history/History.svelte")),
   route("/maps/:map/drafts/:draft", () => import("./pages/history/OneDraft.svelte")),
   route("/robots", () => import("./pages/robots/Robots.svelte")),

@@ -208,6 +208,24 @@ test("a landmark is taught by a robot's frame, learnt and tried", async () => {
   assert.equal(landmark.size.width_m, 0.8);
 });
 
+test("candidates appear while a robot drives, and are named, accepted or thrown away", async () => {
+  const [{ name: robot }] = (await api("GET", "/robots")).items;
+  const page = await go(`/maps/${MAP}/gather`);
+  await page.getByLabel("Robot").selectOption(robot);
+  await page.getByRole("button", { name: "Begin to gather" }).click();
+  await page.getByRole("article", { name: /Candidate \d+/ }).first().waitFor();
+  await page.getByRole("button", { name: "Stop" }).click();
+  await page.getByRole("button", { name: "Begin to gather" }).waitFor();
+  await page.getByRole("button", { name: /Take the name/ }).first().click();
+  await check(page, "gather");
+  await page.getByRole("button", { name: "Accept what is named, and learn" }).click();
+  await page.getByText("1 landmark accepted and learnt.").waitFor();
+  await page.getByRole("button", { name: "Throw everything away" }).click();
+  await page.getByRole("dialog").getByRole("button", { name: "Throw away" }).click();
+  await page.getByText("The gathering is thrown away.").waitFor();
+  assert.deepEqual(page.faults, []);
+});
+
 test("a viewer sees no button that may not be pressed, and is refused all the same", async () => {
   const { text } = await api("POST", "/tokens", { name: "guest", role: "viewer" });
   const guest = await its.context.browser().newContext({ baseURL: server.origin });
