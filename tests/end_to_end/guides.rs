@@ -5,7 +5,11 @@ use std::{path::Path, process::Command};
 use tests::{documents::markdown, guide_files, guides, machines, skipped};
 
 /// Guides that are run by tests of another part.
-const ELSEWHERE: [(&str, &str); 1] = [("python", "client/python/tests/test_guide.py")];
+const ELSEWHERE: [(&str, &str); 2] = [
+    ("python", "client/python/tests/test_guide.py"),
+    // It names what is on the pages; journeys in a browser use it.
+    ("administrator", "web/tests/unit/guide.test.ts"),
+];
 
 fn run(name: &str) {
     let guide = markdown("docs/guides").into_iter().find(|g| g.file_stem().is_some_and(|s| s == name));

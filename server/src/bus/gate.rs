@@ -83,27 +83,32 @@ impl GateSettings {
             frame_bytes: self.frame_bytes,
         };
         let session = router::open(&settings).await?;
-        self.join(&session).await;
-        Ok(session)
+        if self.join(&session).await {
+            return Ok(session);
+        }
+        // Robots would be linked, and never heard.
+        close(&session).await;
+        let detail = "the router of robots and the server's own do not reach each other".to_owned();
+        Err(BusError::Listen { endpoint: self.link_endpoint.clone(), detail })
     }
 
     fn fault(&self, error: &CertificateError) -> BusError {
         BusError::Listen { endpoint: self.endpoint.clone(), detail: error.to_string() }
     }
 
-    /// Waits until messages pass to the server's own router: earlier ones would be lost.
-    async fn join(&self, session: &zenoh::Session) {
-        let Ok(robot) = Name::new(ASKS) else { return };
+    /// Waits until messages pass to the server's own router: earlier ones would be lost. False if they do not.
+    async fn join(&self, session: &zenoh::Session) -> bool {
+        let Ok(robot) = Name::new(ASKS) else { return false };
         let (key, until) = (self.keys.build(&Key::Hello(robot)), Instant::now() + JOIN);
         while Instant::now() < until {
             if let Ok(replies) = session.get(&key).timeout(ASK_EVERY * 10).await
                 && replies.recv_async().await.is_ok_and(|reply| reply.result().is_ok())
             {
-                return;
+                return true;
             }
             tokio::time::sleep(ASK_EVERY).await;
         }
-        tracing::error!(follows = "messages of robots may not arrive", "routers_not_joined");
+        false
     }
 }
 
@@ -114,7 +119,13 @@ impl Gate {
         let mut news = (settings.registry.changes(), settings.certificates.current());
         let change = *news.0.borrow_and_update();
         let policy = settings.policy();
-        let session = settings.open(&policy).await?;
+        let session = match settings.open(&policy).await {
+            Ok(session) => session,
+            Err(error) => {
+                tracing::warn!(%error, follows = "it is tried once more", "gate_not_open");
+                settings.open(&policy).await?
+            }
+        };
         settings.registry.set_applied(change);
         let (stop, stopping) = watch::channel(false);
         let task = tokio::spawn(keep(settings, policy, session, news, stopping, pulse));

@@ -27,8 +27,6 @@ use std::{fs::File, io};
 use tokio::io::{AsyncReadExt as _, AsyncSeekExt as _, AsyncWriteExt as _};
 use utoipa_axum::{router::OpenApiRouter, routes};
 
-/// Path of what makes a map of a bundle. It reads its body to a file, and looks at its key itself.
-pub(super) const LOAD: &str = "/bundles";
 const ZIP: &str = "application/zip";
 /// Bytes of a file that are read at a time.
 const PART_BYTES: usize = 256 << 10;

@@ -1,8 +1,7 @@
 //! `Idempotency-Key`: a creation that is repeated with its key is answered as the first time, and made once.
 
 use super::{
-    API, AppState, bundles, error::ApiError, extract::too_large, reference_runs::PATH_BYTES,
-    upload::FORM_OVERHEAD,
+    API, AppState, error::ApiError, extract::too_large, reference_runs::PATH_BYTES, upload::FORM_OVERHEAD,
 };
 use crate::{
     config::Limits,
@@ -26,6 +25,8 @@ use utoipa::openapi::{
 const KEY: HeaderName = HeaderName::from_static("idempotency-key");
 /// Says that the answer is that of an earlier request with this key.
 const REPLAYED: HeaderName = HeaderName::from_static("idempotency-replayed");
+/// Makes a map of a bundle. Its handler reads the body to a file, and looks at its key itself.
+const LOAD: &str = "/bundles";
 /// Longest key.
 const MAX_KEY: usize = 128;
 
@@ -38,7 +39,7 @@ pub(super) const CREATIONS: &[(&str, LargestBody)] = &[
     ("/maps", json),
     ("/maps/{map}/copies", json),
     ("/maps/{map}/drafts", json),
-    (bundles::LOAD, |limits| limits.bundle_bytes),
+    (LOAD, |limits| limits.bundle_bytes),
     ("/maps/{map}/landmarks", json),
     ("/maps/{map}/bulk/create-landmarks", json),
     ("/maps/{map}/landmarks/{landmark}/views", |limits| limits.upload_bytes + FORM_OVERHEAD),
@@ -59,7 +60,7 @@ pub(super) async fn keyed(app: &AppState, request: Request, next: Next) -> Respo
     let creation = CREATIONS.iter().find(|(at, _)| path == Some(*at));
     match creation {
         // A bundle goes to a file before its digest is known.
-        Some((bundles::LOAD, _)) => next.run(request).await,
+        Some((LOAD, _)) => next.run(request).await,
         Some((_, max)) if request.method() == Method::POST && request.headers().contains_key(KEY) => {
             let max = max(&app.config.limits);
             once(app, request, max, next).await.unwrap_or_else(IntoResponse::into_response)
