@@ -209,9 +209,12 @@ test("a landmark is taught by a robot's frame, learnt and tried", async () => {
 });
 
 test("candidates appear while a robot drives, and are named, accepted or thrown away", async () => {
+  const page = await go("/robots");
+  await page.getByRole("cell", { name: "Live" }).first().waitFor();
   const [{ name: robot }] = (await api("GET", "/robots")).items;
-  const page = await go(`/maps/${MAP}/gather`);
+  await page.goto(`/maps/${MAP}/gather`);
   await page.getByLabel("Robot").selectOption(robot);
+  await page.getByLabel("also further views of known landmarks").check();
   await page.getByRole("button", { name: "Begin to gather" }).click();
   await page.getByRole("article", { name: /Candidate \d+/ }).first().waitFor();
   await page.getByRole("button", { name: "Stop" }).click();
