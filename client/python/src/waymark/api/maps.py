@@ -116,8 +116,8 @@ class Job:
     state: JobState
     progress: float
     message: str
-    by: str
-    created_ms: int
+    by: str = ""
+    created_ms: int = 0
     started_ms: int | None = None
     ended_ms: int | None = None
     result: Any = None
