@@ -29,6 +29,10 @@ fn main() -> Result<(), Box<dyn Error>> {
             let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
             encoder.write_all(&content)?;
             fs::write(&packed, encoder.finish()?)?;
+            let [file, packed] = [&file, &packed].map(|path| path.to_str());
+            let (Some(file), Some(packed)) = (file, packed) else {
+                return Err("a folder that is not UTF-8".into());
+            };
             writeln!(list, "    ({path:?}, include_bytes!({file:?}), include_bytes!({packed:?})),")?;
         }
     }

@@ -203,7 +203,7 @@ impl RunRecord {
 /// The visibility settings as text, checked.
 pub(super) fn visibility_text(settings: Option<VisibilitySettings>) -> Result<Option<String>, BundleError> {
     let Some(settings) = settings else { return Ok(None) };
-    settings.check().map_err(|e| invalid(VISIBILITY, e.field, &e))?;
+    settings.check().map_err(|e| invalid(VISIBILITY, e.field, e))?;
     serde_json::to_string(&settings).map(Some).map_err(|e| invalid(VISIBILITY, "", e))
 }
 

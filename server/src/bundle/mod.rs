@@ -100,8 +100,8 @@ fn refused(fault: Fault, file: impl Into<String>, why: impl Into<String>) -> Bun
 }
 
 /// A value out of its range.
-fn invalid(file: &str, field: impl std::fmt::Display, why: impl ToString) -> BundleError {
-    refused(Fault::InvalidValue, format!("{file}: {field}"), why.to_string())
+fn invalid(file: &str, field: impl std::fmt::Display, why: impl std::fmt::Display) -> BundleError {
+    refused(Fault::InvalidValue, format!("{file}: {field}"), format!("{why}"))
 }
 
 #[cfg(test)]

@@ -113,7 +113,7 @@ async fn load(
             async { bundle::load(&work.store, file, request, &work.config.limits).await.map_err(in_words) };
         Ok::<_, ApiError>(created(shown, loaded).await?.into_response())
     };
-    creation::under_key(&app, &head, digest, answer).await
+    Box::pin(creation::under_key(&app, &head, digest, answer)).await
 }
 
 /// Says what to do about a map that is not there.

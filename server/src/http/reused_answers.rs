@@ -80,14 +80,15 @@ impl ReusedAnswers {
 
     /// Keeps an answer that was made of what `read` stands for.
     fn keep(&self, read: Stamp, question: Question, answer: Answer) {
+        let address = question.path_and_query.len();
         let mut kept = self.lock();
-        let bytes = question.path_and_query.len() + answer.body.len();
+        let bytes = address + answer.body.len();
         if kept.stamp != read || kept.bytes + bytes > MAX_KEPT {
             *kept = Kept { stamp: read, ..Kept::default() };
         }
         kept.bytes += bytes;
-        if let Some(earlier) = kept.answers.insert(question.clone(), answer) {
-            kept.bytes -= question.path_and_query.len() + earlier.body.len();
+        if let Some(earlier) = kept.answers.insert(question, answer) {
+            kept.bytes -= address + earlier.body.len();
         }
     }
 }
