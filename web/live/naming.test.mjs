@@ -5,7 +5,7 @@ import test from "node:test";
 import { readFileSync } from "node:fs";
 import { answerOf, correctionCells, isByPose, labelOf, named, totalsText, trustText } from "./naming.js";
 
-const proto = readFileSync(new URL("../protos/waymark/v1/waymark.proto", import.meta.url), "utf8");
+const proto = readFileSync(new URL("../../protos/waymark/v1/waymark.proto", import.meta.url), "utf8");
 const candidates = [{ landmark: "door-2", ratio: 0.5 }, { landmark: "door-3", ratio: 0.6 }];
 const global = { verdict: "unique", sighting: "global", landmark: "poster", guided_landmark: "", kind: "full", candidates };
 const guided = { verdict: "ambiguous", sighting: "guided", landmark: "", guided_landmark: "door-3", kind: "full", candidates };
