@@ -8,7 +8,6 @@ export type Camera = Schemas["Camera"];
 export type Commit = Schemas["Commit"];
 export type Draft = Schemas["Draft"];
 export type DraftDifference = Schemas["DraftDifference"];
-export type Difference = Schemas["Difference"];
 export type DistanceHistogram = Schemas["DistanceHistogram"];
 export type DuplicatePair = Schemas["DuplicatePair"];
 export type Job = Schemas["Job"];
