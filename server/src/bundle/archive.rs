@@ -218,3 +218,113 @@ fn read(zip: &mut ZipArchive<File>, name: &str) -> Result<Vec<u8>, BundleError> 
     (&mut entry).take(u64::MAX).read_to_end(&mut bytes).map_err(damaged)?;
     Ok(bytes)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Cursor;
+
+    const PLAIN: SimpleFileOptions = SimpleFileOptions::DEFAULT.compression_method(CompressionMethod::Stored);
+
+    /// A zip of these files. It has no manifest.
+    fn packed<'a>(files: impl IntoIterator<Item = (&'a str, &'a [u8], SimpleFileOptions)>) -> Vec<u8> {
+        let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
+        for (name, bytes, options) in files {
+            zip.start_file(name, options).unwrap();
+            zip.write_all(bytes).unwrap();
+        }
+        zip.set_raw_comment(vec![b'0'; SEAL_BYTES as usize].into_boxed_slice()).unwrap();
+        zip.finish().unwrap().into_inner()
+    }
+
+    /// What is said of a zip whose seal is right.
+    fn refusal(mut zip: Vec<u8>) -> (Fault, String) {
+        let end = zip.len() - SEAL_BYTES as usize;
+        let seal = hex(&Sha256::digest(&zip[..end]));
+        zip[end..].copy_from_slice(seal.as_bytes());
+        let mut file = tempfile::tempfile().unwrap();
+        file.write_all(&zip).unwrap();
+        match Reader::open(file) {
+            Err(BundleError::Refused { fault, file, .. }) => (fault, file),
+            Err(other) => panic!("another error: {other}"),
+            Ok(_) => panic!("it is opened"),
+        }
+    }
+
+    /// The same bytes with one name in place of another of its length.
+    fn renamed(mut zip: Vec<u8>, from: &[u8], to: &[u8]) -> Vec<u8> {
+        let places: Vec<usize> =
+            (0..=zip.len() - from.len()).filter(|i| zip[*i..].starts_with(from)).collect();
+        // In front of its bytes, and in the list at the end.
+        assert_eq!(places.len(), 2);
+        for place in places {
+            zip[place..place + to.len()].copy_from_slice(to);
+        }
+        zip
+    }
+
+    #[test]
+    fn a_later_format_is_named_whatever_else_it_says() {
+        let later = br#"{"format": "waymark-map-bundle", "version": 2, "new": 1}"#;
+        assert_eq!(
+            refusal(packed([(MANIFEST, &later[..], PLAIN)])),
+            (Fault::NewerFormat, MANIFEST.to_owned())
+        );
+        let other = br#"{"format": "another", "version": 1}"#;
+        assert_eq!(
+            refusal(packed([(MANIFEST, &other[..], PLAIN)])),
+            (Fault::NotABundle, MANIFEST.to_owned())
+        );
+        assert_eq!(refusal(packed([("map.json", &b"{}"[..], PLAIN)])), (Fault::Missing, MANIFEST.to_owned()));
+    }
+
+    #[test]
+    fn a_name_twice_is_refused() {
+        let twice = packed([("map.json", &b"{}"[..], PLAIN), ("pam.json", &b"[]"[..], PLAIN)]);
+        let (fault, _) = refusal(renamed(twice, b"pam.json", b"map.json"));
+        assert_eq!(fault, Fault::BadPath);
+    }
+
+    #[test]
+    fn a_file_that_claims_more_than_the_bundle_holds_is_refused() {
+        let mut zip = packed([("map.json", &b"{}"[..], PLAIN)]);
+        // In the list at the end: the packed and the whole size follow the checksum.
+        let list = zip.windows(4).position(|bytes| bytes == b"PK\x01\x02").unwrap();
+        for size in [list + 20, list + 24] {
+            zip[size..size + 4].copy_from_slice(&(1_u32 << 30).to_le_bytes());
+        }
+        assert_eq!(refusal(zip), (Fault::TooLarge, "map.json".to_owned()));
+    }
+
+    #[test]
+    fn a_packed_file_is_refused() {
+        let mut zip = packed([("map.json", &b"{}"[..], PLAIN)]);
+        let list = zip.windows(4).position(|bytes| bytes == b"PK\x01\x02").unwrap();
+        // Method 8, deflate, in front of the bytes and in the list.
+        for method in [8, list + 10] {
+            zip[method..method + 2].copy_from_slice(&8_u16.to_le_bytes());
+        }
+        assert_eq!(refusal(zip), (Fault::TooLarge, "map.json".to_owned()));
+    }
+
+    #[test]
+    fn only_plain_names_are_files_of_a_bundle() {
+        for (name, plain) in [
+            ("map.json", true),
+            ("pictures/ab-1.png", true),
+            ("", false),
+            ("/map.json", false),
+            ("../map.json", false),
+            ("pictures/../map.json", false),
+            ("pictures//a.png", false),
+            (".map.json", false),
+            ("Map.json", false),
+            ("a\\b", false),
+            ("c:map.json", false),
+            ("map.json\0", false),
+        ] {
+            assert_eq!(is_plain(name), plain, "{name:?}");
+        }
+        assert!(!is_plain(&"a".repeat(129)));
+    }
+}

@@ -65,7 +65,7 @@ fn actor(parts: &Parts) -> Result<Option<Actor>, ApiError> {
         TokenId::Stored(number) => Some(number),
     };
     Ok(Some(Actor {
-        name: principal.name.clone(),
+        name: principal.name.to_string(),
         token,
         action: format!("{} {}", parts.method, below(matched)),
         target: below(parts.uri.path()),
@@ -112,7 +112,7 @@ fn principal(app: &AppState, parts: &Parts, role: Role) -> Result<Principal, Api
 }
 
 /// The token of a header.
-fn bearer(value: &HeaderValue) -> Option<&str> {
+pub(super) fn bearer(value: &HeaderValue) -> Option<&str> {
     let (scheme, token) = value.to_str().ok()?.split_once(' ')?;
     scheme.eq_ignore_ascii_case("bearer").then(|| token.trim())
 }

@@ -158,7 +158,7 @@ mod tests {
             token: TokenId::Stored(1),
             name: "x".into(),
             role,
-            maps: maps.map(|map| [map.to_owned()].into()),
+            maps: maps.map(|map| Arc::new([map.to_owned()].into())),
             expires_ms: None,
         };
         let of = |map: &str| ServerEventBody::MapChanged { map: map.into(), version: Some(1) };

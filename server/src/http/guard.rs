@@ -3,7 +3,7 @@
 //! A browser reaches the server on behalf of any page it shows; so a request must name this server as its host and, if it
 //! changes anything, come from its own pages or from no page at all. Who asks is the matter of `authorise`.
 
-use super::{AppState, error::ApiError, peer::Peer};
+use super::{AppState, error::ApiError, peer::Peer, reused_answers};
 use crate::config::Limits;
 use axum::{
     body::HttpBody,
@@ -53,9 +53,12 @@ pub(super) async fn guard(State(app): State<AppState>, mut request: Request, nex
     let loopback = is_loopback && !is_encrypted;
     let mut response = match check_origin(request.method(), request.headers(), loopback) {
         Err(error) => error.into_response(),
-        Ok(()) => match tokio::time::timeout(deadline, placed(&app, request, next)).await {
-            Ok(response) => response,
-            Err(_elapsed) => timed_out(&method, deadline).into_response(),
+        Ok(()) => match reused_answers::kept(&app, &request) {
+            Some(response) => response,
+            None => match tokio::time::timeout(deadline, placed(&app, request, next)).await {
+                Ok(response) => response,
+                Err(_elapsed) => timed_out(&method, deadline).into_response(),
+            },
         },
     };
     let ms = started.elapsed().as_secs_f64() * 1e3;

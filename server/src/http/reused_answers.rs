@@ -3,9 +3,15 @@
 //!
 //! An answer here is a function of committed rows and published snapshots alone. The [`Stamp`] of both is taken before the
 //! rows are read; so an answer that is older than its stamp says is never kept.
+//!
+//! A kept answer is given at the door, before the request has found its route: tokens do not change but by their end, which
+//! is looked at each time, and what is kept was asked by the same token before.
 
-use super::{API, AppState, authorise::Asker};
-use crate::identity::TokenId;
+use super::{
+    API, AppState,
+    authorise::{Asker, bearer},
+};
+use crate::{identity::TokenId, store::now_ms};
 use axum::{
     body::{Body, Bytes, HttpBody as _, to_bytes},
     extract::{MatchedPath, Request},
@@ -97,10 +103,23 @@ fn stamp(app: &AppState) -> Stamp {
     Stamp { commits: app.store.commits(), publications: app.store.snapshots().publications() }
 }
 
+/// The kept answer to a read with a token that is still valid. `None` for everything else: it goes on to its route.
+pub(super) fn kept(app: &AppState, request: &Request) -> Option<Response> {
+    let path = request.uri().path().strip_prefix(API)?;
+    if request.method() != Method::GET || !path.starts_with("/maps/") {
+        return None;
+    }
+    let token = bearer(request.headers().get(header::AUTHORIZATION)?)?;
+    let token = app.store.tokens().principal_of(token, now_ms()).ok()?.token;
+    let question = Question { token, path_and_query: request.uri().path_and_query()?.as_str().to_owned() };
+    Some(app.reused.get(stamp(app), &question)?.into_response())
+}
+
 /// Answers a read of a map as before if nothing has changed; lets everything else pass.
 pub(super) async fn reused(app: &AppState, request: Request, next: Next) -> Response {
     let Some(question) = question(&request) else { return next.run(request).await };
     let now = stamp(app);
+    // Sessions of pages have no token to look at before.
     if let Some(answer) = app.reused.get(now, &question) {
         return answer.into_response();
     }

@@ -92,5 +92,6 @@ async fn whoami(Extension(principal): Extension<Principal>) -> Json<Whoami> {
         TokenId::Local => None,
         TokenId::Stored(id) => Some(id),
     };
-    Json(Whoami { name, role, maps: maps.map(|maps| maps.into_iter().collect()), token, expires_ms })
+    let maps = maps.map(|maps| maps.iter().cloned().collect());
+    Json(Whoami { name: name.to_string(), role, maps, token, expires_ms })
 }

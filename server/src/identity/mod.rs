@@ -19,7 +19,10 @@ pub(crate) use secret::{Secret, TokenText};
 pub(crate) use sessions::{CODE_VALID, SESSION_VALID, Sessions};
 
 use protos::api::Role;
-use std::collections::BTreeSet;
+use std::{
+    collections::BTreeSet,
+    sync::{Arc, LazyLock},
+};
 
 /// Which token a principal has shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -30,15 +33,15 @@ pub(crate) enum TokenId {
     Stored(i64),
 }
 
-/// Who asks.
+/// Who asks. A copy shares the texts: each request holds some.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Principal {
     pub(crate) token: TokenId,
     /// Name of the token.
-    pub(crate) name: String,
+    pub(crate) name: Arc<str>,
     pub(crate) role: Role,
     /// Names of the maps that it is for; `None` for all maps and what is above maps.
-    pub(crate) maps: Option<BTreeSet<String>>,
+    pub(crate) maps: Option<Arc<BTreeSet<String>>>,
     /// ms since the Unix epoch.
     pub(crate) expires_ms: Option<i64>,
 }
@@ -46,8 +49,8 @@ pub(crate) struct Principal {
 impl Principal {
     /// Whoever reads the local token: this user of this machine.
     fn local() -> Self {
-        let name = "local".to_owned();
-        Self { token: TokenId::Local, name, role: Role::Admin, maps: None, expires_ms: None }
+        static NAME: LazyLock<Arc<str>> = LazyLock::new(|| "local".into());
+        Self { token: TokenId::Local, name: NAME.clone(), role: Role::Admin, maps: None, expires_ms: None }
     }
 
     /// Whether this map is shown to it.

@@ -27,10 +27,31 @@ pub(crate) enum Denial {
     Expired,
 }
 
+/// A token with its principal at hand.
+#[derive(Debug)]
+struct HeldToken {
+    principal: Principal,
+    is_revoked: bool,
+    sha256: [u8; 32],
+}
+
+impl HeldToken {
+    fn new(PublishedToken { token, sha256 }: PublishedToken) -> Self {
+        let principal = Principal {
+            token: TokenId::Stored(token.id),
+            name: token.name.into(),
+            role: token.role,
+            maps: token.maps.map(|maps| Arc::new(maps.into_iter().collect())),
+            expires_ms: token.expires_ms,
+        };
+        Self { principal, is_revoked: token.revoked_ms.is_some(), sha256 }
+    }
+}
+
 /// All tokens of the server.
 #[derive(Debug, Default)]
 pub(crate) struct TokenRegistry {
-    stored: ArcSwap<BTreeMap<i64, PublishedToken>>,
+    stored: ArcSwap<BTreeMap<i64, HeldToken>>,
     /// Digest of the local token's secret.
     local: ArcSwapOption<[u8; 32]>,
     changes: watch::Sender<()>,
@@ -39,7 +60,7 @@ pub(crate) struct TokenRegistry {
 impl TokenRegistry {
     /// Replaces all stored tokens.
     pub(crate) fn publish(&self, tokens: impl IntoIterator<Item = PublishedToken>) {
-        self.stored.store(Arc::new(tokens.into_iter().map(|t| (t.token.id, t)).collect()));
+        self.stored.store(Arc::new(tokens.into_iter().map(|t| (t.token.id, HeldToken::new(t))).collect()));
         self.changes.send_replace(());
     }
 
@@ -76,20 +97,14 @@ impl TokenRegistry {
             TokenId::Stored(id) => id,
         };
         let stored = self.stored.load();
-        let token = &stored.get(&id).ok_or(Denial::Unknown)?.token;
-        if token.revoked_ms.is_some() {
+        let HeldToken { principal, is_revoked, .. } = stored.get(&id).ok_or(Denial::Unknown)?;
+        if *is_revoked {
             return Err(Denial::Revoked);
         }
-        if token.expires_ms.is_some_and(|end| end <= now_ms) {
+        if principal.expires_ms.is_some_and(|end| end <= now_ms) {
             return Err(Denial::Expired);
         }
-        Ok(Principal {
-            token: TokenId::Stored(id),
-            name: token.name.clone(),
-            role: token.role,
-            maps: token.maps.as_ref().map(|maps| maps.iter().cloned().collect()),
-            expires_ms: token.expires_ms,
-        })
+        Ok(principal.clone())
     }
 }
 

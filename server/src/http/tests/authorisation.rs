@@ -4,7 +4,7 @@ use super::*;
 use crate::{
     identity::authorisation::{Access, Scope, TABLE, access},
     store::{
-        jobs, robots,
+        jobs, now_ms, robots,
         tokens::{self, TokenInsert},
     },
 };
@@ -295,6 +295,17 @@ async fn what_a_principal_may_not_see_is_nowhere_in_its_answers() {
     let foreign = ask("GET", "/maps/yard", "").await;
     let same = foreign.1.to_string().replace("yard", "nowhere");
     assert_eq!((foreign.0, same), (missing.0, missing.1.to_string()));
+}
+
+#[tokio::test]
+async fn an_expired_token_is_given_no_kept_answer() {
+    let service = service().await;
+    let token = token(&service, Role::Viewer, Some("hall"), Some(now_ms() + 1500)).await;
+    let ask = || service.ask_as_it_is(with_token(request("GET", "/api/v1/maps/hall", ""), &token));
+    let (first, kept) = (read(ask().await).await, read(ask().await).await);
+    assert_eq!((first.0, &first), (200, &kept));
+    tokio::time::sleep(Duration::from_millis(1600)).await;
+    assert_eq!(ask().await.status(), StatusCode::UNAUTHORIZED);
 }
 
 #[tokio::test]
