@@ -25,8 +25,15 @@ use std::{
 };
 
 /// What is kept, below [`API`]: reads that rest on committed rows and published snapshots alone.
-const REUSED: [&str; 4] =
-    ["/maps/{map}", "/maps/{map}/landmarks", "/maps/{map}/landmarks/{landmark}", "/maps/{map}/walls"];
+const REUSED: [&str; 5] = [
+    "/maps/{map}",
+    "/maps/{map}/landmarks",
+    "/maps/{map}/landmarks/{landmark}",
+    "/maps/{map}/walls",
+    "/whoami",
+];
+/// How their paths begin.
+const BEGINNINGS: [&str; 2] = ["/maps/", "/whoami"];
 /// Larger answers are made anew, bytes: they are sent rarely, and cost more to send than to make.
 const MAX_BODY: u64 = 256 << 10;
 /// All bodies and addresses together, bytes. Beyond it, all are forgotten.
@@ -106,7 +113,7 @@ fn stamp(app: &AppState) -> Stamp {
 /// The kept answer to a read with a token that is still valid. `None` for everything else: it goes on to its route.
 pub(super) fn kept(app: &AppState, request: &Request) -> Option<Response> {
     let path = request.uri().path().strip_prefix(API)?;
-    if request.method() != Method::GET || !path.starts_with("/maps/") {
+    if request.method() != Method::GET || !BEGINNINGS.iter().any(|beginning| path.starts_with(beginning)) {
         return None;
     }
     let token = bearer(request.headers().get(header::AUTHORIZATION)?)?;
