@@ -5,9 +5,9 @@ use super::{
     API, AppState,
     cookie::session_cookie,
     error::{ApiError, method_not_allowed},
-    guard::RequestId,
     history,
     peer::Peer,
+    request_id::RequestId,
 };
 use crate::{
     identity::{

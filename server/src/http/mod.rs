@@ -39,6 +39,7 @@ mod pictures;
 mod recognise;
 mod reference_runs;
 mod relocalisation;
+mod request_id;
 mod replay;
 mod reused_answers;
 mod revision;

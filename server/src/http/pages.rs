@@ -63,11 +63,21 @@ fn answer(&(path, content, packed): &File, tag: &str, asked: &HeaderMap) -> Resp
         return (StatusCode::NOT_MODIFIED, headers).into_response();
     }
     headers.insert(header::CONTENT_TYPE, media_type(path));
-    if !has(header::ACCEPT_ENCODING, "gzip") {
+    if !takes_gzip(asked) {
         return (headers, Bytes::from_static(content)).into_response();
     }
     headers.insert(header::CONTENT_ENCODING, HeaderValue::from_static("gzip"));
     (headers, Bytes::from_static(packed)).into_response()
+}
+
+/// Whether `Accept-Encoding` names gzip with a weight above 0 (RFC 9110, 12.5.3).
+fn takes_gzip(asked: &HeaderMap) -> bool {
+    let lists = asked.get_all(header::ACCEPT_ENCODING).iter().filter_map(|list| list.to_str().ok());
+    lists.flat_map(|list| list.split(',')).any(|coding| {
+        let (name, weight) = coding.split_once(';').unwrap_or((coding, "q=1"));
+        let weight = weight.trim().trim_start_matches(['q', 'Q']).trim_start_matches('=');
+        name.trim().eq_ignore_ascii_case("gzip") && weight.parse().is_ok_and(|q: f32| q > 0.0)
+    })
 }
 
 fn media_type(path: &str) -> HeaderValue {
@@ -170,6 +180,17 @@ mod tests {
         };
         let packed = asked(header::ACCEPT_ENCODING, "br, gzip");
         assert_eq!(packed.headers()[header::CONTENT_ENCODING], "gzip");
+        for (list, gzip) in [
+            ("gzip", true),
+            ("br;q=1.0, GZIP; q=0.5", true),
+            ("gzip;q=0", false),
+            ("br, gzip;q=0.0", false),
+            ("x-gzip2", false),
+            ("identity", false),
+        ] {
+            let answer = asked(header::ACCEPT_ENCODING, list);
+            assert_eq!(answer.headers().contains_key(header::CONTENT_ENCODING), gzip, "{list}");
+        }
         assert_eq!(packed.headers()[header::CACHE_CONTROL], FOREVER);
         assert!(file.2.len() < file.1.len() / 2);
         let plain = asked(header::ACCEPT_ENCODING, "br");
