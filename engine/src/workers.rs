@@ -342,7 +342,7 @@ impl Engine {
         self.reply(key, job, (answer, icons), publish);
     }
 
-    /// Publishes an answer, shows it on pages, and has it stored if there are `icons`.
+    /// Counts an answer, shows it on pages, has it stored if there are `icons`, and publishes it.
     fn reply(
         &self,
         key: &SlotKey,
@@ -354,7 +354,6 @@ impl Engine {
         (answer.epoch, answer.seq, answer.captured_ns) = (frame.epoch, frame.seq, frame.captured_ns);
         answer.clock_suspect = job.clock_suspect;
         answer.latency_ms = job.received.elapsed().as_secs_f64() * 1e3;
-        publish.answer(key, &answer);
         let (answer, now) = (Arc::new(answer), Instant::now());
         if let Some(icons) = icons {
             self.kept_frames.keep_answered(key, &answer, frame);
@@ -362,10 +361,13 @@ impl Engine {
         }
         if answer.rejection.is_none() {
             let (width_px, height_px, pixels) = (frame.width_px, frame.height_px, frame.pixels.clone());
+            let answer = answer.clone();
             self.live.publish_answer(key, LiveFrame { width_px, height_px, pixels, answer }, now);
         } else {
-            self.live.publish_refusal(key, answer, now);
+            self.live.publish_refusal(key, answer.clone(), now);
         }
+        // Last, so that who has the answer finds it counted.
+        publish.answer(key, &answer);
     }
 }
 

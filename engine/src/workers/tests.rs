@@ -60,6 +60,34 @@ impl Publish for Panicking {
     fn pose(&self, _: &Name, _: &v1::RobotPose) {}
 }
 
+/// What the API told of the robot when its answers came: frames answered, frames refused.
+struct ToldAt(Engine, Mutex<Vec<(u64, u64)>>);
+
+impl Publish for ToldAt {
+    fn answer(&self, key: &SlotKey, _: &v1::Answer) {
+        let told = self.0.live.activity(&key.robot, Instant::now());
+        let counts = told.map_or((0, 0), |told| (told.answered, told.refused.values().sum()));
+        self.1.lock().unwrap().push(counts);
+    }
+
+    fn pose(&self, _: &Name, _: &v1::RobotPose) {}
+}
+
+/// Who has the answer and asks at once finds its frame counted.
+#[test]
+fn a_frame_is_counted_before_its_answer_is_sent() {
+    let engine = hall();
+    let told = ToldAt(engine.clone(), Mutex::default());
+    let intake = intake(&engine, Duration::from_mins(1));
+    for camera in [key(0).camera, Name::new(PLANTED).unwrap()] {
+        intake.receive(key(0), message(1, 768)).unwrap();
+        let (_, job) = engine.slots.try_take().unwrap();
+        engine.answer_frame(&SlotKey { robot: key(0).robot, camera }, &job, &told);
+        engine.slots.finish(&key(0), FrameOutcome::Processed);
+    }
+    assert_eq!(*told.1.lock().unwrap(), [(1, 0), (1, 1)]);
+}
+
 fn settled(engine: &Engine) -> crate::slots::FrameCounts {
     loop {
         let counts = engine.slots.counts();

@@ -9,7 +9,7 @@ use engine::{
     workers::{Publish, failed},
 };
 use protos::{Key, Keys, Name, prost::bytes::Bytes, v1};
-use std::time::Instant;
+use std::{sync::Arc, time::Instant};
 use zenoh::{
     Session,
     pubsub::Subscriber,
@@ -117,8 +117,10 @@ pub(crate) fn take_frame(to: &Receivers, outbox: &Outbox, kind: FrameKind, slot:
         panics.catch(Edge::Message, "frame", follows, || to.intake.take(kind, slot.clone(), message.clone()));
     if let Err(answer) = received.unwrap_or_else(|| Err(internal(kind, message))) {
         tracing::debug!(?slot, rejection = ?answer.rejection, "frame_refused");
+        let answer: Arc<v1::Answer> = answer.into();
+        to.live.publish_refusal(slot, answer.clone(), Instant::now());
+        // Last, so that who has the answer finds it counted.
         outbox.answer(slot, &answer);
-        to.live.publish_refusal(slot, answer.into(), Instant::now());
     }
 }
 
