@@ -79,8 +79,8 @@ fn a_frame_is_counted_before_its_answer_is_sent() {
     let engine = hall();
     let told = ToldAt(engine.clone(), Mutex::default());
     let intake = intake(&engine, Duration::from_mins(1));
-    for camera in [key(0).camera, Name::new(PLANTED).unwrap()] {
-        intake.receive(key(0), message(1, 768)).unwrap();
+    for (seq, camera) in [(1, key(0).camera), (2, Name::new(PLANTED).unwrap())] {
+        intake.receive(key(0), message(seq, 768)).unwrap();
         let (_, job) = engine.slots.try_take().unwrap();
         engine.answer_frame(&SlotKey { robot: key(0).robot, camera }, &job, &told);
         engine.slots.finish(&key(0), FrameOutcome::Processed);
