@@ -12,29 +12,25 @@ use std::{
 };
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let web = Path::new(&env::var("CARGO_MANIFEST_DIR")?).join("../web");
+    let folder = Path::new(&env::var("CARGO_MANIFEST_DIR")?).join("../web/dist");
     let out = PathBuf::from(env::var("OUT_DIR")?);
     let mut list = "[\n".to_owned();
-    for (folder, prefix) in [("dist", ""), ("live", "live/")] {
-        let folder = web.join(folder);
-        println!("cargo:rerun-if-changed={}", folder.display());
-        for file in files(&folder)? {
-            let path = file.strip_prefix(&folder)?.to_str().ok_or("a file name that is not UTF-8")?;
-            let path = format!("{prefix}{path}");
-            if !matches!(file.extension().and_then(|e| e.to_str()), Some("html" | "js" | "css" | "svg")) {
-                continue;
-            }
-            let content = fs::read(&file)?;
-            let packed = out.join(format!("{}.gz", path.replace('/', "-")));
-            let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
-            encoder.write_all(&content)?;
-            fs::write(&packed, encoder.finish()?)?;
-            let [file, packed] = [&file, &packed].map(|path| path.to_str());
-            let (Some(file), Some(packed)) = (file, packed) else {
-                return Err("a folder that is not UTF-8".into());
-            };
-            writeln!(list, "    ({path:?}, include_bytes!({file:?}), include_bytes!({packed:?})),")?;
+    println!("cargo:rerun-if-changed={}", folder.display());
+    for file in files(&folder)? {
+        let path = file.strip_prefix(&folder)?.to_str().ok_or("a file name that is not UTF-8")?;
+        if !matches!(file.extension().and_then(|e| e.to_str()), Some("html" | "js" | "css" | "svg")) {
+            continue;
         }
+        let content = fs::read(&file)?;
+        let packed = out.join(format!("{}.gz", path.replace('/', "-")));
+        let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
+        encoder.write_all(&content)?;
+        fs::write(&packed, encoder.finish()?)?;
+        let [file, packed] = [&file, &packed].map(|path| path.to_str());
+        let (Some(file), Some(packed)) = (file, packed) else {
+            return Err("a folder that is not UTF-8".into());
+        };
+        writeln!(list, "    ({path:?}, include_bytes!({file:?}), include_bytes!({packed:?})),")?;
     }
     list.push(']');
     fs::write(out.join("pages.rs"), list)?;

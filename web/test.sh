@@ -8,5 +8,4 @@ cd "$(dirname "$0")"
 npm ci --ignore-scripts --no-audit --no-fund
 npm run check
 npm run unit
-node --test live/
 npm run journeys

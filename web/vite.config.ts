@@ -19,6 +19,6 @@ export default defineConfig({
     chunkSizeWarningLimit: 400,
     reportCompressedSize: true,
   },
-  server: { proxy: { "/api": proxied, "/open": proxied, "/login": proxied, "/logout": proxied, "/live": proxied } },
+  server: { proxy: { "/api": proxied, "/open": proxied, "/login": proxied, "/logout": proxied } },
   test: { include: ["tests/unit/**/*.test.ts"] },
 });

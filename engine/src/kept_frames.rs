@@ -151,6 +151,11 @@ mod tests {
         kept.keep(frame("front", "yard", 20, 10));
         kept.keep(frame("front", "hall", 4, 10));
         assert_eq!(seqs(&kept, "hall", 3), [4, 10, 3]);
+        // A camera that has sent nothing for long has its turn, too.
+        for seq in 5..8 {
+            kept.keep(frame("front", "hall", seq, 10));
+        }
+        assert_eq!(seqs(&kept, "hall", 3), [7, 10, 6]);
         assert_eq!(seqs(&kept, "yard", 3), [20]);
         assert_eq!(seqs(&kept, "cellar", 3), [0; 0]);
     }

@@ -20,7 +20,7 @@ pub struct Operation {
 }
 
 /// Operations that create, and take a key.
-const CREATIONS: [&str; 12] = [
+const CREATIONS: [&str; 13] = [
     "/maps/{map}/bulk/create-landmarks",
     "/maps",
     "/maps/{map}/copies",
@@ -33,6 +33,7 @@ const CREATIONS: [&str; 12] = [
     "/maps/{map}/gatherings",
     "/maps/{map}/gatherings/{gathering}/accept",
     "/robots/{robot}/recording/reference",
+    "/robots/{robot}/certificates",
 ];
 
 /// Paths of what has a revision: their changes say which one they are meant for.

@@ -90,9 +90,11 @@ fn turns_are_counted_the_short_way() {
         let pose = v1::Pose2Covariance { pose, ..v1::Pose2Covariance::default() };
         v1::Answer { map_from_robot: Some(pose), ..v1::Answer::default() }
     };
-    let PoseChange::Moved { distance_m, angle_rad } = change(&at(3.1), &at(-3.1)).pose else {
-        panic!("same")
-    };
-    assert!(distance_m == 0.0 && (angle_rad - (TAU - 6.2)).abs() < 1e-12, "{angle_rad}");
+    for (before, after) in [(3.1, -3.1), (-3.1, 3.1)] {
+        let PoseChange::Moved { distance_m, angle_rad } = change(&at(before), &at(after)).pose else {
+            panic!("same")
+        };
+        assert!(distance_m == 0.0 && (angle_rad - (TAU - 6.2)).abs() < 1e-12, "{angle_rad}");
+    }
     assert!(change(&at(3.1412), &at(-3.1418)).is_none());
 }

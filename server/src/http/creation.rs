@@ -34,7 +34,7 @@ const MAX_KEY: usize = 128;
 type LargestBody = fn(&Limits) -> usize;
 
 /// Every POST that creates stored rows: its path below [`API`], and its largest body. The others ask, or begin what is there
-/// once at most (a mapping, a recording), so that a repeat is refused by itself.
+/// once at most (a mapping, a recording), so that a repeat is refused by itself; a token's secret is kept nowhere.
 pub(super) const CREATIONS: &[(&str, LargestBody)] = &[
     ("/maps", json),
     ("/maps/{map}/copies", json),
@@ -48,6 +48,7 @@ pub(super) const CREATIONS: &[(&str, LargestBody)] = &[
     ("/maps/{map}/gatherings", json),
     ("/maps/{map}/gatherings/{gathering}/accept", json),
     ("/robots/{robot}/recording/reference", |_| PATH_BYTES),
+    ("/robots/{robot}/certificates", json),
 ];
 
 fn json(limits: &Limits) -> usize {

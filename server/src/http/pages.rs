@@ -1,4 +1,4 @@
-//! The administrator's pages, embedded in the program. `/live/` is the live view of robots and gatherings.
+//! The administrator's pages, embedded in the program.
 
 use super::AppState;
 use crate::store::pictures::hex;
@@ -14,13 +14,12 @@ use sha2::{Digest as _, Sha256};
 /// Path below `/`, content, content compressed by gzip.
 type File = (&'static str, &'static [u8], &'static [u8]);
 
-/// Made by `build.rs` of `web/dist` and `web/live`.
+/// Made by `build.rs` of `web/dist`.
 static FILES: &[File] = &include!(concat!(env!("OUT_DIR"), "/pages.rs"));
 const INDEX: &str = "index.html";
-const LIVE_INDEX: &str = "live/index.html";
 /// Addresses that the pages themselves understand (`web/src/routes.svelte.ts`).
-const ADDRESSES: [&str; 8] =
-    ["/", "/maps/{*rest}", "/robots", "/robots/{*rest}", "/answers", "/answers/{*rest}", "/admin", "/live/"];
+const ADDRESSES: [&str; 7] =
+    ["/", "/maps/{*rest}", "/robots", "/robots/{*rest}", "/answers", "/answers/{*rest}", "/admin"];
 /// Files with the digest of their content in their name never change.
 const FOREVER: HeaderValue = HeaderValue::from_static("public, max-age=31536000, immutable");
 /// A new program brings new pages: the browser asks again each time.
@@ -28,13 +27,10 @@ const ASK_AGAIN: HeaderValue = HeaderValue::from_static("no-cache");
 
 pub(super) fn router() -> Router<AppState> {
     let mut router = Router::new();
-    for address in ADDRESSES {
-        let path = if address == "/live/" { LIVE_INDEX } else { INDEX };
-        if let Some(file) = FILES.iter().find(|(name, ..)| *name == path) {
-            router = router.route(address, served(file));
-        }
+    if let Some(index) = FILES.iter().find(|(name, ..)| *name == INDEX) {
+        router = ADDRESSES.iter().fold(router, |router, address| router.route(address, served(index)));
     }
-    for file in FILES.iter().filter(|(path, ..)| !path.ends_with(INDEX)) {
+    for file in FILES.iter().filter(|(path, ..)| *path != INDEX) {
         router = router.route(&format!("/{}", file.0), served(file));
     }
     router

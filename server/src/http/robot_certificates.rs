@@ -2,7 +2,7 @@
 
 use super::{
     AppState,
-    answers::page,
+    answers::{created, page},
     error::ApiError,
     extract::{Body, PathParams, QueryParams, name, page_limit},
 };
@@ -39,7 +39,8 @@ pub(super) fn router() -> OpenApiRouter<AppState> {
 }
 
 /// Signs a robot's request for a certificate, with which it connects to the encrypted listener. The robot's private key stays
-/// where it was made. Other connections of robots are interrupted for about a second. A repeat makes another certificate.
+/// where it was made. Other connections of robots are interrupted for about a second. A repeat without a key makes another
+/// certificate.
 #[utoipa::path(post, path = "/robots/{robot}/certificates", tag = "identity", params(("robot" = String, Path)),
     request_body = CertificateRequest, responses((status = 201, body = EnrolledRobot),
     (status = 404, body = Problem, description = "unknown_robot"),
@@ -80,17 +81,22 @@ async fn enrol(
         issued_ms: now_ms,
         expires_ms: signed.expires_ms,
     };
-    let stored = app.store.write(move |tx| Box::pin(robot_certificates::create(tx, insert))).await?;
-    access_control(&app).await;
-    let enrolled = EnrolledRobot {
-        certificate_pem: signed.certificate_pem,
-        authority_pem: certificates.server_authority_pem().map(str::to_owned),
-        zenoh,
-        names: certificates.names().to_vec(),
-        fleet: app.config.fleet.as_str().to_owned(),
-        certificate: stored,
+    let (certificate_pem, fleet) = (signed.certificate_pem, app.config.fleet.as_str().to_owned());
+    let shown = move |stored: &RobotCertificate| {
+        let enrolled = EnrolledRobot {
+            certificate_pem: certificate_pem.clone(),
+            authority_pem: certificates.server_authority_pem().map(str::to_owned),
+            zenoh: zenoh.clone(),
+            names: certificates.names().to_vec(),
+            fleet: fleet.clone(),
+            certificate: stored.clone(),
+        };
+        (StatusCode::CREATED, enrolled)
     };
-    Ok((StatusCode::CREATED, Json(enrolled)))
+    let work = app.store.write(move |tx| Box::pin(robot_certificates::create(tx, insert)));
+    let done = created(shown, work).await?;
+    access_control(&app).await;
+    Ok(done)
 }
 
 /// Lists a robot's certificates, the oldest first, with those that were revoked or have expired.

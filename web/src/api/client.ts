@@ -29,6 +29,8 @@ export interface Options {
   query?: Record<string, string | number | boolean | null | undefined>;
   body?: unknown;
   form?: FormData;
+  /** A file as it is, with the time that it may take, ms. */
+  file?: { content: Blob; kind: string; deadline_ms: number };
   /** The revision that a change is meant for. */
   ifMatch?: string;
   /** Why something is changed, for the history of the map. */
@@ -67,9 +69,11 @@ function request(method: Method, options: Options): RequestInit {
   if (options.why) headers.set("waymark-why", encodeURIComponent(options.why));
   if (options.key) headers.set("idempotency-key", options.key);
   if (options.body !== undefined) headers.set("content-type", "application/json");
-  const deadline = AbortSignal.timeout(DEADLINE_MS);
+  if (options.file) headers.set("content-type", options.file.kind);
+  const deadline = AbortSignal.timeout(options.file?.deadline_ms ?? DEADLINE_MS);
   const signal = options.signal ? AbortSignal.any([options.signal, deadline]) : deadline;
-  return { method, headers, signal, body: options.form ?? (options.body === undefined ? null : JSON.stringify(options.body)) };
+  const json = options.body === undefined ? null : JSON.stringify(options.body);
+  return { method, headers, signal, body: options.file?.content ?? options.form ?? json };
 }
 
 async function send(method: Method, at: string, options: Options): Promise<Response> {
@@ -79,7 +83,7 @@ async function send(method: Method, at: string, options: Options): Promise<Respo
   } catch (cause) {
     if (options.signal?.aborted) throw cause;
     const late = cause instanceof DOMException && cause.name === "TimeoutError";
-    const text = late ? "The server has not answered within 30 s." : "The server cannot be reached. Does it run? Is the network up?";
+    const text = late ? `The server has not answered within ${(options.file?.deadline_ms ?? DEADLINE_MS) / 1000} s.` : "The server cannot be reached. Does it run? Is the network up?";
     throw new ApiError(text, 0, "unreachable", null);
   }
   if (answer.ok) return answer;

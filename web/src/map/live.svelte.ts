@@ -1,5 +1,6 @@
 // What robots do now: the event stream of a map, kept as the last pose and the trail of each robot.
 import { address, get, path } from "../api/client";
+import { Stream } from "../api/stream";
 import type { Robot } from "../api/types";
 import type { Point } from "./geometry";
 
@@ -19,6 +20,20 @@ export interface LiveRobot {
   /** When the pose was true, by this page's clock, ms. */
   posed_ms: number;
   trail: Point[];
+  /** Where it may be while it has no pose, the most probable first. */
+  hypotheses: Hypothesis[];
+}
+
+/** A place where a robot may be. */
+export interface Hypothesis {
+  probability: number;
+  pose: { x_m: number; y_m: number; theta_rad: number };
+  covariance: number[];
+}
+
+interface AnswerEvent {
+  robot: string;
+  answer: { hypotheses?: { probability: number; map_from_robot?: { pose?: Hypothesis["pose"]; covariance?: number[] } }[] };
 }
 
 interface PoseEvent {
@@ -35,28 +50,33 @@ export type LinkState = "connecting" | "live" | "lost";
 export class LiveMap {
   robots = $state.raw<ReadonlyMap<string, LiveRobot>>(new Map());
   link = $state<LinkState>("connecting");
-  #source: EventSource;
+  #stream: Stream;
   #heard = new Map<string, LiveRobot>();
   #pending = false;
 
   constructor(map: string, changed: () => void) {
-    this.#source = new EventSource(address(path`/maps/${map}/live`));
-    this.#source.onopen = () => {
-      this.link = "live";
-      this.#readRobots(map);
-    };
-    this.#source.onerror = () => (this.link = "lost");
-    this.#source.addEventListener("pose", (event) => this.#pose(JSON.parse(event.data) as PoseEvent));
-    this.#source.addEventListener("presence", (event) => {
-      const { robot, alive } = JSON.parse(event.data) as { robot: string; alive: boolean };
-      this.#of(robot).is_connected = alive;
-      this.#tell();
+    this.#stream = new Stream(address(path`/maps/${map}/live`), {
+      on: {
+        pose: (event) => this.#pose(JSON.parse(event.data) as PoseEvent),
+        answer: (event) => this.#answer(JSON.parse(event.data) as AnswerEvent),
+        presence: (event) => {
+          const { robot, alive } = JSON.parse(event.data) as { robot: string; alive: boolean };
+          this.#of(robot).is_connected = alive;
+          this.#tell();
+        },
+        map_changed: changed,
+      },
+      onopen: (again) => {
+        this.link = "live";
+        void this.#readRobots(map);
+        if (again) changed();
+      },
+      onlost: () => (this.link = "lost"),
     });
-    this.#source.addEventListener("map_changed", changed);
   }
 
   close(): void {
-    this.#source.close();
+    this.#stream.close();
   }
 
   async #readRobots(map: string): Promise<void> {
@@ -72,16 +92,27 @@ export class LiveMap {
   #of(name: string): LiveRobot {
     let robot = this.#heard.get(name);
     if (!robot) {
-      robot = { name, is_connected: true, covariance: [], trust: "unspecified", posed_ms: 0, trail: [] };
+      robot = { name, is_connected: true, covariance: [], trust: "unspecified", posed_ms: 0, trail: [], hypotheses: [] };
       this.#heard.set(name, robot);
     }
     return robot;
   }
 
+  /** Keeps the places where a robot without a pose may be. */
+  #answer({ robot: name, answer }: AnswerEvent): void {
+    const robot = this.#of(name);
+    const told = answer.hypotheses ?? [];
+    if (!told.length && !robot.hypotheses.length) return;
+    robot.hypotheses = told.flatMap(({ probability, map_from_robot }) =>
+      map_from_robot?.pose ? [{ probability, pose: map_from_robot.pose, covariance: map_from_robot.covariance ?? [] }] : [],
+    );
+    this.#tell();
+  }
+
   #pose({ robot: name, pose, covariance, age_ms, trust }: PoseEvent): void {
     const robot = this.#of(name);
     robot.is_connected = true;
-    Object.assign(robot, { pose, covariance, trust, posed_ms: performance.now() - age_ms });
+    Object.assign(robot, { pose, covariance, trust, posed_ms: performance.now() - age_ms, hypotheses: [] });
     const last = robot.trail.at(-1);
     if (!last || Math.hypot(last[0] - pose.x_m, last[1] - pose.y_m) > TRAIL_STEP_M) {
       robot.trail.push([pose.x_m, pose.y_m]);

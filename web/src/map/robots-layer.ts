@@ -8,7 +8,7 @@ import VectorSource from "ol/source/Vector";
 import { Fill, RegularShape, Stroke, Style, Text } from "ol/style";
 import type { Colours } from "./colours";
 import { type Point as Position, ellipse, ring, yawHalf } from "./geometry";
-import { type LiveRobot, STALE_MS } from "./live.svelte";
+import { type Hypothesis, type LiveRobot, STALE_MS } from "./live.svelte";
 
 /** Length of the cone of the heading, m. */
 const CONE_M = 1.2;
@@ -34,12 +34,13 @@ export function robotLayer(colours: Colours): RobotLayer {
 
 function drawn(robot: LiveRobot, now_ms: number, colours: Colours): Feature[] {
   const { pose, covariance, trail, name } = robot;
-  if (!pose) return [];
+  const places = robot.hypotheses.map((place) => possible(place, name, colours));
+  if (!pose) return places;
   const isStale = !robot.is_connected || now_ms - robot.posed_ms > STALE_MS;
   const colour = isStale ? colours.stale : colours.robot;
   const at: Position = [pose.x_m, pose.y_m];
   const path = feature(new LineString(trail), new Style({ stroke: new Stroke({ color: `${colour}99`, width: 2 }) }));
-  const features = trail.length > 1 ? [path] : [];
+  const features = trail.length > 1 ? [...places, path] : places;
   if (covariance.length === 9) {
     const edge = new Style({ stroke: new Stroke({ color: colour, width: 1.5 }), fill: new Fill({ color: `${colour}26` }) });
     features.push(feature(new Polygon([ring(at, ellipse(covariance))]), edge));
@@ -65,6 +66,20 @@ function drawn(robot: LiveRobot, now_ms: number, colours: Colours): Feature[] {
   robotItself.set("robot", name);
   features.push(robotItself);
   return features;
+}
+
+/** A place where a robot may be: the stronger, the more probable. */
+function possible({ probability, pose, covariance }: Hypothesis, name: string, colours: Colours): Feature {
+  const at: Position = [pose.x_m, pose.y_m];
+  const strength = Math.round(40 + 150 * Math.min(1, probability)).toString(16).padStart(2, "0");
+  const text = new Text({
+    text: `${name}? ${Math.round(100 * probability)} %`,
+    font: "12px system-ui, sans-serif",
+    fill: new Fill({ color: colours.text }),
+    stroke: new Stroke({ color: colours.halo, width: 3 }),
+  });
+  const style = new Style({ stroke: new Stroke({ color: colours.stale, width: 1.5, lineDash: [4, 3] }), fill: new Fill({ color: `${colours.stale}${strength}` }), text });
+  return feature(new Polygon([ring(at, ellipse(covariance))]), style);
 }
 
 function feature(geometry: LineString | Polygon | Point, style: Style): Feature {

@@ -1,6 +1,7 @@
 // Journeys of an administrator through the pages of a running server, at a desk and on a phone.
 import assert from "node:assert/strict";
-import { after, before, test } from "node:test";
+import { readFile } from "node:fs/promises";
+import { after, afterEach, before, test } from "node:test";
 import { PHONE, browser, check, demo, open } from "./harness.js";
 
 let server, its;
@@ -12,6 +13,9 @@ after(async () => {
   await its?.close();
   await server?.stop();
 });
+
+// Open pages hold streams, and a browser has six connections to a server.
+afterEach(() => Promise.all(its.context.pages().map((page) => page.close())));
 
 const go = (address, size) => open(its.context, server.origin, address, size);
 /** The name of the demo's map. */
@@ -227,6 +231,181 @@ test("candidates appear while a robot drives, and are named, accepted or thrown 
   await page.getByRole("dialog").getByRole("button", { name: "Throw away" }).click();
   await page.getByText("The gathering is thrown away.").waitFor();
   assert.deepEqual(page.faults, []);
+});
+
+test("a floor plan is laid beneath a map by a measured length", async () => {
+  await api("POST", "/maps", { name: "plan" });
+  const page = await go("/maps/plan");
+  await page.getByRole("button", { name: "Floor plan" }).click();
+  const png = await page.evaluate(() => {
+    const canvas = Object.assign(document.createElement("canvas"), { width: 200, height: 100 });
+    canvas.getContext("2d").fillRect(20, 20, 160, 60);
+    return canvas.toDataURL("image/png").split(",")[1];
+  });
+  await page.getByLabel("Picture (PNG or JPEG)").setInputFiles({ name: "floor.png", mimeType: "image/png", buffer: Buffer.from(png, "base64") });
+  await page.getByLabel("A length in the picture, pixels").fill("160");
+  await page.getByLabel("The same length on the floor, metres").fill("8");
+  await page.getByRole("button", { name: "Save the floor plan" }).click();
+  await page.getByText("The floor plan is set.").waitFor();
+  const { place } = await api("GET", "/maps/plan/underlay");
+  assert.ok(Math.abs(place.metres_per_pixel - 0.05) < 1e-9, JSON.stringify(place));
+  await check(page, "floor-plan");
+});
+
+test("a landmark is moved on the map and snaps to a wall", async () => {
+  await api("POST", "/maps", { name: "room" });
+  await api("PUT", "/maps/room/walls", { segments: [{ a: [-4, 2], b: [4, 2] }, { a: [-4, -2], b: [4, -2] }] }, { "if-match": "*" });
+  const size = { width_m: 0.6, height_m: 0.8 };
+  await api("POST", "/maps/room/landmarks", { name: "sign", size, place: { x_m: -3, y_m: 2, z_m: 1.4, theta_rad: -Math.PI / 2, roll_rad: 0, tilt_rad: 0 } });
+  const page = await go("/maps/room?landmark=sign&view=0,0,0.02,0");
+  await page.getByRole("button", { name: "Move" }).click();
+  const box = await page.getByRole("application").boundingBox();
+  // 1 m to the right of the middle, 1.8 m below it: 20 cm before the lower wall.
+  await page.mouse.click(box.x + box.width / 2 + 50, box.y + box.height / 2 + 90);
+  await page.getByText(/sign is on the wall/).waitFor();
+  const { place } = await api("GET", "/maps/room/landmarks/sign");
+  assert.ok(Math.abs(place.y_m + 2) < 1e-9 && Math.abs(place.x_m - 1) < 0.1, JSON.stringify(place));
+  assert.ok(Math.abs(place.theta_rad - Math.PI / 2) < 1e-9, "it faces the room");
+  await page.getByRole("button", { name: "Undo" }).click();
+  await page.waitForTimeout(500);
+  assert.equal((await api("GET", "/maps/room/landmarks/sign")).place.y_m, 2);
+  await check(page, "landmark-moved");
+});
+
+test("a person tells a robot where it is", async () => {
+  const page = await go(`/maps/${MAP}`);
+  await page.getByRole("region", { name: "Robots on this map" }).getByText("Live").first().waitFor();
+  await page.getByRole("button", { name: "Tell a robot where it is" }).click();
+  const robot = await page.getByLabel("Robot", { exact: true }).inputValue();
+  const box = await page.getByRole("application").boundingBox();
+  await page.mouse.click(box.x + box.width / 2, box.y + box.height / 2);
+  await page.getByText("Now click where it looks.").waitFor();
+  await page.waitForTimeout(400);
+  await page.mouse.click(box.x + box.width / 2 + 60, box.y + box.height / 2);
+  await page.getByText(`${robot} is told where it is`).waitFor();
+  assert.deepEqual(page.faults, []);
+});
+
+test("a robot that knocks is admitted, and its certificates are listed", async () => {
+  const robots = (await api("GET", "/robots")).items;
+  const name = robots.at(-1).name;
+  const page = await go("/robots");
+  await page.getByRole("button", { name: `Remove ${name}` }).click();
+  await page.getByRole("button", { name: "Remove the robot" }).click();
+  await page.getByRole("heading", { name: "Robots that knock" }).waitFor();
+  await check(page, "robot-knocks");
+  await page.getByRole("button", { name: `Admit ${name}` }).click();
+  await page.getByRole("dialog").getByLabel("Map").selectOption(MAP);
+  await page.getByRole("button", { name: "Register it" }).click();
+  await page.getByRole("link", { name, exact: true }).click();
+  await page.getByText(/waymark robot enrol/).waitFor();
+  assert.deepEqual(page.faults, []);
+});
+
+for (const [size, where] of [[undefined, "desk"], [PHONE, "phone"]]) {
+  test(`where landmarks are seen is drawn, and sheets are printed, at the ${where}`, async () => {
+    const page = await go(`/maps/${MAP}`, size);
+    await page.getByRole("button", { name: "Where landmarks are seen" }).click();
+    await page.getByText(/Areas of ([1-9]\d*) of \1 landmarks? with size and place/).waitFor();
+    await check(page, `seen-${where}`);
+    await page.goto(`/maps/${MAP}/sheet`);
+    await page.getByRole("img", { name: "The floor from above" }).waitFor();
+    await check(page, `floor-sheet-${where}`);
+    const first = (await api("GET", `/maps/${MAP}/landmarks`)).items.find(({ place }) => place);
+    await page.goto(`/maps/${MAP}/landmarks/${first.name}/sheet`);
+    await page.getByRole("img", { name: "The floor from above" }).waitFor();
+    await check(page, `landmark-sheet-${where}`);
+  });
+
+  test(`settings of a map are read and changed, at the ${where}`, async () => {
+    const page = await go(`/maps/${MAP}/settings`, size);
+    for (const part of ["Where it lies", "Which camera looks", "Best modality", "Walls from scans"]) {
+      await page.getByRole("button", { name: part }).click();
+      await page.getByRole("heading", { name: part }).waitFor();
+      await page.waitForFunction(() => !document.querySelector(".loading"));
+      await check(page, `settings-${part.toLowerCase().replaceAll(" ", "-")}-${where}`);
+    }
+  });
+}
+
+test("a map lies in another, has a camera, a named area and a choice of what is fused", async () => {
+  await api("POST", "/maps", { name: "upstairs" });
+  const page = await go("/maps/upstairs/settings");
+  await page.getByLabel("It lies in the map").selectOption(MAP);
+  await page.getByLabel("Its floor above that one, m").fill("3.2");
+  await page.getByLabel("Turned left by, degrees").fill("90");
+  await page.getByRole("button", { name: "Save", exact: true }).click();
+  await page.getByText(`upstairs lies in ${MAP} now.`).waitFor();
+  const { parent } = await api("GET", "/maps/upstairs");
+  assert.ok(parent.level_m === 3.2 && Math.abs(parent.theta_rad - Math.PI / 2) < 1e-6, JSON.stringify(parent));
+  await page.getByRole("button", { name: "Which camera looks" }).click();
+  await page.getByLabel("Camera above the floor, m").fill("0.9");
+  await page.getByRole("button", { name: "Save", exact: true }).click();
+  await page.getByText(/The camera is set/).waitFor();
+  assert.equal((await api("GET", "/maps/upstairs/visibility-settings")).camera_height_m, 0.9);
+  await page.getByRole("button", { name: "Best modality" }).click();
+  await page.getByLabel(/^Where runs have told/).selectOption("best");
+  await page.getByText("The choice is kept.").waitFor();
+  await page.getByRole("button", { name: "Name an area" }).click();
+  await page.getByRole("application").evaluate((floor) => floor.scrollIntoView({ block: "center" }));
+  const box = await page.getByRole("application").boundingBox();
+  for (const [dx, dy] of [[-60, -60], [60, -60], [60, 60]]) {
+    await page.mouse.click(box.x + box.width / 2 + dx, box.y + box.height / 2 + dy);
+    await page.waitForTimeout(400);
+  }
+  await page.getByLabel("Name of the area").fill("lobby");
+  await page.getByRole("button", { name: "Keep the area" }).click();
+  await page.getByText("The area lobby is kept.").waitFor();
+  const { fusion_mode, areas } = await api("GET", "/maps/upstairs/modalities");
+  assert.deepEqual([fusion_mode, areas.map(({ name, corners_m }) => [name, corners_m.length])], ["best", [["lobby", 3]]]);
+  assert.deepEqual(page.faults, []);
+});
+
+test("walls are made of a robot's scans, or the drive is given up", async () => {
+  const [{ name: robot }] = (await api("GET", "/robots")).items;
+  const page = await go(`/maps/${MAP}/settings?part=scans`);
+  await page.getByLabel("Robot").selectOption(robot);
+  await page.getByRole("button", { name: "Begin to map" }).click();
+  await page.getByText(/scans are being mapped/).waitFor();
+  await page.getByRole("button", { name: "Give it up" }).click();
+  await page.getByRole("dialog").getByRole("button", { name: "Give it up" }).click();
+  await page.getByText("The mapping is given up.").waitFor();
+  assert.deepEqual(page.faults, []);
+});
+
+test("a map is saved as a file and loaded under another name", async () => {
+  const page = await go(`/maps/${MAP}/settings`);
+  const [download] = await Promise.all([page.waitForEvent("download"), page.getByRole("link", { name: "Save the map as a file" }).click()]);
+  assert.equal(download.suggestedFilename(), `${MAP}.zip`);
+  const file = await download.path();
+  await page.goto("/");
+  await page.getByRole("button", { name: "Load a map from a file" }).click();
+  await page.getByRole("dialog").getByLabel("File", { exact: true }).setInputFiles({ name: "map.zip", mimeType: "application/zip", buffer: await readFile(file) });
+  await page.getByRole("dialog").getByLabel(/called otherwise/).fill("twin");
+  await page.getByRole("button", { name: "Load it" }).click();
+  await page.getByRole("heading", { name: "twin", level: 1 }).waitFor();
+  const [a, b] = [await api("GET", `/maps/${MAP}`), await api("GET", "/maps/twin")];
+  assert.equal(a.landmarks, b.landmarks);
+  assert.deepEqual(page.faults, []);
+});
+
+test("a camera is calibrated from what it has seen, or it is said what is missing; fixes and a run are shown", async () => {
+  const [{ name: robot }] = (await api("GET", "/robots")).items;
+  const page = await go(`/robots/${robot}`);
+  await page.getByRole("button", { name: /^Calibrate / }).first().click();
+  const dialog = page.getByRole("dialog");
+  await dialog.getByRole("button", { name: "Calibrate", exact: true }).click();
+  await dialog.getByText(/Focal length/).or(dialog.getByRole("alert")).first().waitFor();
+  await page.keyboard.press("Escape");
+  await page.getByText("What the position rests on").click();
+  await page.getByText(/The position rests on:/).waitFor();
+  await page.getByRole("button", { name: "Record a run" }).click();
+  await page.getByText(/A run is being recorded/).waitFor();
+  await page.getByRole("button", { name: "Give the recording up" }).click();
+  await page.getByText("The recording is given up.").waitFor();
+  await page.getByText(/Error of the position, m/).waitFor();
+  // A refused calibration is an answer of 409 or 422, which the browser reports.
+  assert.deepEqual(page.faults.filter((fault) => !/409|422|404/.test(fault)), []);
 });
 
 test("a viewer sees no button that may not be pressed, and is refused all the same", async () => {

@@ -225,7 +225,7 @@ async fn a_refusal_names_the_role_and_the_next_command() {
     let (status, problem) = read(service.ask_as_it_is(request("POST", "/api/v1/maps", "{")).await).await;
     assert_eq!((status, &problem["role"]), (401, &json!("operator")));
     for path in
-        ["/healthz", "/readyz", "/version", "/api/v1/healthz", "/", "/live/app.js", "/api/v1/openapi.json"]
+        ["/healthz", "/readyz", "/version", "/api/v1/healthz", "/", "/icon.svg", "/api/v1/openapi.json"]
     {
         let status = service.ask_as_it_is(request("GET", path, "")).await.status();
         assert_eq!(status, StatusCode::OK, "{path} is open");

@@ -33,6 +33,7 @@ impl Service {
             ("jobs", "SELECT count(*) FROM jobs"),
             ("gatherings", "SELECT count(*) FROM gatherings"),
             ("runs", "SELECT count(*) FROM runs"),
+            ("robot_certificates", "SELECT count(*) FROM robot_certificates"),
             ("kept_answers", "SELECT count(*) FROM kept_answers"),
         ] {
             rows.insert(table, sqlx::query_scalar(count).fetch_one(self.store.reads()).await.unwrap());
