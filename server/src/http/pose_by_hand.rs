@@ -82,3 +82,17 @@ async fn put(
     let shown = known.map(|known| super::robots::pose_shown(&known, published.trust().into()));
     shown.map(Json).ok_or_else(|| not_heard(&robot))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn standard_deviations_become_variances() {
+        let said = PoseByHand { sigma_m: 0.4, sigma_rad: 0.3, ..PoseByHand::new(1.0, 2.0, 0.5) };
+        let checked = checked(&said).unwrap();
+        assert_eq!(checked.pose, Pose2::new(1.0, 2.0, 0.5));
+        let is = Matrix3::from_diagonal(&Vector3::new(0.16, 0.16, 0.09));
+        assert!((checked.covariance - is).norm() < 1e-12, "{}", checked.covariance);
+    }
+}

@@ -107,3 +107,23 @@ pub(crate) async fn all_of(db: impl SqliteExecutor<'_>, map_id: i64) -> Result<V
         sqlx::query(ALL_OF).bind(map_id).fetch_all(db).await.map_err(StoreError::during("read walls"))?;
     rows.iter().map(StoredWall::of).collect::<Result<_, _>>().map_err(StoreError::during("read walls"))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_wall_of_a_map_maker_is_the_same_after_storing() {
+        let covariance = Matrix2::new(4e-6, 3e-6, 3e-6, 9e-5);
+        let wall =
+            LaserSegment::from_ends(Point2::new(5.0, -1.0), Point2::new(3.0, 4.0), covariance).unwrap();
+        let stored = StoredWall::from(&wall);
+        let kept =
+            StoredWall { covariance: stored.covariance.map(|c| numbers(&bytes(&c)).unwrap()), ..stored };
+        assert_eq!(kept, stored);
+        let read = kept.segment().unwrap();
+        assert!((read.a - wall.a).norm() + (read.b - wall.b).norm() < 1e-12);
+        assert!((read.covariance - covariance).norm() < 1e-12, "{}", read.covariance);
+        assert!(numbers(&[0; 23]).is_err());
+    }
+}

@@ -1375,7 +1375,8 @@ export interface paths {
         put?: never;
         /**
          * Signs a robot's request for a certificate, with which it connects to the encrypted listener. The robot's private key stays
-         *     where it was made. Other connections of robots are interrupted for about a second. A repeat makes another certificate.
+         *     where it was made. Other connections of robots are interrupted for about a second. A repeat without a key makes another
+         *     certificate.
          */
         post: operations["enrol"];
         delete?: never;
@@ -15716,7 +15717,10 @@ export interface operations {
     enrol: {
         parameters: {
             query?: never;
-            header?: never;
+            header?: {
+                /** @description A fresh text of visible ASCII characters for each creation, the same one to repeat it: the repeat changes nothing and gets the first answer, for a day. */
+                "Idempotency-Key"?: string;
+            };
             path: {
                 robot: string;
             };
@@ -15787,7 +15791,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description not_encrypted, other_authority, too_many */
+            /** @description not_encrypted, other_authority, too_many, in_progress */
             409: {
                 headers: {
                     [name: string]: unknown;
@@ -15814,7 +15818,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description bad_name, invalid_value, out_of_range */
+            /** @description bad_name, invalid_value, out_of_range, idempotency_key_reused */
             422: {
                 headers: {
                     [name: string]: unknown;

@@ -226,6 +226,12 @@ mod tests {
         assert_eq!(refused(|q| patch_of(q).top_px = 37), is(Code::OutOfRange, "patch.top_px"));
         assert_eq!(refused(|q| patch_of(q).left_px = 13), is(Code::OutOfRange, "patch.left_px"));
         assert_eq!(refused(|q| patch_of(q).top_px = 9), is(Code::OutOfRange, "patch.top_px"));
+        // It holds its quad, and reaches a pixel beyond the image.
+        let high = |q: &mut v1::FoundQuad| {
+            let patch = patch_of(q);
+            (patch.height_px, patch.image) = (39, vec![7; 20 * 39].into());
+        };
+        assert_eq!(refused(high), is(Code::OutOfRange, "patch.top_px"));
         assert_eq!(refused(|q| patch_of(q).encoding = 0), is(Code::OutOfRange, "patch.encoding"));
         let short = vec![7; 239].into();
         assert_eq!(refused(|q| patch_of(q).image = short), is(Code::SizeMismatch, "patch.image"));

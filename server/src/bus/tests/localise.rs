@@ -38,6 +38,32 @@ async fn a_robot_asks_where_it_is_and_its_fused_pose_stays() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn a_robot_has_one_question_at_a_time_and_no_larger_one_than_a_frame() {
+    let mut scene = Scene::new();
+    let running = running(scene::engine(&[scene.taught()]), 1).await;
+    let robot = running.robot("r1").await;
+    let (_, readings) = scene.stops(99, 3).into_iter().next().unwrap();
+    let frame = Capture::gray(&readings.frame.image)
+        .with_intrinsics(&scene.intrinsics())
+        .with_mounting(&readings.step.robot_from_camera);
+    let query = LocaliseQuery::default().with_frame(frame);
+    // Searching a picture takes far longer than a message.
+    let asked = (0..6).map(|_| robot.localise(query.clone(), WAIT));
+    let answers = futures::future::join_all(asked).await;
+    let (done, others): (Vec<_>, Vec<_>) = answers.into_iter().partition(Result::is_ok);
+    assert!(!done.is_empty() && !others.is_empty(), "{} answered at once", done.len());
+    for other in others {
+        assert_eq!(refused(other), ("too_many".to_owned(), "robot".to_owned()));
+    }
+    assert!(robot.localise(query, WAIT).await.is_ok(), "its place is free again");
+    let rows = crate::config::Limits::default().frame_bytes / 4096 + 1;
+    let large = Capture::gray(&GrayImage::from_fn(4096, rows, |_, _| 9));
+    let query = LocaliseQuery::default().with_frame(large);
+    assert_eq!(refused(robot.localise(query, WAIT).await), ("too_large".to_owned(), "message".to_owned()));
+    running.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn a_question_that_cannot_be_answered_is_refused_with_code_and_field() {
     let running = running(scene::engine(&[Arc::new(MapSnapshot::empty("hall", 3))]), 1).await;
     let (robot, stranger) = (running.robot("r1").await, running.robot("stranger").await);

@@ -68,7 +68,8 @@ pub(crate) async fn publish(
     Err(StoreError::Busy)
 }
 
-async fn write(
+/// The publication of what was compared. Errors: `Changed` if that is the present state no more.
+pub(super) async fn write(
     tx: &mut Tx,
     (merge, both): (Merge, Both),
     is: &Precondition,

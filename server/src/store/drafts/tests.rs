@@ -251,6 +251,54 @@ async fn a_removed_view_and_landmark_are_removed_and_one_that_the_map_has_taught
 }
 
 #[tokio::test]
+async fn what_was_compared_before_another_change_is_not_published() {
+    let (_dir, store, _task) = open().await;
+    let id = draft(&store, "d").await;
+    edit(&store, id).await;
+    let before = both(&store, "a", "d").await.unwrap();
+    store.write(|tx| Box::pin(walls::replace(tx, "a", &[[0.0, 0.0, 0.9, 0.0]]))).await.unwrap();
+    let written = store.write(move |tx| {
+        let merged = (merge::merge(&before), before);
+        Box::pin(async move { publish::write(tx, merged, &Precondition::Any, &Limits::default()).await })
+    });
+    assert!(matches!(written.await, Err(StoreError::Changed)));
+    assert!(list(store.reads(), 1).await.unwrap().iter().any(|row| row.name == "d"), "the draft is there");
+}
+
+#[tokio::test]
+async fn a_publication_keeps_the_bounds_of_a_map() {
+    let (_dir, store, _task) = open().await;
+    let id = draft(&store, "d").await;
+    edit(&store, id).await;
+    let had = state(&store).await;
+    let few = Limits { landmarks: 1, ..Limits::default() };
+    let refused = publish(&store, ("a", "d"), &Precondition::Any, &few).await;
+    assert!(matches!(refused, Err(StoreError::Limit { what: "landmarks in a map", max: 1 })), "{refused:?}");
+    assert_eq!(state(&store).await, had, "nothing of it is published");
+}
+
+#[tokio::test]
+async fn a_finding_ends_with_the_geometry_that_it_is_about() {
+    let (_dir, store, _task) = open().await;
+    let health = async || {
+        let sql = "SELECT name || ' ' || health FROM landmarks WHERE map_id = 1 AND name IN ('p1', 'p2') ORDER BY name";
+        sqlx::query_scalar::<_, String>(sql).fetch_all(store.reads()).await.unwrap()
+    };
+    let flag = "UPDATE landmarks SET health = 'flagged', finding = '{}' WHERE map_id = 1";
+    draft(&store, "d").await;
+    let write = store.write(move |tx| {
+        Box::pin(async move {
+            sqlx::query(flag).execute(&mut tx.conn).await.map_err(StoreError::during("flag"))?;
+            landmarks::update(tx, "d", "p1", |_| sized()).await.map(drop)
+        })
+    });
+    write.await.unwrap();
+    assert_eq!(health().await, ["p1 flagged", "p2 flagged"]);
+    publish_it(&store, "d").await.unwrap();
+    assert_eq!(health().await, ["p1 sound", "p2 flagged"]);
+}
+
+#[tokio::test]
 async fn robots_and_limits_leave_drafts_alone() {
     let (_dir, store, _task) = open().await;
     let refused = |name: &'static str| store.write(move |tx| Box::pin(robots::put(tx, "r1", name, 9)));
