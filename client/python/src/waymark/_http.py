@@ -169,6 +169,7 @@ CREATIONS = frozenset(
         "start_gathering",
         "accept_tracks",
         "finish_recording",
+        "enrol_robot",
     }
 )
 # Changes of what has a revision. Each says which one it is meant for.
