@@ -19,8 +19,8 @@ export const DESKTOP = { width: 1280, height: 800 };
 export const PHONE = { width: 390, height: 844 };
 
 /** Starts `waymark demo --stay`: a corridor whose posters are taught, and robots that drive. */
-export async function demo(robots = ["--robots", "2", "--rate-hz", "1"]) {
-  const child = spawn(PROGRAM, ["demo", "--stay", "--legs", "40", ...robots, "--http", "127.0.0.1:0"], {
+export async function demo() {
+  const child = spawn(PROGRAM, ["demo", "--stay", "--legs", "40", "--robots", "2", "--rate-hz", "1", "--http", "127.0.0.1:0"], {
     stdio: ["ignore", "pipe", "pipe"],
   });
   let said = "";
