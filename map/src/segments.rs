@@ -88,8 +88,9 @@ impl LaserSegment {
         let (a, b) = (Point2::new(ax, ay), Point2::new(bx, by));
         let length = (b - a).norm().max(MIN_SEGMENT_M);
         let variance = BY_HAND_SIGMA_M * BY_HAND_SIGMA_M;
+        // Each end is known to sigma: the direction to sqrt(2) sigma / length, the middle to sigma at most.
         let covariance = Matrix2::new(2.0 * variance / (length * length), 0.0, 0.0, variance);
-        Self::from_ends(a, b, covariance)
+        Self::about_middle(a, b, &covariance)
     }
 
     /// From a line and two points that are projected on it, `a` to `b` with the free side on the left.
@@ -164,6 +165,15 @@ mod tests {
         assert!((back.facing() + w.facing()).norm() < 1e-12);
         assert!((back.alpha_rad - w.alpha_rad).abs() < 1e-12, "same line");
         assert!((back.rho_m - w.rho_m).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_wall_by_hand_is_as_well_known_far_from_the_origin() {
+        let expected = Matrix2::new(2.0 * 1e-4 / 4.0, 0.0, 0.0, 1e-4);
+        for far_m in [0.0, 300.0] {
+            let wall = LaserSegment::by_hand(&[far_m, far_m, far_m + 2.0, far_m]).unwrap();
+            assert!((wall.covariance_about_middle() - expected).norm() < 1e-9, "{far_m} m from the origin");
+        }
     }
 
     #[test]

@@ -20,6 +20,10 @@ export interface LiveRobot {
   /** When the pose was true, by this page's clock, ms. */
   posed_ms: number;
   trail: Point[];
+  /** Where odometry alone takes it. */
+  odometry: Point[];
+  /** Where it truly was, if a simulator tells it. */
+  truth: Point[];
   /** Where it may be while it has no pose, the most probable first. */
   hypotheses: Hypothesis[];
 }
@@ -44,6 +48,11 @@ interface PoseEvent {
   trust: string;
 }
 
+interface SpotEvent {
+  robot: string;
+  pose: { x_m: number; y_m: number };
+}
+
 export type LinkState = "connecting" | "live" | "lost";
 
 /** Follows the robots of a map. `changed` is called when the map itself has changed. Call `close` at the end. */
@@ -58,6 +67,8 @@ export class LiveMap {
     this.#stream = new Stream(address(path`/maps/${map}/live`), {
       on: {
         pose: (event) => this.#pose(JSON.parse(event.data) as PoseEvent),
+        odometry: (event) => this.#spot(JSON.parse(event.data) as SpotEvent, "odometry"),
+        truth: (event) => this.#spot(JSON.parse(event.data) as SpotEvent, "truth"),
         answer: (event) => this.#answer(JSON.parse(event.data) as AnswerEvent),
         presence: (event) => {
           const { robot, alive } = JSON.parse(event.data) as { robot: string; alive: boolean };
@@ -92,7 +103,7 @@ export class LiveMap {
   #of(name: string): LiveRobot {
     let robot = this.#heard.get(name);
     if (!robot) {
-      robot = { name, is_connected: true, covariance: [], trust: "unspecified", posed_ms: 0, trail: [], hypotheses: [] };
+      robot = { name, is_connected: true, covariance: [], trust: "unspecified", posed_ms: 0, trail: [], odometry: [], truth: [], hypotheses: [] };
       this.#heard.set(name, robot);
     }
     return robot;
@@ -113,12 +124,12 @@ export class LiveMap {
     const robot = this.#of(name);
     robot.is_connected = true;
     Object.assign(robot, { pose, covariance, trust, posed_ms: performance.now() - age_ms, hypotheses: [] });
-    const last = robot.trail.at(-1);
-    if (!last || Math.hypot(last[0] - pose.x_m, last[1] - pose.y_m) > TRAIL_STEP_M) {
-      robot.trail.push([pose.x_m, pose.y_m]);
-      if (robot.trail.length > TRAIL_POINTS) robot.trail.shift();
-    }
+    extend(robot.trail, pose);
     this.#tell();
+  }
+
+  #spot({ robot, pose }: SpotEvent, track: "odometry" | "truth"): void {
+    if (extend(this.#of(robot)[track], pose)) this.#tell();
   }
 
   /** Tells readers at most once for each picture that the browser draws. */
@@ -130,4 +141,13 @@ export class LiveMap {
       this.robots = new Map([...this.#heard].map(([name, robot]) => [name, { ...robot }]));
     });
   }
+}
+
+/** Adds a point to a trail if it is a step away. Whether it is. */
+function extend(trail: Point[], { x_m, y_m }: SpotEvent["pose"]): boolean {
+  const last = trail.at(-1);
+  if (last && Math.hypot(last[0] - x_m, last[1] - y_m) <= TRAIL_STEP_M) return false;
+  trail.push([x_m, y_m]);
+  if (trail.length > TRAIL_POINTS) trail.shift();
+  return true;
 }

@@ -138,6 +138,29 @@ for (const [size, where] of [[undefined, "desk"], [PHONE, "phone"]]) {
   });
 }
 
+test("a map shows where odometry alone and a simulator say that robots are", async () => {
+  const page = await go(`/maps/${MAP}`);
+  await page.getByRole("region", { name: "Robots on this map" }).getByText("Live").first().waitFor();
+  const blue = () =>
+    page.evaluate(() =>
+      [...document.querySelectorAll(".floor canvas")].reduce((sum, canvas) => {
+        const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+        for (let i = 0; i < data.length; i += 4) sum += data[i] < 60 && data[i + 1] < 110 && data[i + 2] > 190 && data[i + 3] > 200;
+        return sum;
+      }, 0),
+    );
+  const before = await blue();
+  await page.getByText("Layers", { exact: true }).click();
+  await page.getByLabel("Odometry (dashed), truth of a simulator", { exact: true }).check();
+  await page.waitForURL(/off=none/);
+  const until = Date.now() + 20_000;
+  while ((await blue()) < before + 20 && Date.now() < until) await page.waitForTimeout(300);
+  assert.ok((await blue()) >= before + 20, `pixels of the true track: ${before} before, ${await blue()} after`);
+  await page.reload();
+  assert.ok(await page.getByLabel("Odometry (dashed), truth of a simulator", { exact: true }).isChecked(), "the layer is in the address");
+  assert.deepEqual(page.faults, []);
+});
+
 test("a landmark is renamed, measured, taken out of use and brought back by undo", async () => {
   const [first] = (await api("GET", `/maps/${MAP}/landmarks`)).items;
   const page = await go(`/maps/${MAP}/landmarks/${first.name}`);
