@@ -92,6 +92,8 @@ def test_what_was_learnt_is_shown(server: Server, taught: str) -> None:
         assert model.landmark == landmark and model.correlation.threshold > 0
         distances = maps.landmark_distances(taught, landmark)
         assert distances.correlation.threshold == model.correlation.threshold
+        evidence = maps.landmark_evidence(taught, landmark)
+        assert evidence.threshold == 5 and len(evidence.named) == len(evidence.doubtful) and evidence.answers >= 0
         assert maps.landmark_icon(taught, landmark).startswith(b"\x89PNG")
         assert isinstance(maps.duplicates(taught), tuple)
         views = maps.views(taught, landmark)

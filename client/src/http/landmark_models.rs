@@ -2,11 +2,14 @@
 
 use super::{map_client::MapClient, operation::operations};
 use crate::ClientError;
-use protos::api::{DuplicatePair, DuplicateQuery, LandmarkDistances, LandmarkModelDetail, Page};
+use protos::api::{
+    DuplicatePair, DuplicateQuery, LandmarkDistances, LandmarkEvidence, LandmarkModelDetail, Page,
+};
 
 operations! {
     MODEL: GET "/maps/{map}/landmarks/{landmark}/model" => landmark_model,
     DISTANCES: GET "/maps/{map}/landmarks/{landmark}/distances" => landmark_distances,
+    EVIDENCE: GET "/maps/{map}/landmarks/{landmark}/evidence" => landmark_evidence,
     ICON: GET "/maps/{map}/landmarks/{landmark}/icon" => landmark_icon,
     DUPLICATES: GET "/maps/{map}/duplicates" => duplicates,
 }
@@ -28,6 +31,15 @@ impl MapClient {
         landmark: &str,
     ) -> Result<LandmarkDistances, ClientError> {
         self.send(self.ask(&DISTANCES, &[&map, &landmark])?).await
+    }
+
+    /// How strongly points spoke for it in the newest stored answers.
+    pub async fn landmark_evidence(
+        &self,
+        map: &str,
+        landmark: &str,
+    ) -> Result<LandmarkEvidence, ClientError> {
+        self.send(self.ask(&EVIDENCE, &[&map, &landmark])?).await
     }
 
     /// The learnt icon that is nearest to the mean of its views: PNG.

@@ -3,8 +3,8 @@
 use super::{map_client::MapClient, operation::operations};
 use crate::ClientError;
 use protos::api::{
-    BulkOutcome, Landmark, LandmarkDeletion, LandmarkDeletions, LandmarkPatch, LandmarkQuery, NewLandmark,
-    NewLandmarks, Page, Place, Size, VisibilityAreaBody, VisibilitySettingsBody,
+    BulkOutcome, Landmark, LandmarkDeletion, LandmarkDeletions, LandmarkMerge, LandmarkPatch, LandmarkQuery,
+    NewLandmark, NewLandmarks, Page, Place, Size, VisibilityAreaBody, VisibilitySettingsBody,
 };
 
 operations! {
@@ -13,6 +13,7 @@ operations! {
     GET: GET "/maps/{map}/landmarks/{landmark}" => landmark,
     UPDATE: PATCH "/maps/{map}/landmarks/{landmark}" => update_landmark,
     DELETE: DELETE "/maps/{map}/landmarks/{landmark}" => delete_landmark,
+    MERGE: POST "/maps/{map}/landmarks/{landmark}/merge" => merge_landmarks,
     ADD_ALL: POST "/maps/{map}/bulk/create-landmarks" => add_landmarks,
     DELETE_ALL: POST "/maps/{map}/bulk/delete-landmarks" => delete_landmarks,
     AREA: GET "/maps/{map}/landmarks/{landmark}/visibility" => visibility_area,
@@ -77,6 +78,13 @@ impl MapClient {
         patch: &LandmarkPatch,
     ) -> Result<Landmark, ClientError> {
         self.send(self.ask(&UPDATE, &[&map, &landmark])?.json(patch)).await
+    }
+
+    /// Makes two landmarks one: `into` gets the views of `from`, and the size and place that it lacks; `from` is deleted. Learn
+    /// it again afterwards.
+    pub async fn merge_landmarks(&self, map: &str, into: &str, from: &str) -> Result<Landmark, ClientError> {
+        let body = LandmarkMerge { from: from.to_owned() };
+        self.send(self.ask(&MERGE, &[&map, &into])?.json(&body)).await
     }
 
     /// Deletes a landmark with its views and model.

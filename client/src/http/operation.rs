@@ -37,13 +37,14 @@ const CREATIONS: [&str; 13] = [
 ];
 
 /// Paths of what has a revision: their changes say which one they are meant for.
-const REVISED: [&str; 9] = [
+const REVISED: [&str; 10] = [
     "/maps/{map}",
     "/maps/{map}/walls",
     "/maps/{map}/underlay",
     "/maps/{map}/visibility-settings",
     "/maps/{map}/modalities",
     "/maps/{map}/landmarks/{landmark}",
+    "/maps/{map}/landmarks/{landmark}/merge",
     "/maps/{map}/rollback",
     "/maps/{map}/commits/{commit}/undo",
     "/maps/{map}/drafts/{draft}/publish",

@@ -144,6 +144,27 @@ pub struct LandmarkDistances {
     pub gradient_dissimilarity: DistanceHistogram,
 }
 
+/// How strongly the points of quads spoke for a landmark in the stored answers: heaps by the negative decimal logarithm of
+/// the number of false alarms.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct LandmarkEvidence {
+    /// The landmark.
+    pub landmark: String,
+    /// Stored answers that were read: the newest that name it or were compared with it, at most 500.
+    pub answers: u64,
+    /// Accepted from here upwards.
+    pub threshold: f64,
+    /// Width of a bin; the first begins at 0. The last has everything beyond, too.
+    pub bin_width: f64,
+    /// Quads that were named as it, by bin.
+    pub named: Vec<u32>,
+    /// Quads with its points while a part of it showed something else, by bin.
+    pub doubtful: Vec<u32>,
+    /// Quads named as it without points, by the picture as a whole.
+    pub named_without_points: u32,
+}
+
 /// Which pairs of look-alikes are listed.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::IntoParams))]

@@ -56,6 +56,15 @@ pub struct LandmarkDeletions {
     pub landmarks: Vec<LandmarkDeletion>,
 }
 
+/// Another landmark that is the same object.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+#[serde(deny_unknown_fields)]
+pub struct LandmarkMerge {
+    /// Its name. It is deleted.
+    pub from: String,
+}
+
 /// What was done to several landmarks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]

@@ -8,14 +8,15 @@ use super::{
     landmarks::shown,
     pictures::{ASK_AGAIN, IfNoneMatch, PictureHead},
 };
-use crate::store::{StoreError, kind::Kind, landmarks, maps, pictures::hex};
+use crate::store::{StoreError, kind::Kind, landmarks, maps, pictures::hex, stored_answers};
 use axum::{Json, extract::State, http::StatusCode, response::Response};
 use engine::{picture, snapshot::StoredModel};
 use protos::api::{
     DistanceHistogram, DuplicatePair, DuplicateQuery, IconKeypoint, Landmark, LandmarkDistances,
-    LandmarkModelDetail, LandmarkPoint, LandmarkStatus, LookAlikeBody, MemoryPart, Page, Problem,
-    ThresholdBody, ThresholdLimit,
+    LandmarkEvidence, LandmarkModelDetail, LandmarkPoint, LandmarkStatus, LookAlikeBody, MemoryPart, Page,
+    Problem, ThresholdBody, ThresholdLimit,
 };
+use protos::v1;
 use std::{
     collections::{BTreeMap, BTreeSet},
     sync::Arc,
@@ -25,12 +26,14 @@ use vision::{
     model::{DistanceSamples, LandmarkId, LandmarkModel, LimitedBy, Threshold},
     params::Params,
     points::{descriptor::VALUES, taught::TaughtPoint},
+    recognise::LOG10_EPSILON,
 };
 
 pub(super) fn router() -> OpenApiRouter<AppState> {
     OpenApiRouter::new()
         .routes(routes!(model))
         .routes(routes!(distances))
+        .routes(routes!(evidence))
         .routes(routes!(icon))
         .routes(routes!(duplicates))
 }
@@ -174,6 +177,53 @@ async fn distances(
         hausdorff: histogram(&model.hausdorff, &model.hausdorff_evidence),
         gradient_dissimilarity: histogram(&model.likeness, &model.likeness_evidence),
     }))
+}
+
+/// Stored answers that evidence is counted in: the newest.
+const EVIDENCE_ANSWERS: usize = 500;
+/// Width of a bin of the evidence, powers of ten.
+const EVIDENCE_BIN: f64 = 10.0;
+/// Bins of the evidence. The last has what is beyond, too.
+const EVIDENCE_BINS: usize = 20;
+
+/// What points said for a landmark in these answers.
+fn evidence_in(answers: &[v1::Answer], landmark: String) -> LandmarkEvidence {
+    let mut shown = LandmarkEvidence {
+        landmark,
+        answers: answers.len() as u64,
+        threshold: -LOG10_EPSILON,
+        bin_width: EVIDENCE_BIN,
+        named: vec![0; EVIDENCE_BINS],
+        doubtful: vec![0; EVIDENCE_BINS],
+        named_without_points: 0,
+    };
+    for quad in answers.iter().flat_map(|answer| &answer.quads) {
+        let is_named = [&quad.landmark, &quad.guided_landmark].contains(&&shown.landmark);
+        let is_doubtful = quad.doubtful_landmark == shown.landmark;
+        let bin = quad.points.as_ref().map(|points| (-points.log10_false_alarms / EVIDENCE_BIN) as usize);
+        match bin.map(|bin| bin.min(EVIDENCE_BINS - 1)) {
+            Some(bin) if is_named => shown.named[bin] += 1,
+            Some(bin) if is_doubtful => shown.doubtful[bin] += 1,
+            None if is_named => shown.named_without_points += 1,
+            _ => {}
+        }
+    }
+    shown
+}
+
+/// How strongly points spoke for a landmark in the newest stored answers: a histogram beside the threshold.
+#[utoipa::path(get, path = "/maps/{map}/landmarks/{landmark}/evidence", tag = "landmarks",
+    params(("map" = String, Path), ("landmark" = String, Path)),
+    responses((status = 200, body = LandmarkEvidence),
+    (status = 404, body = Problem, description = "unknown_map, unknown_landmark")))]
+async fn evidence(
+    State(app): State<AppState>,
+    PathParams((map, landmark)): PathParams<(String, String)>,
+) -> Result<Json<LandmarkEvidence>, ApiError> {
+    maps::get(app.store.reads(), &map).await?;
+    let name = landmarks::get(app.store.reads(), &map, &landmark).await?.name;
+    let answers = stored_answers::about(app.store.reads(), &map, &name, EVIDENCE_ANSWERS).await?;
+    Ok(Json(evidence_in(&answers, name)))
 }
 
 /// The learnt icon of a landmark that is nearest to the mean of its views, as PNG. `ETag` is the digest of its model.

@@ -11,6 +11,7 @@ use crate::{
     failed_gates::{self, Evidence, Refusal, StoredLookAlike},
     jobs::Learning,
     store::{
+        landmark_merge::{self, Merge},
         landmarks::{self, LandmarkGeometry, LandmarkRow},
         maps,
         revisions::{self, Subject},
@@ -24,7 +25,7 @@ use map::{
 };
 use nalgebra::Vector3;
 use protos::api::{
-    FailedGate, Landmark, LandmarkHealthBody, LandmarkModelBody, LandmarkPatch, LandmarkQuery,
+    FailedGate, Landmark, LandmarkHealthBody, LandmarkMerge, LandmarkModelBody, LandmarkPatch, LandmarkQuery,
     LandmarkStatus, ListOrder, ListQuery, LookAlikeBody, NewLandmark, Page, Place, PlaceSigma, Problem, Size,
     SizeAndPlace,
 };
@@ -33,7 +34,10 @@ use utoipa_axum::{router::OpenApiRouter, routes};
 use vision::{model::LandmarkId, pose::LandmarkSize};
 
 pub(super) fn router() -> OpenApiRouter<AppState> {
-    OpenApiRouter::new().routes(routes!(create, list)).routes(routes!(get, patch, delete))
+    OpenApiRouter::new()
+        .routes(routes!(create, list))
+        .routes(routes!(get, patch, delete))
+        .routes(routes!(merge))
 }
 
 /// Size and place, checked. Either may be missing.
@@ -301,6 +305,28 @@ async fn patch(
     let changed = write.await?;
     let learning = app.jobs.learning(&map_name).await?;
     Ok(Revised(changed.revision.clone(), shown(&app, &learning, &map_name, changed)))
+}
+
+/// Makes two landmarks one: this one gets the views of `from`, and the size and place that it lacks; `from` is deleted. Its
+/// model stays until it is learnt again; the history brings both back.
+#[utoipa::path(post, path = "/maps/{map}/landmarks/{landmark}/merge", tag = "landmarks",
+    params(("map" = String, Path), ("landmark" = String, Path)), request_body = LandmarkMerge,
+    responses((status = 200, body = Landmark), (status = 404, body = Problem),
+    (status = 409, body = Problem, description = "too_many"),
+    (status = 422, body = Problem, description = "invalid_value")))]
+async fn merge(
+    State(app): State<AppState>,
+    PathParams((map, landmark)): PathParams<(String, String)>,
+    IfMatch(is): IfMatch,
+    Body(LandmarkMerge { from }): Body<LandmarkMerge>,
+) -> Result<Revised<Landmark>, ApiError> {
+    if from == landmark {
+        return Err(ApiError::invalid("invalid_value", "from", "a landmark is not merged with itself"));
+    }
+    let merge = Merge { map: map.clone(), into: landmark, from, is, max: app.config.limits.views };
+    let row = landmark_merge::merge(&app.store, merge).await?;
+    let learning = app.jobs.learning(&map).await?;
+    Ok(Revised(row.revision.clone(), shown(&app, &learning, &map, row)))
 }
 
 /// Deletes a landmark with its views and its model.

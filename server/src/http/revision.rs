@@ -28,6 +28,7 @@ pub(super) const REVISED: &[(&str, &[&str])] = &[
     ("/maps/{map}/visibility-settings", &["put"]),
     ("/maps/{map}/modalities", &["put"]),
     ("/maps/{map}/landmarks/{landmark}", &["patch", "delete"]),
+    ("/maps/{map}/landmarks/{landmark}/merge", &["post"]),
     ("/maps/{map}/rollback", &["post"]),
     ("/maps/{map}/commits/{commit}/undo", &["post"]),
     ("/maps/{map}/drafts/{draft}/publish", &["post"]),

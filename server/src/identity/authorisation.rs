@@ -125,6 +125,8 @@ pub(crate) const TABLE: &[Rule] = &[
     map("GET", "/maps/{map}/landmarks/{landmark}", Viewer),
     map("PATCH", "/maps/{map}/landmarks/{landmark}", Teacher),
     map("DELETE", "/maps/{map}/landmarks/{landmark}", Teacher),
+    map("POST", "/maps/{map}/landmarks/{landmark}/merge", Teacher),
+    map("GET", "/maps/{map}/landmarks/{landmark}/evidence", Viewer),
     map("GET", "/maps/{map}/landmarks/{landmark}/model", Viewer),
     map("GET", "/maps/{map}/landmarks/{landmark}/distances", Viewer),
     map("GET", "/maps/{map}/landmarks/{landmark}/icon", Viewer),

@@ -23,6 +23,9 @@ statements! {
             AND (?6 IS NULL OR ?6 IN (SELECT value FROM json_each(a.landmarks)) \
                  OR ?6 IN (SELECT value FROM json_each(a.candidates))) \
             AND (?7 IS NULL OR a.stored_ms >= ?7) AND (?8 IS NULL OR a.stored_ms < ?8) ORDER BY a.id DESC LIMIT ?10";
+    ABOUT = "SELECT a.answer FROM stored_answers a JOIN maps m ON m.id = a.map_id WHERE m.name = ?1 \
+             AND (?2 IN (SELECT value FROM json_each(a.landmarks)) OR ?2 IN (SELECT value FROM json_each(a.candidates))) \
+             ORDER BY a.id DESC LIMIT ?3";
     COUNT = "SELECT count(*) FROM stored_answers a JOIN maps m ON m.id = a.map_id \
              WHERE (?1 IS NULL OR m.name IN (SELECT value FROM json_each(?1))) AND (?2 IS NULL OR a.robot = ?2) \
              AND (?3 IS NULL OR a.camera = ?3) AND (?4 IS NULL OR a.status = ?4) AND (?5 IS NULL OR a.refusal = ?5) \
@@ -132,6 +135,23 @@ pub(crate) async fn add(tx: &mut Tx, records: &[AnswerRecord], max: usize) -> Re
     }
     let oldest = sqlx::query(FORGET).bind(max as i64).execute(&mut tx.conn).await;
     oldest.map_err(StoreError::during("delete old answers")).map(drop)
+}
+
+/// The newest answers on a map that name a landmark or were compared with it.
+pub(crate) async fn about(
+    db: &sqlx::SqlitePool,
+    map: &str,
+    landmark: &str,
+    limit: usize,
+) -> Result<Vec<v1::Answer>, StoreError> {
+    let at = || StoreError::during("read answers");
+    let rows =
+        sqlx::query(ABOUT).bind(map).bind(landmark).bind(limit as i64).fetch_all(db).await.map_err(at())?;
+    let answer = |row: &SqliteRow| {
+        let message: &[u8] = row.try_get("answer").map_err(at())?;
+        v1::Answer::decode(message).map_err(|e| damaged(e.to_string()))
+    };
+    rows.iter().map(answer).collect()
 }
 
 /// One answer, and the indices of the quads whose icons are stored.

@@ -769,6 +769,23 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/maps/{map}/landmarks/{landmark}/evidence": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** How strongly points spoke for a landmark in the newest stored answers: a histogram beside the threshold. */
+        get: operations["evidence"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/maps/{map}/landmarks/{landmark}/icon": {
         parameters: {
             query?: never;
@@ -797,6 +814,26 @@ export interface paths {
         put?: never;
         /** Learns one landmark again from its views. */
         post: operations["learn_one"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/maps/{map}/landmarks/{landmark}/merge": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Makes two landmarks one: this one gets the views of `from`, and the size and place that it lacks; `from` is deleted. Its
+         *     model stays until it is learnt again; the history brings both back.
+         */
+        post: operations["merge"];
         delete?: never;
         options?: never;
         head?: never;
@@ -2877,6 +2914,38 @@ export interface components {
             landmark: string;
         };
         /**
+         * @description How strongly the points of quads spoke for a landmark in the stored answers: heaps by the negative decimal logarithm of
+         *     the number of false alarms.
+         */
+        LandmarkEvidence: {
+            /**
+             * Format: int64
+             * @description Stored answers that were read: the newest that name it or were compared with it, at most 500.
+             */
+            answers: number;
+            /**
+             * Format: double
+             * @description Width of a bin; the first begins at 0. The last has everything beyond, too.
+             */
+            bin_width: number;
+            /** @description Quads with its points while a part of it showed something else, by bin. */
+            doubtful: number[];
+            /** @description The landmark. */
+            landmark: string;
+            /** @description Quads that were named as it, by bin. */
+            named: number[];
+            /**
+             * Format: int32
+             * @description Quads named as it without points, by the picture as a whole.
+             */
+            named_without_points: number;
+            /**
+             * Format: double
+             * @description Accepted from here upwards.
+             */
+            threshold: number;
+        };
+        /**
          * @description How far a landmark is trusted.
          * @enum {string}
          */
@@ -2892,6 +2961,11 @@ export interface components {
         LandmarkLesson: {
             /** @description Views generated from each photograph, 0 to 100; absent fills up where photographs are few. */
             generated_views?: number | null;
+        };
+        /** @description Another landmark that is the same object. */
+        LandmarkMerge: {
+            /** @description Its name. It is deleted. */
+            from: string;
         };
         /** @description What was learnt of a landmark, in brief. */
         LandmarkModelBody: {
@@ -10902,6 +10976,82 @@ export interface operations {
             };
         };
     };
+    evidence: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                map: string;
+                landmark: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["LandmarkEvidence"];
+                };
+            };
+            /** @description unauthenticated: the role viewer is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description host_not_allowed, origin_not_allowed; forbidden: less than the role viewer; page_header_missing */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description unknown_map, unknown_landmark, not_found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description timeout; `may_be_done: true` if it is a change that had begun */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description internal; not_published, with `may_be_done: true` */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description busy, storage_failed */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
     icon: {
         parameters: {
             query?: never;
@@ -11093,6 +11243,173 @@ export interface operations {
             };
             /** @description invalid_value, idempotency_key_reused */
             422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description internal; not_published, with `may_be_done: true` */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description busy, storage_failed, too_many_uploads */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description storage_full */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    merge: {
+        parameters: {
+            query?: never;
+            header: {
+                /** @description The reason of a change, for the history of the map: one line of at most 200 characters, percent-encoded where it is not ASCII. */
+                "Waymark-Why"?: string;
+                /**
+                 * @description The ETag of what was read, or `*` for whatever is there.
+                 * @example *
+                 */
+                "If-Match": string;
+            };
+            path: {
+                map: string;
+                landmark: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                /**
+                 * @example {
+                 *       "from": "door"
+                 *     }
+                 */
+                "application/json": components["schemas"]["LandmarkMerge"];
+            };
+        };
+        responses: {
+            200: {
+                headers: {
+                    /** @description The revision: another one after every edit or lesson, the same after what robots do by themselves. */
+                    ETag?: string;
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Landmark"];
+                };
+            };
+            /** @description bad_json */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description unauthenticated: the role teacher is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description host_not_allowed, origin_not_allowed; forbidden: less than the role teacher; page_header_missing */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description not_found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description timeout; `may_be_done: true` if it is a change that had begun */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description too_many */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description changed_meanwhile; `ETag` is the present revision */
+            412: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description too_large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description not_json */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description invalid_value */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description precondition_required */
+            428: {
                 headers: {
                     [name: string]: unknown;
                 };

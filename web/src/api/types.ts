@@ -21,6 +21,7 @@ export type DuplicatePair = Schemas["DuplicatePair"];
 export type Job = Schemas["Job"];
 export type Landmark = Schemas["Landmark"];
 export type LandmarkDistances = Schemas["LandmarkDistances"];
+export type LandmarkEvidence = Schemas["LandmarkEvidence"];
 export type LandmarkModelDetail = Schemas["LandmarkModelDetail"];
 export type MapBody = Schemas["Map"];
 export type Place = Schemas["Place"];

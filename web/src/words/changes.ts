@@ -11,6 +11,7 @@ const OPERATIONS: Record<string, string> = {
   "POST /maps/{map}/landmarks": "Landmark created",
   "PATCH /maps/{map}/landmarks/{landmark}": "Landmark changed",
   "DELETE /maps/{map}/landmarks/{landmark}": "Landmark deleted",
+  "POST /maps/{map}/landmarks/{landmark}/merge": "Landmarks merged",
   "POST /maps/{map}/bulk/create-landmarks": "Landmarks created",
   "POST /maps/{map}/bulk/delete-landmarks": "Landmarks deleted",
   "POST /maps/{map}/landmarks/{landmark}/views": "Photograph added",

@@ -189,6 +189,21 @@ test("a landmark is renamed, measured, taken out of use and brought back by undo
   await check(page, "history");
 });
 
+test("two landmarks that are one object are merged", async () => {
+  const [first] = (await api("GET", `/maps/${MAP}/landmarks`)).items;
+  await api("POST", `/maps/${MAP}/landmarks`, { name: "twin" });
+  const page = await go(`/maps/${MAP}/landmarks/${first.name}`);
+  await page.getByRole("img", { name: /Points .*named/ }).waitFor();
+  await page.getByRole("button", { name: "Merge" }).click();
+  await page.getByLabel("The other one").selectOption("twin");
+  await check(page, "landmark-merge");
+  await page.getByRole("button", { name: "Make them one" }).click();
+  await page.getByText(`twin is part of ${first.name} now`).waitFor();
+  const names = (await api("GET", `/maps/${MAP}/landmarks`)).items.map(({ name }) => name);
+  assert.ok(!names.includes("twin"), names.join());
+  assert.deepEqual(page.faults, []);
+});
+
 test("a draft is begun, compared, tried and published", async () => {
   const page = await go(`/maps/${MAP}/history`);
   await page.getByRole("button", { name: "Begin a draft" }).click();

@@ -93,6 +93,10 @@ pub(super) async fn prepared(operation: &str) -> (Service, String) {
     if operation.ends_with("/accept") {
         gathering = gathered(&service.store, "hall", std::iter::once(seen_from(1.0, 1, 0.0))).await;
     }
+    if operation.ends_with("/merge") {
+        let new = request("POST", "/api/v1/maps/hall/landmarks", r#"{"name": "door"}"#);
+        assert_eq!(service.ask(new).await.status(), StatusCode::CREATED);
+    }
     if operation.ends_with("/reference") || operation.ends_with("/{robot}/pose") {
         driven(&service);
     }

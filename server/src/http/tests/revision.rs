@@ -170,5 +170,5 @@ async fn the_document_asks_for_revisions_where_the_server_does() {
             found += usize::from(asks);
         }
     }
-    assert_eq!(found, 12);
+    assert_eq!(found, 13);
 }

@@ -180,3 +180,43 @@ async fn views_are_found_by_time_and_capture_in_both_orders() {
         assert_eq!(page["total"], if wanted.is_empty() { 0 } else { 3 }, "{query}");
     }
 }
+
+#[tokio::test]
+async fn what_points_said_for_a_landmark_is_counted_by_strength() {
+    let service = Service::start(Limits::default()).await;
+    let (status, _) = service.upload("sign", blocks(1), &[("create", "true"), ("whole_image", "true")]).await;
+    assert_eq!(status, 201);
+    let quad = |log10_false_alarms: Option<f64>, landmark: &str, doubtful_landmark: &str| v1::QuadAnswer {
+        points: log10_false_alarms.map(|log10_false_alarms| v1::PointEvidence {
+            log10_false_alarms,
+            ..v1::PointEvidence::default()
+        }),
+        landmark: landmark.into(),
+        doubtful_landmark: doubtful_landmark.into(),
+        ..v1::QuadAnswer::default()
+    };
+    let quads = vec![
+        quad(Some(-31.0), "sign", ""),
+        quad(Some(-900.0), "sign", ""),
+        quad(Some(-12.0), "", "sign"),
+        quad(None, "sign", ""),
+        quad(Some(-31.0), "door", ""),
+    ];
+    let answer = v1::Answer { map: "hall".into(), quads, ..v1::Answer::default() };
+    let key = SlotKey { robot: Name::new("r1").unwrap(), camera: Name::new("front").unwrap() };
+    let record = AnswerRecord { key, answer: Arc::new(answer), icons: vec![] };
+    let stored = service
+        .store
+        .write(|tx| Box::pin(async move { stored_answers::add(tx, std::slice::from_ref(&record), 3).await }));
+    stored.await.unwrap();
+    let (status, found) = service.get("/api/v1/maps/hall/landmarks/sign/evidence").await;
+    assert_eq!((status, &found["answers"], &found["threshold"]), (200, &json!(1), &json!(5.0)), "{found}");
+    let bins = |heap: &str| -> Vec<(usize, u64)> {
+        let heap = found[heap].as_array().unwrap().iter().map(|n| n.as_u64().unwrap());
+        heap.enumerate().filter(|(_, n)| *n > 0).collect()
+    };
+    assert_eq!((bins("named"), bins("doubtful")), (vec![(3, 1), (19, 1)], vec![(1, 1)]));
+    assert_eq!(found["named_without_points"], 1);
+    let missing = service.get("/api/v1/maps/hall/landmarks/door/evidence").await;
+    assert_eq!((missing.0, &missing.1["code"]), (404, &json!("unknown_landmark")));
+}

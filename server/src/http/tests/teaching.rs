@@ -218,3 +218,44 @@ async fn the_second_name_of_a_picture_is_refused_with_the_first() {
     service.learn("second").await;
     assert_eq!(service.landmark("second").await.1["status"], "active");
 }
+
+#[tokio::test]
+async fn two_landmarks_that_are_one_object_become_one() {
+    let service = Service::start(Limits { views: 3, ..Limits::default() }).await;
+    let merge = async |into: &str, from: &str, revision: &str| {
+        let path = format!("/api/v1/maps/hall/landmarks/{into}/merge");
+        let mut asked = request("POST", &path, json!({ "from": from }).to_string());
+        asked.headers_mut().insert(header::IF_MATCH, revision.parse().unwrap());
+        read(service.ask(asked).await).await
+    };
+    for (name, number) in [("poster", 1), ("poster", 2), ("sign", 2), ("sign", 3), ("door", 4), ("door", 5)] {
+        assert_eq!(service.upload(name, blocks(number), &[CREATE, WHOLE]).await.0, 201);
+    }
+    let place = json!({ "x_m": 1.0, "y_m": 2.0, "z_m": 1.5, "theta_rad": 0.0 });
+    let size = json!({ "width_m": 0.6, "height_m": 0.84 });
+    assert_eq!(service.patch("sign", json!({ "place": place, "size": size })).await.0, 200);
+    let code = |answer: (u16, Value)| (answer.0, answer.1["code"].as_str().unwrap_or_default().to_owned());
+    assert_eq!(code(merge("poster", "poster", "*").await), (422, "invalid_value".into()));
+    assert_eq!(code(merge("poster", "nothing", "*").await), (404, "unknown_landmark".into()));
+    assert_eq!(code(merge("nothing", "poster", "*").await), (404, "unknown_landmark".into()));
+    assert_eq!(code(merge("poster", "sign", "\"1.0\"").await), (412, "changed_meanwhile".into()));
+    assert_eq!(code(merge("poster", "door", "*").await), (409, "too_many".into()));
+    assert_eq!(service.landmark("door").await.1["views"], 2, "nothing was done");
+
+    // The picture that both have counts once.
+    let (status, merged) = merge("poster", "sign", "*").await;
+    assert_eq!((status, &merged["views"]), (200, &json!(3)), "{merged}");
+    assert_eq!((&merged["place"], &merged["size"]), (&place, &size), "what it lacked");
+    assert_eq!(service.landmark("sign").await.0, 404);
+    for view in service.get("/api/v1/maps/hall/landmarks/poster/views").await.1["items"].as_array().unwrap() {
+        let path = format!("/api/v1/maps/hall/landmarks/poster/views/{}/image", view["id"]);
+        assert_eq!(service.ask(request("GET", &path, "")).await.status(), 200, "{path}");
+    }
+    let commits = service.get("/api/v1/maps/hall/commits").await.1;
+    let path = format!("/api/v1/maps/hall/commits/{}/undo", commits["items"][0]["id"]);
+    let (status, undone) = read(service.ask(request("POST", &path, "{}")).await).await;
+    assert_eq!(status, 200, "{undone} {commits}");
+    assert_eq!(service.landmark("poster").await.1["views"], 2);
+    let (status, back) = service.landmark("sign").await;
+    assert_eq!((status, &back["views"], &back["place"]), (200, &json!(2), &place), "{back}");
+}

@@ -8,6 +8,7 @@ from waymark.api import (
     AnswerStatus,
     DuplicatePair,
     LandmarkDistances,
+    LandmarkEvidence,
     LandmarkModelDetail,
     LocaliseResult,
     StoredAnswer,
@@ -66,6 +67,10 @@ class AsyncAnswers(AsyncBase):
     async def landmark_distances(self, map: str, landmark: str) -> LandmarkDistances:
         """Histograms of the distances that its thresholds were fitted to."""
         return await self._send(LandmarkDistances, "landmark_distances", map, landmark)
+
+    async def landmark_evidence(self, map: str, landmark: str) -> LandmarkEvidence:
+        """How strongly points spoke for it in the newest stored answers."""
+        return await self._send(LandmarkEvidence, "landmark_evidence", map, landmark)
 
     async def landmark_icon(self, map: str, landmark: str) -> bytes:
         """The learnt icon that is nearest to the mean of its views: PNG."""

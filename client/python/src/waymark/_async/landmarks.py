@@ -98,6 +98,11 @@ class AsyncLandmarks(AsyncBase):
         body = given(name=name, size=size, place=place, health=health)
         return await self._send(Landmark, "update_landmark", map, landmark, json=body)
 
+    async def merge_landmarks(self, map: str, into: str, origin: str) -> Landmark:
+        """Makes two landmarks one: `into` gets the views of `origin`, and the size and place that it lacks; `origin` is
+        deleted. Learn it again afterwards."""
+        return await self._send(Landmark, "merge_landmarks", map, into, json={"from": origin})
+
     async def delete_landmark(self, map: str, landmark: str) -> None:
         """Deletes a landmark with its views and model."""
         await self._done("delete_landmark", map, landmark)

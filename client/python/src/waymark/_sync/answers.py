@@ -9,6 +9,7 @@ from waymark.api import (
     AnswerStatus,
     DuplicatePair,
     LandmarkDistances,
+    LandmarkEvidence,
     LandmarkModelDetail,
     LocaliseResult,
     StoredAnswer,
@@ -67,6 +68,10 @@ class Answers(Base):
     def landmark_distances(self, map: str, landmark: str) -> LandmarkDistances:
         """Histograms of the distances that its thresholds were fitted to."""
         return self._send(LandmarkDistances, "landmark_distances", map, landmark)
+
+    def landmark_evidence(self, map: str, landmark: str) -> LandmarkEvidence:
+        """How strongly points spoke for it in the newest stored answers."""
+        return self._send(LandmarkEvidence, "landmark_evidence", map, landmark)
 
     def landmark_icon(self, map: str, landmark: str) -> bytes:
         """The learnt icon that is nearest to the mean of its views: PNG."""

@@ -99,6 +99,11 @@ class Landmarks(Base):
         body = given(name=name, size=size, place=place, health=health)
         return self._send(Landmark, "update_landmark", map, landmark, json=body)
 
+    def merge_landmarks(self, map: str, into: str, origin: str) -> Landmark:
+        """Makes two landmarks one: `into` gets the views of `origin`, and the size and place that it lacks; `origin` is
+        deleted. Learn it again afterwards."""
+        return self._send(Landmark, "merge_landmarks", map, into, json={"from": origin})
+
     def delete_landmark(self, map: str, landmark: str) -> None:
         """Deletes a landmark with its views and model."""
         self._done("delete_landmark", map, landmark)

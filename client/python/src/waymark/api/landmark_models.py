@@ -94,6 +94,20 @@ class LandmarkDistances:
 
 
 @dataclass(frozen=True, slots=True)
+class LandmarkEvidence:
+    """How strongly points spoke for a landmark in the newest stored answers (`answers` of them were read): counts of quads by
+    bins of the negative decimal logarithm of the number of false alarms. The last bin has everything beyond, too."""
+
+    landmark: str
+    answers: int
+    threshold: float
+    bin_width: float
+    named: tuple[int, ...]
+    doubtful: tuple[int, ...]
+    named_without_points: int
+
+
+@dataclass(frozen=True, slots=True)
 class DuplicatePair:
     """Two landmarks that look alike, by name, and which of them is matched. `distance` is 1 minus the similarity."""
 
