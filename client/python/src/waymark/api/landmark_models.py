@@ -95,8 +95,10 @@ class LandmarkDistances:
 
 @dataclass(frozen=True, slots=True)
 class LandmarkEvidence:
-    """How strongly points spoke for a landmark in the newest stored answers (`answers` of them were read): counts of quads by
-    bins of the negative decimal logarithm of the number of false alarms. The last bin has everything beyond, too."""
+    """How strongly points spoke for a landmark in the newest stored answers, of which `answers` were read.
+
+    Counts of quads by bins of the negative decimal logarithm of the number of false alarms. The last bin has everything
+    beyond, too."""
 
     landmark: str
     answers: int
