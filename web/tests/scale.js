@@ -19,9 +19,13 @@ async function started(program, args, says) {
   let said = "";
   const found = await new Promise((done, failed) => {
     const hear = (text) => {
+      // What is said afterwards is read and dropped: a full pipe would stop the program.
+      if (said === undefined) return;
       said += text;
       const match = says.exec(said);
-      if (match) done(match[0]);
+      if (!match) return;
+      done(match[0]);
+      said = undefined;
     };
     child.stdout.setEncoding("utf8").on("data", hear);
     child.stderr.setEncoding("utf8").on("data", hear);
@@ -69,9 +73,17 @@ async function pan(page, ms) {
   return drawn / seconds;
 }
 
-const step = (text) => console.log(`${(performance.now() / 1000).toFixed(1)} s: ${text}`);
 const data = mkdtempSync(join(tmpdir(), "waymark-scale-"));
 const ended = [];
+// Whatever hangs, this ends: the figures are of a minute.
+const MOST_MS = 240_000;
+const late = setTimeout(() => {
+  console.error(`not ended within ${MOST_MS / 1000} s`);
+  for (const end of ended.reverse()) end();
+  process.exit(1);
+}, MOST_MS);
+late.unref();
+const step = (text) => console.log(`${(performance.now() / 1000).toFixed(1)} s: ${text}`);
 try {
   const server = await started(PROGRAM, ["serve", "--data", data, "--http", HTTP, "--zenoh", ZENOH], /http:\/\/[^\s/]+\/open\?code=\S+/);
   ended.push(() => server.child.kill("SIGKILL"));
@@ -95,20 +107,25 @@ try {
   step("the robots have poses");
 
   const page = await its.context.newPage();
+  page.setDefaultTimeout(30_000);
+  page.on("console", (message) => message.type() === "error" && console.error(message.text()));
   const first = performance.now();
   await page.goto(`${origin}/maps/big`);
   await page.getByText(/2,000 landmarks/).first().waitFor({ timeout: 60_000 });
   const shown_ms = performance.now() - first;
   const paint_ms = await page.evaluate(() => performance.getEntriesByName("first-contentful-paint")[0]?.startTime);
+  step("the map is shown");
   await page.waitForTimeout(3000);
   const live = await page.getByText("Live", { exact: true }).count();
   const far = await pan(page, 5000);
+  step("panned over the whole map");
   for (let i = 0; i < 5; i++) {
     await page.getByRole("button", { name: "Zoom in" }).click();
     await page.waitForTimeout(300);
   }
   await page.waitForTimeout(1000);
   const near = await pan(page, 5000);
+  step("panned near");
   const cdp = await its.context.newCDPSession(page);
   await cdp.send("Performance.enable");
   const { metrics } = await cdp.send("Performance.getMetrics");

@@ -6,7 +6,7 @@ import { mkdirSync, readFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import { chromium } from "playwright-core";
 
-const PROGRAM = process.env.WAYMARK_PROGRAM ?? new URL("../../../target/debug/waymark", import.meta.url).pathname;
+export const PROGRAM = process.env.WAYMARK_PROGRAM ?? new URL("../../../target/debug/waymark", import.meta.url).pathname;
 const CHROMIUM = process.env.CHROMIUM ?? "/usr/bin/chromium";
 const OUTPUT = new URL("../output/", import.meta.url).pathname;
 const AXE = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
@@ -19,16 +19,21 @@ export const DESKTOP = { width: 1280, height: 800 };
 export const PHONE = { width: 390, height: 844 };
 
 /** Starts `waymark demo --stay`: a corridor whose posters are taught, and robots that drive. */
-export async function demo() {
-  const child = spawn(PROGRAM, ["demo", "--stay", "--legs", "40", "--robots", "2", "--rate-hz", "1", "--http", "127.0.0.1:0"], {
-    stdio: ["ignore", "pipe", "pipe"],
-  });
+export const demo = () => started(["demo", "--stay", "--legs", "40", "--robots", "2", "--rate-hz", "1", "--http", "127.0.0.1:0"]);
+
+/** Starts the program, and waits for the link to its pages. */
+export async function started(args) {
+  const child = spawn(PROGRAM, args, { stdio: ["ignore", "pipe", "pipe"] });
   let said = "";
   const link = await new Promise((found, failed) => {
     const hear = (text) => {
+      // What is said after the link is read and dropped: a full pipe would stop the server.
+      if (said === undefined) return;
       said += text;
-      const match = /http:\/\/[^\s/]+\/open\?code=\S+/.exec(said);
-      if (match) found(match[0]);
+      const match = /https?:\/\/[^\s/]+\/open\?code=\S+/.exec(said);
+      if (!match) return;
+      found(match[0]);
+      said = undefined;
     };
     child.stdout.setEncoding("utf8").on("data", hear);
     child.stderr.setEncoding("utf8").on("data", hear);
@@ -47,12 +52,34 @@ export async function demo() {
 /** A browser that is signed in by a link. */
 export async function browser({ link, origin }) {
   const args = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync"];
-  const started = await chromium.launch({ executablePath: CHROMIUM, args });
-  const context = await started.newContext({ viewport: DESKTOP, baseURL: origin });
+  const launched = await chromium.launch({ executablePath: CHROMIUM, args });
+  const context = await launched.newContext({ viewport: DESKTOP, baseURL: origin, ignoreHTTPSErrors: true });
   const first = await context.newPage();
   await first.goto(link);
   await first.close();
-  return { context, close: () => started.close() };
+  return { context, close: () => launched.close() };
+}
+
+/** Asks the API as the page does, with the session of the browser. */
+export const asker = ({ context }, { origin }) => async (method, path, body, headers = {}) => {
+  const answer = await context.request.fetch(`${origin}/api/v1${path}`, {
+    method,
+    headers: { "x-waymark-page": "1", ...headers },
+    ...(body && { data: body }),
+  });
+  assert.ok(answer.ok(), `${method} ${path}: ${answer.status()} ${await answer.text()}`);
+  return answer.status() === 204 ? undefined : answer.json();
+};
+
+/** Asks again until there is an answer. */
+export async function eventually(what, ask) {
+  const until = Date.now() + SOON;
+  for (;;) {
+    const found = await ask();
+    if (found) return found;
+    assert.ok(Date.now() < until, `there is no ${what} within ${SOON / 1000} s`);
+    await new Promise((later) => setTimeout(later, 500));
+  }
 }
 
 /** Opens an address, and collects what may not happen. */
