@@ -6,12 +6,12 @@ import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
 import { promisify } from "node:util";
-import { PROGRAM, asker, browser, check, open, started } from "./harness.js";
+import { PROGRAM, asker, browser, check, open, serve } from "./harness.js";
 
 let folder, server, its, api;
 before(async () => {
   folder = mkdtempSync(join(tmpdir(), "waymark-certificates-"));
-  server = await started(["serve", "--tls", "--data", join(folder, "data"), "--http", "127.0.0.1:0", "--zenoh", "tls/127.0.0.1:0"]);
+  server = await serve("--tls", "--data", join(folder, "data"), "--zenoh", "tls/127.0.0.1:0");
   its = await browser(server);
   api = asker(its, server);
 });
@@ -26,8 +26,7 @@ test("a certificate is revoked on the page of its robot", async () => {
   await api("PUT", "/robots/mower", { map: "yard" });
   const page = await open(its.context, server.origin, "/robots/mower");
   await page.getByText(/waymark robot enrol mower/).waitFor();
-  const plain = server.origin.replace("https:", "http:");
-  await promisify(execFile)(PROGRAM, ["robot", "enrol", "mower", "--out", join(folder, "mower"), "--server", plain]);
+  await promisify(execFile)(PROGRAM, ["robot", "enrol", "mower", "--out", join(folder, "mower"), "--server", server.origin]);
   await page.reload();
   const row = page.getByRole("row").filter({ hasText: "valid" });
   await row.waitFor();

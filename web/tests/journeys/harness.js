@@ -19,26 +19,43 @@ export const DESKTOP = { width: 1280, height: 800 };
 export const PHONE = { width: 390, height: 844 };
 
 /** Starts `waymark demo --stay`: a corridor whose posters are taught, and robots that drive. */
-export const demo = () => started(["demo", "--stay", "--legs", "40", "--robots", "2", "--rate-hz", "1", "--http", "127.0.0.1:0"]);
+export async function demo() {
+  const { found, stop } = await started(["demo", "--stay", "--legs", "40", "--robots", "2", "--rate-hz", "1", "--http", "127.0.0.1:0"], /https?:\/\/[^\s/]+\/open\?code=\S+/);
+  return { link: found[0], origin: new URL(found[0]).origin, stop };
+}
 
-/** Starts the program, and waits for the link to its pages. */
-export async function started(args) {
-  const child = spawn(PROGRAM, args, { stdio: ["ignore", "pipe", "pipe"] });
+/** Starts `waymark serve`. It prints no link where no person reads: its token gives one. */
+export async function serve(...args) {
+  const { found, stop } = await started(["serve", "--http", "127.0.0.1:0", ...args], /pages\s+\S+:(\d+)\/\s+robots\s+(\S+)\s+token\s+(\S+)\n/);
+  const [, port, robots, file] = found;
+  // With encryption, too, plain text is served to this machine.
+  const origin = `http://127.0.0.1:${port}`;
+  const headers = { authorization: `Bearer ${readFileSync(file, "utf8").trim()}` };
+  const answer = await fetch(`${origin}/api/v1/session/links`, { method: "POST", headers });
+  assert.ok(answer.ok, `a link: ${answer.status} ${await answer.clone().text()}`);
+  return { link: `${origin}${(await answer.json()).path}`, origin, robots, stop };
+}
+
+/** Starts the program, and waits until it says this. */
+async function started(args, says) {
+  // The server takes variables of this prefix for its settings.
+  const env = Object.fromEntries(Object.entries(process.env).filter(([name]) => !name.startsWith("WAYMARK_")));
+  const child = spawn(PROGRAM, args, { stdio: ["ignore", "pipe", "pipe"], env });
   let said = "";
-  const link = await new Promise((found, failed) => {
+  const found = await new Promise((done, failed) => {
     const hear = (text) => {
-      // What is said after the link is read and dropped: a full pipe would stop the server.
+      // What is said afterwards is read and dropped: a full pipe would stop the server.
       if (said === undefined) return;
       said += text;
-      const match = /https?:\/\/[^\s/]+\/open\?code=\S+/.exec(said);
+      const match = says.exec(said);
       if (!match) return;
-      found(match[0]);
+      done(match);
       said = undefined;
     };
     child.stdout.setEncoding("utf8").on("data", hear);
     child.stderr.setEncoding("utf8").on("data", hear);
     child.on("exit", (code) => failed(new Error(`the server has ended with ${code}: ${said}`)));
-    setTimeout(() => failed(new Error(`no link of the page within 5 min: ${said}`)), 300_000).unref();
+    setTimeout(() => failed(new Error(`it did not say ${says} within 5 min: ${said}`)), 300_000).unref();
   });
   const stop = () => new Promise((ended) => {
     child.removeAllListeners("exit");
@@ -46,7 +63,7 @@ export async function started(args) {
     child.kill("SIGINT");
     setTimeout(() => child.kill("SIGKILL"), 20_000).unref();
   });
-  return { link, origin: new URL(link).origin, stop };
+  return { found, stop };
 }
 
 /** A browser that is signed in by a link. */
