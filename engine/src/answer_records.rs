@@ -1,20 +1,33 @@
-//! Which answers are worth storing, and the icons of their quads. In: the answers of the workers. Out: some of them, queued for
-//! whoever stores them: of each camera the first of every kind and one in [`LONGEST`], at most one in [`SHORTEST`].
+//! Which answers are worth storing, and what they rest on: the icons of their quads, matched points, the prior pose. In: the
+//! answers of the workers. Out: some of them, queued for whoever stores them: of each camera the first of every kind and one in
+//! [`LONGEST`], at most one in [`SHORTEST`].
 
-use crate::{slots::SlotKey, snapshot::MapSnapshot};
-use protos::v1;
+use crate::{
+    landmark_checks::FrameEvaluation,
+    prior_check::{PriorCheck, prior_check},
+    slots::SlotKey,
+    snapshot::MapSnapshot,
+};
+use protos::{CheckedFrame, v1};
 use std::{
     collections::BTreeMap,
     sync::{Arc, Mutex, PoisonError},
     time::{Duration, Instant},
 };
 use tokio::sync::mpsc::{Receiver, Sender, channel, error::TrySendError};
-use vision::{frame::GrayImage, geometry::Corners, icon::icon};
+use vision::{
+    frame::GrayImage,
+    geometry::Corners,
+    icon::icon,
+    points::shown_matches::{ShownMatch, shown_matches},
+};
 
 /// Answers that wait to be stored. More are dropped.
 pub const QUEUE: usize = 64;
 /// Quads of one answer whose icons are stored, the detector's best first.
 pub const MAX_ICONS: usize = 8;
+/// Matches of a quad with a landmark that are stored, those that agree first.
+pub const MAX_MATCHES: usize = 100;
 /// Least time between two stored answers of a camera.
 pub const SHORTEST: Duration = Duration::from_secs(1);
 /// An answer of the same kind as the stored one before is stored after this time.
@@ -22,8 +35,17 @@ pub const LONGEST: Duration = Duration::from_secs(10);
 /// Cameras that are remembered; a further one replaces the one with the oldest stored answer.
 pub const MAX_CAMERAS: usize = 2048;
 
+/// Points of a quad that are like points of a landmark.
+#[derive(Debug, Clone, PartialEq)]
+pub struct QuadMatches {
+    /// Name of the landmark: the one that is named, else the nearest candidate.
+    pub landmark: String,
+    /// At most [`MAX_MATCHES`].
+    pub matches: Vec<ShownMatch>,
+}
+
 /// The icon of a quad.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct QuadIcon {
     /// Index of the quad in the answer.
     pub quad: usize,
@@ -31,6 +53,17 @@ pub struct QuadIcon {
     pub size: usize,
     /// Row-major grey levels; row 0 is the top.
     pub pixels: Vec<u8>,
+    /// Its matches with the best candidate; `None` without a candidate that has points.
+    pub matched: Option<QuadMatches>,
+}
+
+/// What an answer rests on.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct AnswerBasis {
+    /// The icons of its quads, by index; those too small or outside of the frame have none.
+    pub icons: Vec<QuadIcon>,
+    /// The pose that was known without the frame, against that by the frame.
+    pub prior_check: Option<PriorCheck>,
 }
 
 /// An answer to be stored.
@@ -40,8 +73,8 @@ pub struct AnswerRecord {
     pub key: SlotKey,
     /// What was answered.
     pub answer: Arc<v1::Answer>,
-    /// The icons of its quads, by index; those too small or outside of the frame have none.
-    pub icons: Vec<QuadIcon>,
+    /// What it rests on.
+    pub basis: AnswerBasis,
 }
 
 /// What tells answers of one camera apart: status, names, and the reason of a refusal.
@@ -92,19 +125,24 @@ pub fn named_landmarks(answer: &v1::Answer) -> Vec<&str> {
 }
 
 impl AnswerRecorder {
-    /// The icons of an answer that is to be stored; `None` for one that is not.
+    /// What an answer that is to be stored rests on; `None` for one that is not.
     pub fn take(
         &self,
         key: &SlotKey,
         answer: &v1::Answer,
         (image, map): (&GrayImage, &MapSnapshot),
-    ) -> Option<Vec<QuadIcon>> {
-        self.is_due(key, answer, Instant::now()).then(|| quad_icons(answer, image, map))
+        (evaluation, frame): (&FrameEvaluation, &CheckedFrame),
+    ) -> Option<AnswerBasis> {
+        let basis = || AnswerBasis {
+            icons: quad_icons(answer, image, map),
+            prior_check: prior_check(evaluation, frame.prior.as_ref()),
+        };
+        self.is_due(key, answer, Instant::now()).then(basis)
     }
 
-    /// No icons for an answer to a frame that could not be analysed, if it is to be stored.
-    pub fn take_refused(&self, key: &SlotKey, answer: &v1::Answer) -> Option<Vec<QuadIcon>> {
-        self.is_due(key, answer, Instant::now()).then(Vec::new)
+    /// Nothing for an answer to a frame that could not be analysed, if it is to be stored.
+    pub fn take_refused(&self, key: &SlotKey, answer: &v1::Answer) -> Option<AnswerBasis> {
+        self.is_due(key, answer, Instant::now()).then(AnswerBasis::default)
     }
 
     fn is_due(&self, key: &SlotKey, answer: &v1::Answer, now: Instant) -> bool {
@@ -143,16 +181,33 @@ fn quad_icons(answer: &v1::Answer, image: &GrayImage, map: &MapSnapshot) -> Vec<
     let of_quad = |(quad, found): (usize, &v1::QuadAnswer)| {
         let corners: [[f64; 2]; 4] =
             found.corners.iter().map(|c| [c.u_px, c.v_px]).collect::<Vec<_>>().try_into().ok()?;
-        let icon = icon(image, &Corners::try_from(corners).ok()?, &map.params.icon).ok()?;
+        let corners = Corners::try_from(corners).ok()?;
+        let icon = icon(image, &corners, &map.params.icon).ok()?;
         let pixels = icon.pixels.iter().map(|grey| grey.round().clamp(0.0, 255.0) as u8).collect();
-        Some(QuadIcon { quad, size: icon.size, pixels })
+        let matched = best_candidate(found).and_then(|name| quad_matches(image, &corners, map, name));
+        Some(QuadIcon { quad, size: icon.size, pixels, matched })
     };
     answer.quads.iter().enumerate().filter_map(of_quad).take(MAX_ICONS).collect()
+}
+
+/// The landmark that a quad is named after, globally, guided or in doubt; else its nearest candidate.
+fn best_candidate(quad: &v1::QuadAnswer) -> Option<&str> {
+    let named = [&quad.landmark, &quad.guided_landmark, &quad.doubtful_landmark];
+    let nearest = quad.candidates.iter().map(|candidate| &candidate.landmark);
+    named.into_iter().chain(nearest).map(String::as_str).find(|name| !name.is_empty())
+}
+
+fn quad_matches(image: &GrayImage, corners: &Corners, map: &MapSnapshot, name: &str) -> Option<QuadMatches> {
+    let (id, _) = map.landmarks.iter().find(|(_, landmark)| landmark.name == name)?;
+    let model = map.models.iter().find(|model| model.id == *id).filter(|model| !model.points.is_empty())?;
+    let matches = shown_matches(image, corners, &model.points, MAX_MATCHES);
+    Some(QuadMatches { landmark: name.to_owned(), matches })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::Scene;
     use protos::Name;
 
     fn key(camera: usize) -> SlotKey {
@@ -197,7 +252,7 @@ mod tests {
         assert!(recorder.is_due(&key(0), &none, start), "the oldest is forgotten");
         for seq in 0..=QUEUE as u64 {
             let answer = Arc::new(v1::Answer { seq, ..none.clone() });
-            recorder.send(AnswerRecord { key: key(0), answer, icons: Vec::new() });
+            recorder.send(AnswerRecord { key: key(0), answer, basis: AnswerBasis::default() });
         }
         let stored: Vec<u64> =
             std::iter::from_fn(|| queue.try_recv().ok()).map(|record| record.answer.seq).collect();
@@ -222,5 +277,31 @@ mod tests {
         assert_eq!(refusal_of(&said), None);
         said.rejection = Some(v1::Rejection { code: "bad_image".into(), ..v1::Rejection::default() });
         assert_eq!(refusal_of(&said), Some("bad_image"));
+    }
+
+    #[test]
+    fn a_quad_is_stored_with_its_matches_with_the_landmark_that_it_is_named_after() {
+        let mut scene = Scene::new();
+        let map = scene.taught();
+        let (name, readings) = scene.stops(2, 1).into_iter().next().unwrap();
+        let corners = readings.frame.truth.landmark(&name).unwrap().corners_px;
+        let mut answer = answer(v1::Status::Matched, &name);
+        answer.quads[0].corners = protos::convert::result::corners(&corners);
+        let matched = |answer: &v1::Answer| {
+            let icons = quad_icons(answer, &readings.frame.image, &map);
+            icons.into_iter().next().and_then(|icon| icon.matched)
+        };
+        let found = matched(&answer).unwrap();
+        assert_eq!(found.landmark, name);
+        assert!(found.matches.len() <= MAX_MATCHES, "{}", found.matches.len());
+        assert!(found.matches.iter().filter(|m| m.agrees).count() >= 10, "{found:?}");
+        // Without a name, the nearest candidate.
+        answer.quads[0].landmark.clear();
+        assert_eq!(matched(&answer), None);
+        answer.quads[0].candidates =
+            vec![v1::Candidate { landmark: name.clone(), ..v1::Candidate::default() }];
+        assert_eq!(matched(&answer), Some(found));
+        answer.quads[0].landmark = "gone".into();
+        assert_eq!(matched(&answer), None);
     }
 }

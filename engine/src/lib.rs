@@ -27,6 +27,7 @@ pub mod dominant;
 pub mod epochs;
 pub mod gaze;
 pub mod findings;
+pub mod prior_check;
 pub mod answer_records;
 pub mod kept_frames;
 pub mod replay;

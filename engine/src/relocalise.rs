@@ -11,7 +11,7 @@ use map::{
     relocalise::{GridBelief, GridBeliefParams, PoseHypothesis, RelativeObservation},
 };
 use nalgebra::{Matrix3, Point2, Vector2, Vector3};
-use protos::Name;
+use protos::{Name, convert::geometry::pose2_covariance_wire, v1};
 use std::{
     collections::{BTreeMap, BTreeSet, VecDeque},
     sync::{Arc, Mutex, PoisonError},
@@ -42,6 +42,12 @@ const EXPLAINED_RAD: f64 = 0.35;
 const DRIFT: f64 = 0.05;
 /// Margin around the walls: a robot may stand outside of what was mapped.
 const MARGIN_M: f64 = 1.0;
+
+/// A hypothesis as a message.
+pub fn hypothesis_wire(hypothesis: &PoseHypothesis) -> v1::Hypothesis {
+    let map_from_robot = Some(pose2_covariance_wire(&hypothesis.pose));
+    v1::Hypothesis { probability: hypothesis.mass, map_from_robot }
+}
 
 /// A frame of a robot without a pose.
 #[derive(Debug, Clone, Copy)]

@@ -4,7 +4,7 @@
 
 use super::{
     ambiguous_observations::ambiguous_observations,
-    answer_records::{AnswerRecord, AnswerRecorder, QuadIcon},
+    answer_records::{AnswerBasis, AnswerRecord, AnswerRecorder},
     cameras::CameraSample,
     decode::{ImageLimits, decode_frame},
     findings::{FindingSender, LandmarkFinding},
@@ -17,14 +17,14 @@ use super::{
     live::{LiveFrame, LiveHub},
     motion::{FrameStamp, MotionTracker, PriorPose},
     panics::Edge,
-    relocalise::{RelocalisationInput, RelocalisationUpdate, Relocalisers},
+    relocalise::{RelocalisationInput, RelocalisationUpdate, Relocalisers, hypothesis_wire},
     slots::{FrameOutcome, SlotKey, Slots},
     snapshot::{MapSnapshot, Snapshots},
 };
 use crate::frame_tap::{AnalysedFrame, FrameTap};
 use crate::vitals::Vitals;
-use map::{pose2::Pose2Covariance, relocalise::PoseHypothesis};
-use protos::{CheckedFrame, Code, Name, Rejection, convert::geometry::pose2_covariance_wire, v1};
+use map::pose2::Pose2Covariance;
+use protos::{CheckedFrame, Code, Name, Rejection, v1};
 use std::{cell::Cell, sync::Arc, thread::JoinHandle, time::Instant};
 use vision::{frame::GrayImage, model::LandmarkId, pipeline::FrameAnalysis};
 
@@ -122,8 +122,8 @@ impl Workers {
 /// A frame after its analysis.
 struct AnsweredFrame {
     answer: v1::Answer,
-    /// The icons of its quads, if it is to be stored.
-    icons: Option<Vec<QuadIcon>>,
+    /// What it rests on, if it is to be stored.
+    basis: Option<AnswerBasis>,
     map: Arc<MapSnapshot>,
     /// Its fixes and landmark checks; absent if the frame must not change the robot's pose or the map.
     evaluation: Option<FrameEvaluation>,
@@ -166,7 +166,7 @@ impl Engine {
         } else {
             self.analyse(key, job)
         };
-        let AnsweredFrame { answer, icons, map, evaluation, relocalised } = match done {
+        let AnsweredFrame { answer, basis, map, evaluation, relocalised } = match done {
             Ok(done) => done,
             Err(refusal) => {
                 let (answer, outcome) = refused(job, &refusal);
@@ -177,7 +177,7 @@ impl Engine {
         };
         let (frame, outcome) = (&job.frame, FrameOutcome::Processed);
         answered.set(Some(outcome));
-        self.reply(key, job, (answer, icons), publish);
+        self.reply(key, job, (answer, basis), publish);
         let Some(evaluation) = evaluation else { return outcome };
         let at = frame_stamp(frame, &map);
         if let Some(pose) = self.motion.apply_frame(&key.robot, &key.camera, at, &evaluation.fixes()) {
@@ -220,8 +220,8 @@ impl Engine {
         if let Some((answer, evaluation)) =
             self.expected_only(key, frame, (&image, &map), prior.as_ref(), &mut times)
         {
-            let icons = self.records.take(key, &answer, (&image, &map));
-            return Ok(AnsweredFrame { answer, icons, map, evaluation: Some(evaluation), relocalised: None });
+            let basis = self.records.take(key, &answer, (&image, &map), (&evaluation, frame));
+            return Ok(AnsweredFrame { answer, basis, map, evaluation: Some(evaluation), relocalised: None });
         }
         let analysis = analyse_checked(frame, &image, &map, &mut times);
         let mut answer = crate::frame_answer::answer(&analysis, &map);
@@ -238,7 +238,7 @@ impl Engine {
         if !counts {
             times.ended("localise");
             answer.timings = times.finish();
-            let icons = self.records.take(key, &answer, (&image, &map));
+            let basis = self.records.take(key, &answer, (&image, &map), (&evaluation, frame));
             if let Some(captured_ns) = job.stamp_instead_ns.filter(|_| on_own_map && is_live) {
                 let frame = CheckedFrame { captured_ns, ..frame.clone() };
                 let (quads, map_from_robot) = (analysis.quads, frame.prior);
@@ -250,7 +250,7 @@ impl Engine {
                     );
                 }
             }
-            return Ok(AnsweredFrame { answer, icons, map, evaluation: None, relocalised: None });
+            return Ok(AnsweredFrame { answer, basis, map, evaluation: None, relocalised: None });
         }
         if let Some(intrinsics) = &frame.intrinsics {
             let (landmarks, extrinsics) =
@@ -264,18 +264,18 @@ impl Engine {
         let has_pose = evaluation.checks.is_some() || evaluation.fix.is_ok();
         let update = self.relocalise(key, frame, (&image, &analysis), &map, has_pose);
         let relocalised = update.and_then(|update| {
-            answer.hypotheses = update.hypotheses.iter().map(hypothesis).collect();
+            answer.hypotheses = update.hypotheses.iter().map(hypothesis_wire).collect();
             update.pose
         });
         times.ended("localise");
         answer.timings = times.finish();
-        let icons = self.records.take(key, &answer, (&image, &map));
+        let basis = self.records.take(key, &answer, (&image, &map), (&evaluation, frame));
         if self.is_gathered(key, frame) {
             let map_from_robot = frame.prior.or(evaluation.prior);
             let analysed = AnalysedFrame { image, quads: analysis.quads, map: map.clone(), map_from_robot };
             self.frame_tap.offer(key, frame, analysed);
         }
-        Ok(AnsweredFrame { answer, icons, map, evaluation: Some(evaluation), relocalised })
+        Ok(AnsweredFrame { answer, basis, map, evaluation: Some(evaluation), relocalised })
     }
 
     /// Answers a frame by the expected landmarks alone, where the schedule asks for no search of the map. `None` where it asks
@@ -338,16 +338,16 @@ impl Engine {
 
     /// Publishes the answer to a frame that was not analysed.
     fn reply_refused(&self, key: &SlotKey, job: &FrameJob, answer: v1::Answer, publish: &dyn Publish) {
-        let icons = self.records.take_refused(key, &answer);
-        self.reply(key, job, (answer, icons), publish);
+        let basis = self.records.take_refused(key, &answer);
+        self.reply(key, job, (answer, basis), publish);
     }
 
-    /// Counts an answer, shows it on pages, has it stored if there are `icons`, and publishes it.
+    /// Counts an answer, shows it on pages, has it stored if there is a `basis`, and publishes it.
     fn reply(
         &self,
         key: &SlotKey,
         job: &FrameJob,
-        (mut answer, icons): (v1::Answer, Option<Vec<QuadIcon>>),
+        (mut answer, basis): (v1::Answer, Option<AnswerBasis>),
         publish: &dyn Publish,
     ) {
         let frame = &job.frame;
@@ -355,9 +355,9 @@ impl Engine {
         answer.clock_suspect = job.clock_suspect;
         answer.latency_ms = job.received.elapsed().as_secs_f64() * 1e3;
         let (answer, now) = (Arc::new(answer), Instant::now());
-        if let Some(icons) = icons {
+        if let Some(basis) = basis {
             self.kept_frames.keep_answered(key, &answer, frame);
-            self.records.send(AnswerRecord { key: key.clone(), answer: answer.clone(), icons });
+            self.records.send(AnswerRecord { key: key.clone(), answer: answer.clone(), basis });
         }
         if answer.rejection.is_none() {
             let (width_px, height_px, pixels) = (frame.width_px, frame.height_px, frame.pixels.clone());
@@ -369,11 +369,6 @@ impl Engine {
         // Last, so that who has the answer finds it counted.
         publish.answer(key, &answer);
     }
-}
-
-fn hypothesis(hypothesis: &PoseHypothesis) -> v1::Hypothesis {
-    let map_from_robot = Some(pose2_covariance_wire(&hypothesis.pose));
-    v1::Hypothesis { probability: hypothesis.mass, map_from_robot }
 }
 
 fn frame_stamp<'a>(frame: &CheckedFrame, map: &'a MapSnapshot) -> FrameStamp<'a> {

@@ -2,7 +2,7 @@
 //! landmark.
 
 use client::{
-    api::{AnswerStatus, DuplicateQuery, NewMap, NumberOrder, StoredAnswerQuery, ViewQuery},
+    api::{AnswerStatus, DuplicateQuery, NewMap, NumberOrder, PriorSource, StoredAnswerQuery, ViewQuery},
     v1::Verdict,
 };
 use server::config::Limits;
@@ -45,6 +45,9 @@ async fn an_answer_is_opened_again_with_what_it_rests_on() {
     assert!(opened.answer.map_from_robot.is_some() && opened.answer.quads[quad].pose.is_some());
     assert!(opened.quads[quad].icon.is_some(), "{:?}", opened.quads[quad]);
     assert!(opened.quads[quad].landmarks.iter().any(|l| l.landmark == "poster-0" && l.icon.is_some()));
+    let matched = opened.quads[quad].matched.as_ref().expect("matches");
+    let agreeing = matched.matches.iter().filter(|m| m.agrees).count();
+    assert!(matched.landmark == "poster-0" && agreeing >= 8 && matched.matches.len() <= 100, "{matched:?}");
     let quad_icon = maps.stored_quad_icon(summary.id, quad).await.expect("its icon");
     let landmark_icon = maps.landmark_icon(MAP, "poster-0").await.expect("the icon of the landmark");
     for icon in [&quad_icon, &landmark_icon] {
@@ -61,6 +64,16 @@ async fn an_answer_is_opened_again_with_what_it_rests_on() {
     });
     let refused = refused.await;
     assert_eq!((refused.status, refused.has_pose), (AnswerStatus::NoMatch, false), "{refused:?}");
+
+    // The robot has a pose by now: a later answer says how far that of the picture is from it.
+    let with_prior = eventually("an answer with a prior", async || {
+        robot.recognise("front", capture(&readings), SOON).await.expect("an answer");
+        let newest = maps.stored_answers(&about).await.expect("answers").items.into_iter().next()?;
+        maps.stored_answer(newest.id).await.expect("the answer").prior_check
+    });
+    let check = with_prior.await;
+    assert!(check.source == PriorSource::Server && !check.refused && check.seen.is_some(), "{check:?}");
+    assert!(check.distance2.is_some_and(|d2| d2 < check.limit), "{check:?}");
 
     let model = maps.landmark_model(MAP, "poster-0").await.expect("the model");
     assert!(model.in_use && model.correlation.threshold > 0.0 && !model.keypoints.is_empty(), "{model:?}");

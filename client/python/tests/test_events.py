@@ -98,6 +98,13 @@ def test_what_was_learnt_is_shown(server: Server, taught: str) -> None:
         assert isinstance(maps.duplicates(taught), tuple)
         views = maps.views(taught, landmark)
         assert maps.find_views(taught, landmark, sort="-number") == tuple(reversed(views))
+        with pytest.raises(Refused, match="unknown_view"):
+            maps.refused_view_icon(taught, landmark, 1 << 40)
+        again = maps.view_image(taught, landmark, views[0].id)
+        maps.upload_view(taught, landmark, again, views[0].corners)
+        refused = maps.refused_views(taught, landmark)[0]
+        assert (refused.by, refused.reason, refused.view) == ("upload", "duplicate", views[0].id)
+        assert maps.refused_view_icon(taught, landmark, refused.id).startswith(b"\x89PNG")
         mounting = Pose3.mounting(0.0, 0.0, pictures.CAMERA_HEIGHT_M)
         found = maps.localise(taught, Image.rgb(pictures.seen_from(pictures.front())), pictures.CAMERA, mounting)
         assert found.status == "located" and found.map_from_robot is not None, found

@@ -2,7 +2,7 @@
 
 use super::{form::Form, map_client::MapClient, operation::operations};
 use crate::ClientError;
-use protos::api::{CaptureMetadata, Page, Size, TrainingView, ViewQuery};
+use protos::api::{CaptureMetadata, Page, RefusedView, Size, TrainingView, ViewQuery};
 use serde_json::json;
 
 operations! {
@@ -11,6 +11,8 @@ operations! {
     DELETE: DELETE "/maps/{map}/landmarks/{landmark}/views/{view}" => delete_view,
     ICON: GET "/maps/{map}/landmarks/{landmark}/views/{view}/icon" => view_icon,
     IMAGE: GET "/maps/{map}/landmarks/{landmark}/views/{view}/image" => view_image,
+    REFUSED: GET "/maps/{map}/landmarks/{landmark}/refused-views" => refused_views,
+    REFUSED_ICON: GET "/maps/{map}/landmarks/{landmark}/refused-views/{refused}/icon" => refused_view_icon,
 }
 
 /// The part of an uploaded image that shows the landmark.
@@ -117,6 +119,21 @@ impl MapClient {
     /// The photograph of a view as it was uploaded, PNG or JPEG.
     pub async fn view_image(&self, map: &str, landmark: &str, view: i64) -> Result<Vec<u8>, ClientError> {
         self.bytes(self.ask(&IMAGE, &[&map, &landmark, &view])?).await
+    }
+
+    /// The photographs that uploads refused or the last lesson left out, newest first, at most 50, each with the reason.
+    pub async fn refused_views(&self, map: &str, landmark: &str) -> Result<Vec<RefusedView>, ClientError> {
+        self.all(&REFUSED, &[&map, &landmark]).await
+    }
+
+    /// A small picture of a refused photograph, PNG.
+    pub async fn refused_view_icon(
+        &self,
+        map: &str,
+        landmark: &str,
+        refused: i64,
+    ) -> Result<Vec<u8>, ClientError> {
+        self.bytes(self.ask(&REFUSED_ICON, &[&map, &landmark, &refused])?).await
     }
 
     /// The icon of a view, PNG.

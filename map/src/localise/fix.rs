@@ -102,7 +102,9 @@ pub enum FixRefusal {
     },
     /// Every solution is outside the gate of the prior.
     Prior {
-        /// Squared Mahalanobis distance of the nearest solution.
+        /// The nearest solution.
+        nearest: Pose2Covariance,
+        /// Its squared Mahalanobis distance.
         distance2: f64,
         /// Largest accepted value.
         limit: f64,

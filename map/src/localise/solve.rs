@@ -168,9 +168,10 @@ fn pass(problem: &Planar<'_>, from: &Minimum, to: &Minimum) -> (f64, f64) {
 fn by_prior(mut fixes: Vec<Fix>, prior: &Pose2Covariance, scale: f64, p: &LocaliseParams) -> FixResult {
     let distances: Vec<f64> =
         fixes.iter().map(|f| f.pose.distance2(prior).unwrap_or(f64::INFINITY)).collect();
-    let nearest = distances.iter().copied().fold(f64::INFINITY, f64::min);
-    if nearest > p.prior_gate {
-        return FixResult::Refused(FixRefusal::Prior { distance2: nearest, limit: p.prior_gate });
+    let nearest = (0..fixes.len()).min_by(|&a, &b| distances[a].total_cmp(&distances[b])).unwrap_or(0);
+    if distances[nearest] > p.prior_gate {
+        let (nearest, distance2) = (fixes[nearest].pose, distances[nearest]);
+        return FixResult::Refused(FixRefusal::Prior { nearest, distance2, limit: p.prior_gate });
     }
     if fixes.len() == 1 {
         return FixResult::Fixed(Box::new(fixes.swap_remove(0)));

@@ -184,7 +184,10 @@ fn an_ambiguity_is_resolved_by_the_prior_only() {
         // A prior elsewhere refuses both.
         let elsewhere = around(truth.plus(&Vector3::new(30.0, 0.0, 0.0)), 0.3, 0.05);
         let refused = fix_of(&seen, &place(), Some(&elsewhere));
-        assert!(matches!(refused, FixResult::Refused(FixRefusal::Prior { .. })), "{refused:?}");
+        let FixResult::Refused(FixRefusal::Prior { nearest, distance2, limit }) = refused else {
+            panic!("{refused:?}")
+        };
+        assert!(distance2 > limit && nearest.distance2(&elsewhere) == Some(distance2), "{nearest:?}");
     }
 }
 

@@ -1,6 +1,6 @@
 //! `/answers`: answers to frames that the server has stored.
 
-use crate::v1::Answer;
+use crate::v1::{Answer, Pose2Covariance};
 use serde::{Deserialize, Serialize};
 
 /// What came of a frame.
@@ -91,14 +91,71 @@ pub struct LandmarkIcon {
     pub icon: Option<String>,
 }
 
+/// A point of a quad that is like a point of a landmark.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct PointMatch {
+    /// Place in the quad's icon: (0, 0) is its top-left corner, (1, 1) its bottom-right one; a little outside is possible.
+    pub seen: [f64; 2],
+    /// Place in the landmark's icon, likewise.
+    pub taught: [f64; 2],
+    /// Whether it agrees with the others on where the landmark is.
+    pub agrees: bool,
+}
+
+/// The points of a quad that are like points of a landmark.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct QuadMatches {
+    /// The landmark that is named, else the nearest candidate, by its name at that time.
+    pub landmark: String,
+    /// At most 100, those that agree first.
+    pub matches: Vec<PointMatch>,
+}
+
+/// Whose pose a picture was compared with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+#[serde(rename_all = "snake_case")]
+pub enum PriorSource {
+    /// The robot sent it with its frame: a pose beyond the limit is refused.
+    Robot,
+    /// The server had it of earlier frames and odometry: it only chooses between two solutions of the picture.
+    Server,
+}
+
+/// The pose of the robot that was known without a picture, and the pose by the picture alone.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct PriorCheck {
+    /// Whose pose it is.
+    pub source: PriorSource,
+    /// The pose without the picture, map frame, with covariance.
+    #[cfg_attr(feature = "openapi", schema(value_type = Object))]
+    pub prior: Pose2Covariance,
+    /// The pose by the landmarks of the picture: of several solutions the nearest to the prior, also where it was refused;
+    /// null where the picture gives none.
+    #[cfg_attr(feature = "openapi", schema(value_type = Option<Object>))]
+    pub seen: Option<Pose2Covariance>,
+    /// Squared Mahalanobis distance of the two, under the sum of their covariances.
+    pub distance2: Option<f64>,
+    /// The largest distance that a robot's prior lets pass.
+    pub limit: f64,
+    /// The pose was refused for it: `refusal` is `gate_prior`.
+    pub refused: bool,
+}
+
 /// The pictures that belong to a quad of a stored answer.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct StoredQuad {
     /// Path of its icon; absent for quads that are too small, partly outside of the picture, or beyond the first eight.
     pub icon: Option<String>,
     /// The landmarks it was compared with, in the order of the answer's candidates.
     pub landmarks: Vec<LandmarkIcon>,
+    /// Its points that are like those of the best candidate; null without an icon, where that has no points, and for answers of
+    /// earlier builds.
+    pub matched: Option<QuadMatches>,
 }
 
 /// A stored answer with everything that was said.
@@ -112,4 +169,6 @@ pub struct StoredAnswer {
     pub answer: Answer,
     /// The pictures of its quads, in the order of `answer.quads`.
     pub quads: Vec<StoredQuad>,
+    /// The pose before the frame and that by the frame; null where none was known before, and for answers of earlier builds.
+    pub prior_check: Option<PriorCheck>,
 }

@@ -73,6 +73,39 @@ pub enum UploadOutcomeBody {
     NearDuplicate,
 }
 
+/// Who did not take a photograph.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+#[serde(rename_all = "snake_case")]
+pub enum RefusedBy {
+    /// The upload: it is not among the views.
+    Upload,
+    /// The last lesson: it is among the views.
+    Lesson,
+}
+
+/// A photograph that was not taken for a landmark, or not in its last lesson.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct RefusedView {
+    /// Its number, never used again.
+    pub id: i64,
+    /// ms since the Unix epoch.
+    pub refused_ms: i64,
+    /// Who did not take it.
+    pub by: RefusedBy,
+    /// A code: of the refusal of the upload, `duplicate`, `near_duplicate`, `beyond_limit` or `picture_unreadable`.
+    pub reason: String,
+    /// Why: one sentence for a person.
+    pub sentence: String,
+    /// What to do: one sentence for a person.
+    pub advice: String,
+    /// The view that it repeats, or that the lesson left out; null where that is gone.
+    pub view: Option<i64>,
+    /// Path of a small picture of it; null where it could not be decoded.
+    pub icon: Option<String>,
+}
+
 /// What came of placing a landmark by its views.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]

@@ -37,6 +37,7 @@ mod pose_by_hand;
 mod peer;
 mod pictures;
 mod recognise;
+mod refused_views;
 mod reference_runs;
 mod relocalisation;
 mod request_id;

@@ -6,8 +6,8 @@ use super::{
     events,
     examples::with_examples,
     gathering, guard, health, history, landmark_models, landmarks, learning, live, localise, mapping, maps,
-    modalities, page_session, pages, pose_by_hand, recognise, reference_runs, relocalisation, replay,
-    reused_answers, revision, robot_activity, robot_certificates, robots, ros2,
+    modalities, page_session, pages, pose_by_hand, recognise, reference_runs, refused_views, relocalisation,
+    replay, reused_answers, revision, robot_activity, robot_certificates, robots, ros2,
     security::with_security,
     stored_answers, tokens, underlay, views, visibility, visibility_settings, walls,
 };
@@ -53,6 +53,7 @@ fn api(limits: &Limits) -> OpenApiRouter<AppState> {
         .merge(bundles::router())
         .merge(landmark_models::router())
         .merge(views::router(limits.upload_bytes))
+        .merge(refused_views::router())
         .merge(learning::router())
         .merge(gathering::router())
         .merge(visibility::router())

@@ -9,7 +9,7 @@ use super::{
 };
 use crate::{
     identity::Principal,
-    store::stored_answers::{self, AnswerFilter, AnswerRow},
+    store::stored_answers::{self, AnswerFilter, AnswerRow, OpenedAnswer},
 };
 use axum::{Extension, Json, extract::State, response::Response};
 use engine::snapshot::MapSnapshot;
@@ -76,23 +76,25 @@ async fn list(
     Ok(Json(page(rows, limit, total, |row| row.id.to_string(), summary)))
 }
 
-/// One stored answer: quads, the candidates with their distances and thresholds, the gates that refused, both poses, and for
-/// each quad the paths of its icon and of those of the candidates.
+/// One stored answer: quads, the candidates with their distances and thresholds, the gates that refused, the poses, that before
+/// the frame, too, and for each quad the paths of its icon and of those of the candidates, and matched points.
 #[utoipa::path(get, path = "/answers/{answer}", tag = "recognition", params(("answer" = i64, Path)),
     responses((status = 200, body = StoredAnswer), (status = 404, body = Problem)))]
 async fn get(
     State(app): State<AppState>,
     PathParams(id): PathParams<i64>,
 ) -> Result<Json<StoredAnswer>, ApiError> {
-    let (row, answer, icons) = stored_answers::get(app.store.reads(), id).await?;
+    let OpenedAnswer { row, answer, mut icons, prior_check } =
+        stored_answers::get(app.store.reads(), id).await?;
     let snapshot = app.store.snapshots().get(&row.map);
     let learnt = snapshot.as_deref().map(learnt_names).unwrap_or_default();
     let of_quad = |(index, quad): (usize, &v1::QuadAnswer)| StoredQuad {
-        icon: icons.contains(&index).then(|| format!("{API}/answers/{id}/quads/{index}/icon")),
+        icon: icons.contains_key(&index).then(|| format!("{API}/answers/{id}/quads/{index}/icon")),
+        matched: icons.remove(&index).flatten(),
         landmarks: compared(quad).into_iter().map(|name| landmark_icon(&row.map, name, &learnt)).collect(),
     };
     let quads = answer.quads.iter().enumerate().map(of_quad).collect();
-    Ok(Json(StoredAnswer { summary: summary(row), answer, quads }))
+    Ok(Json(StoredAnswer { summary: summary(row), answer, quads, prior_check }))
 }
 
 /// Names of the landmarks whose icons can be shown.

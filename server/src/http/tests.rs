@@ -9,6 +9,7 @@ mod localise;
 mod openapi;
 mod page_sessions;
 mod revision;
+mod refused_views;
 mod stored_answers;
 mod teaching;
 

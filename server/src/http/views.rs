@@ -7,6 +7,7 @@ use super::{
     extract::{self, PathParams, QueryParams, number_cursor, page_limit},
     landmarks::checked_size,
     pictures::{FOREVER, IfNoneMatch, PictureHead, grey_answer},
+    refused_views::{self, Refused},
     upload::{FORM_OVERHEAD, Form},
 };
 use crate::store::{
@@ -14,6 +15,7 @@ use crate::store::{
     kind::Kind,
     landmark_placement::{PlacementReport, StoredCapture},
     landmarks, maps, pictures,
+    refused_views::{RefusedUpload, SmallPicture},
     teaching::{self, Teaching},
     views::{self, NewView, QuadCrop, UploadOutcome, ViewFilter, ViewRow},
 };
@@ -127,7 +129,17 @@ async fn add(
     let novelty = (!flag("keep_near_duplicate", form.optional("keep_near_duplicate").as_ref())?)
         .then(NoveltyParams::default);
     let max = app.config.limits.views;
-    let (new, detected) = app.clone().on_vision_thread(move |app| prepare(app, &image, &extent)).await??;
+    let changed = (map.clone(), landmark.clone());
+    let prepared = app.clone().on_vision_thread(move |app| prepare(app, &image, &extent)).await?;
+    let (new, detected) = match prepared {
+        Ok(prepared) => prepared,
+        Err(Refused { error, picture }) => {
+            if exists {
+                refused_views::keep_refused(&app, changed, &error, picture).await;
+            }
+            return Err(error);
+        }
+    };
     if let (Some(capture), Some(quad)) = (&mut capture, detected) {
         capture.set_detected_corners(&quad.covariance_px2);
     }
@@ -135,13 +147,24 @@ async fn add(
         capture.map(|c| serde_json::to_string(&c)).transpose().map_err(|e| ApiError::internal(&e))?;
     let create = creates.then_some(app.config.limits.landmarks);
     let view = NewView { capture, ..new };
-    let changed = (map.clone(), landmark.clone());
+    let seen = refused_views::of_icon(&view.crop.icon);
     let teaching = Teaching { map, landmark, view, max, novelty, size, create };
     let answer = created(added_shown, teaching::add(&app.store, teaching)).await?;
-    if answer.0 == StatusCode::CREATED {
-        tell_changed(&app, changed);
+    let (status, Json(view)) = &answer;
+    match view.outcome {
+        Some(UploadOutcomeBody::Duplicate) => repeated(&app, changed, "duplicate", (view.id, seen)).await,
+        Some(UploadOutcomeBody::NearDuplicate) => {
+            repeated(&app, changed, "near_duplicate", (view.id, seen)).await;
+        }
+        _ if *status == StatusCode::CREATED => tell_changed(&app, changed),
+        _ => {}
     }
     Ok(answer)
+}
+
+/// Keeps a photograph that repeats a view.
+async fn repeated(app: &App, at: (String, String), reason: &'static str, (view, seen): (i64, SmallPicture)) {
+    refused_views::keep(app, at, RefusedUpload { reason, view: Some(view), picture: Some(seen) }).await;
 }
 
 /// Tells readers of events that the views of a landmark are others: that makes no new version of the map.
@@ -208,21 +231,32 @@ fn prepare(
     app: &App,
     bytes: &Bytes,
     extent: &LandmarkRegion,
+) -> Result<(NewView, Option<WholeQuad>), Refused> {
+    let image = picture::decode(bytes, app.config.limits.upload()).map_err(ApiError::from)?;
+    let of_photograph = |error| Refused { error, picture: Some(Box::new(refused_views::small(&image))) };
+    view_of(app, bytes, &image, extent).map_err(of_photograph)
+}
+
+/// The view of a decoded photograph.
+fn view_of(
+    app: &App,
+    bytes: &Bytes,
+    image: &GrayImage,
+    extent: &LandmarkRegion,
 ) -> Result<(NewView, Option<WholeQuad>), ApiError> {
-    let image = picture::decode(bytes, app.config.limits.upload())?;
     let p = &app.config.params;
-    let quads = if matches!(extent, LandmarkRegion::Whole) { Vec::new() } else { whole_quads(&image, p) };
+    let quads = if matches!(extent, LandmarkRegion::Whole) { Vec::new() } else { whole_quads(image, p) };
     let corners: Vec<Corners> = quads.iter().map(|q| q.corners_px).collect();
     let corners_px = match extent {
         LandmarkRegion::Corners(corners) => *corners,
-        LandmarkRegion::Whole => whole(&image)?,
+        LandmarkRegion::Whole => whole(image)?,
         LandmarkRegion::Detect => found(&corners)?,
     };
     let meant = |q: &&WholeQuad| matches!(extent, LandmarkRegion::Detect) && q.corners_px == corners_px;
     let detected = quads.iter().find(meant).copied();
-    let icon = cut(&image, &corners_px, p)?;
+    let icon = cut(image, &corners_px, p)?;
     let distractor =
-        |corners: &Corners| Some(QuadCrop { corners_px: *corners, icon: icon_of(&image, corners, p).ok()? });
+        |corners: &Corners| Some(QuadCrop { corners_px: *corners, icon: icon_of(image, corners, p).ok()? });
     let view = NewView {
         image: bytes.to_vec(),
         image_sha256: pictures::digest(bytes),

@@ -134,6 +134,8 @@ pub(crate) const TABLE: &[Rule] = &[
     map("GET", "/maps/{map}/landmarks/{landmark}/views", Viewer),
     map("POST", "/maps/{map}/landmarks/{landmark}/views", Teacher),
     map("DELETE", "/maps/{map}/landmarks/{landmark}/views/{view}", Teacher),
+    map("GET", "/maps/{map}/landmarks/{landmark}/refused-views", Viewer),
+    map("GET", "/maps/{map}/landmarks/{landmark}/refused-views/{refused}/icon", Viewer),
     map("GET", "/maps/{map}/landmarks/{landmark}/views/{view}/icon", Viewer),
     map("GET", "/maps/{map}/landmarks/{landmark}/views/{view}/image", Viewer),
     map("POST", "/maps/{map}/landmarks/{landmark}/learn", Teacher),

@@ -25,6 +25,7 @@ use crate::{
         maps::{self, MapRow},
         models,
         pictures::Digest,
+        refused_views::LeftOut,
         views::{self, QuadCrop, TrainingViewRow},
     },
 };
@@ -171,9 +172,10 @@ fn targets(
 /// are fitted a second time where landmarks are refused: their icons are negatives of nobody.
 fn compute(m: &Material, reporter: &ProgressReporter) -> Result<Learnt, JobError> {
     let inputs = each_of(&m.targets, m.workers, reporter, (0.0, 0.3, "views"), |id| learning_input(m, *id))?;
+    let of_targets = || m.targets.iter().copied();
+    let left_out = of_targets().zip(&inputs).map(|(id, input)| (id, input.left_out.clone())).collect();
     let (views, points): (Vec<_>, Vec<_>) =
         inputs.into_iter().map(|input| (input.views, input.points)).unzip();
-    let of_targets = || m.targets.iter().copied();
     let views: BTreeMap<LandmarkId, Vec<TrainingView>> = of_targets().zip(views).collect();
     let points: BTreeMap<LandmarkId, Vec<Vec<TaughtPoint>>> = of_targets().zip(points).collect();
     let mut negatives = collect_negatives(m, &views, reporter)?;
@@ -195,7 +197,7 @@ fn compute(m: &Material, reporter: &ProgressReporter) -> Result<Learnt, JobError
         negatives.remove(&refused.keys().copied().collect());
         fitted = fit(m, &models, &negatives, reporter)?;
     }
-    Ok(Learnt { fitted, failed, refused })
+    Ok(Learnt { fitted, failed, refused, left_out })
 }
 
 /// Fits the thresholds of the models of the lesson, and those of all others, to the negatives.
@@ -258,11 +260,15 @@ struct LearningInput {
     views: Vec<TrainingView>,
     /// Points of its photographs, of at most [`MAX_POINT_VIEWS`] evenly chosen ones.
     points: Vec<Vec<TaughtPoint>>,
+    /// Photographs that are not in it, or only with their icons.
+    left_out: Vec<LeftOut>,
 }
 
 fn learning_input(m: &Material, id: LandmarkId) -> LearningInput {
     let stored = m.views.get(&id).map_or(&[][..], Vec::as_slice);
-    let stored = &stored[..stored.len().min(MAX_VIEWS)];
+    let (stored, beyond) = stored.split_at(stored.len().min(MAX_VIEWS));
+    let mut left_out: Vec<LeftOut> =
+        beyond.iter().map(|l| LeftOut { view: l.view, reason: "beyond_limit" }).collect();
     let mut views: Vec<TrainingView> = stored
         .iter()
         .map(|l| TrainingView {
@@ -288,7 +294,10 @@ fn learning_input(m: &Material, id: LandmarkId) -> LearningInput {
         if count == 0 && !gives_points {
             continue;
         }
-        let Some(image) = m.pictures.of(view) else { continue };
+        let Some(image) = m.pictures.of(view) else {
+            left_out.push(LeftOut { view: view.view, reason: "picture_unreadable" });
+            continue;
+        };
         if gives_points {
             points.push(view_points(&image, &view.crop.corners_px));
         }
@@ -296,7 +305,7 @@ fn learning_input(m: &Material, id: LandmarkId) -> LearningInput {
         let seed = view.view as u64;
         views.extend(synthesis::views(&image, &view.crop.corners_px, count, &m.params, seed));
     }
-    LearningInput { views, points }
+    LearningInput { views, points, left_out }
 }
 
 fn collect_negatives(

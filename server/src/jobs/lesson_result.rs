@@ -11,6 +11,7 @@ use crate::{
         maps::{self, MapRow},
         models::{self, NewModel},
         now_ms,
+        refused_views::{self, LeftOut},
     },
 };
 use serde_json::json;
@@ -33,6 +34,8 @@ pub(super) struct Learnt {
     pub(super) failed: Vec<(LandmarkId, String)>,
     /// Landmarks of the lesson that are refused, and the one in use that each looks like.
     pub(super) refused: BTreeMap<LandmarkId, LookAlike>,
+    /// For each landmark of the lesson, the photographs that it left out.
+    pub(super) left_out: BTreeMap<LandmarkId, Vec<LeftOut>>,
 }
 
 /// Stores models, thresholds and the end of the job. Errors: `Changed` where the job was cancelled meanwhile.
@@ -45,7 +48,7 @@ pub(super) async fn commit(
     started: Instant,
 ) -> Result<(), StoreError> {
     let name = |id: &LandmarkId| names.get(id).cloned().unwrap_or_default();
-    let Learnt { fitted, failed, refused } = learnt;
+    let Learnt { fitted, failed, refused, left_out } = learnt;
     let in_use = |m: &LandmarkModel| m.is_active() && !refused.contains_key(&m.id);
     let active = fitted.models.iter().filter(|m| in_use(m)).count();
     let inactive: Vec<_> = fitted.models.iter().filter(|m| !in_use(m)).map(|m| name(&m.id)).collect();
@@ -68,6 +71,7 @@ pub(super) async fn commit(
         "failed": failed,
         "points": fitted.models.iter().map(|m| m.points.len()).sum::<usize>(),
         "refitted": fitted.refitted.len(),
+        "left_out": left_out.values().map(Vec::len).sum::<usize>(),
         "generated_views": fitted.models.iter().map(|m| m.generated_views).sum::<usize>(),
         "seconds": started.elapsed().as_secs_f64(),
     });
@@ -85,6 +89,9 @@ pub(super) async fn commit(
             let map = maps::recheck(tx, map).await?;
             for row in &rows {
                 models::put(tx, map.id, row).await?;
+            }
+            for (landmark, views) in &left_out {
+                refused_views::replace_of_lesson(tx, landmark.0 as i64, views).await?;
             }
             maps::bump(tx, map.id).await?;
             // A job that was cancelled stores nothing.

@@ -41,6 +41,8 @@ const FILES: &[(&str, &str)] = files![
     "0032_visibility_areas",
     "0033_drafts",
     "0035_job_times",
+    "0036_answer_basis",
+    "0037_refused_views",
 ];
 
 /// The steps in order.

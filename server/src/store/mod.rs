@@ -33,6 +33,7 @@ pub(crate) mod visibility_areas;
 pub(crate) mod robot_certificates;
 pub(crate) mod robots;
 pub(crate) mod stored_answers;
+pub(crate) mod refused_views;
 pub(crate) mod tokens;
 pub(crate) mod jobs;
 pub(crate) mod kept_answers;

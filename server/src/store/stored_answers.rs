@@ -1,20 +1,33 @@
-//! Answers to frames as rows: what was said, and the icons of the quads. Only the newest stay.
+//! Answers to frames as rows: what was said, the icons of the quads with matched points, the pose before the frame. Only the
+//! newest stay.
 
 use super::{StoreError, Tx, kind::Kind, now_ms, statements::statements};
-use engine::answer_records::{AnswerRecord, named_landmarks, refusal_of};
-use protos::{json, prost::Message as _, v1};
+use engine::{
+    answer_records::{AnswerBasis, AnswerRecord, named_landmarks, refusal_of},
+    prior_check,
+};
+use protos::{
+    api::{PointMatch, PriorCheck, PriorSource, QuadMatches},
+    convert::geometry::pose2_covariance_wire,
+    json,
+    prost::Message as _,
+    v1,
+};
 use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
+use vision::points::shown_matches::ShownMatch;
 
 statements! {
     INSERT = "INSERT INTO stored_answers (map_id, robot, camera, stored_ms, status, has_pose, refusal, landmarks, candidates, \
-              answer) SELECT id, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10 FROM maps WHERE name = ?1 RETURNING id";
-    INSERT_ICON = "INSERT INTO stored_answer_icons (answer_id, quad, icon_side, icon) VALUES (?1, ?2, ?3, ?4)";
+              answer, prior_check) SELECT id, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11 FROM maps WHERE name = ?1 \
+              RETURNING id";
+    INSERT_ICON = "INSERT INTO stored_answer_icons (answer_id, quad, icon_side, icon, matched, matches) \
+                   VALUES (?1, ?2, ?3, ?4, ?5, ?6)";
     FORGET = "DELETE FROM stored_answers WHERE id <= (SELECT max(id) FROM stored_answers) - ?1";
     GET = "SELECT a.id, m.name AS map, a.robot, a.camera, a.stored_ms, a.status, a.has_pose, a.refusal, a.landmarks, \
-           a.candidates, a.answer FROM stored_answers a JOIN maps m ON m.id = a.map_id WHERE a.id = ?1";
+           a.candidates, a.answer, a.prior_check FROM stored_answers a JOIN maps m ON m.id = a.map_id WHERE a.id = ?1";
     MAP_OF = "SELECT m.name FROM stored_answers a JOIN maps m ON m.id = a.map_id WHERE a.id = ?1";
-    ICONS = "SELECT quad FROM stored_answer_icons WHERE answer_id = ?1 ORDER BY quad";
+    ICONS = "SELECT quad, matched, matches FROM stored_answer_icons WHERE answer_id = ?1 ORDER BY quad";
     ICON = "SELECT icon_side, icon FROM stored_answer_icons WHERE answer_id = ?1 AND quad = ?2";
     LIST = "SELECT a.id, m.name AS map, a.robot, a.camera, a.stored_ms, a.status, a.has_pose, a.refusal, a.landmarks, \
             a.candidates FROM stored_answers a JOIN maps m ON m.id = a.map_id WHERE a.id < ?9 \
@@ -96,10 +109,51 @@ fn answer_row(row: &SqliteRow) -> Result<AnswerRow, StoreError> {
     })
 }
 
+/// Places of matches are stored in parts of a side.
+const PARTS_OF_A_SIDE: f64 = 10_000.0;
+/// Bytes of a match: four numbers of 16 bits, and whether it agrees.
+const MATCH_BYTES: usize = 9;
+
+fn matches_bytes(matches: &[ShownMatch]) -> Vec<u8> {
+    // Saturates: places far outside of an icon are not drawn.
+    let part = |at: f32| ((f64::from(at) * PARTS_OF_A_SIDE).round() as i16).to_le_bytes();
+    let bytes = |m: &ShownMatch| {
+        let places = [m.seen, m.taught].into_iter().flatten().flat_map(part);
+        places.chain([u8::from(m.agrees)]).collect::<Vec<u8>>()
+    };
+    matches.iter().flat_map(bytes).collect()
+}
+
+fn matches_of(bytes: &[u8]) -> Vec<PointMatch> {
+    let of = |bytes: &[u8; MATCH_BYTES]| {
+        let parts = bytes.as_chunks::<2>().0;
+        let at = |i: usize| f64::from(i16::from_le_bytes(parts[i])) / PARTS_OF_A_SIDE;
+        let agrees = bytes[MATCH_BYTES - 1] != 0;
+        PointMatch { seen: [at(0), at(1)], taught: [at(2), at(3)], agrees }
+    };
+    bytes.as_chunks::<MATCH_BYTES>().0.iter().map(of).collect()
+}
+
+fn prior_check_text(check: &prior_check::PriorCheck) -> String {
+    let source = match check.source {
+        prior_check::PriorSource::Robot => PriorSource::Robot,
+        prior_check::PriorSource::Server => PriorSource::Server,
+    };
+    let shown = PriorCheck {
+        source,
+        prior: pose2_covariance_wire(&check.prior),
+        seen: check.seen.as_ref().map(pose2_covariance_wire),
+        distance2: check.distance2,
+        limit: check.limit,
+        refused: check.is_refused,
+    };
+    serde_json::to_string(&shown).unwrap_or_default()
+}
+
 /// Stores answers with their icons, and deletes the oldest beyond `max`. Those of maps that are gone are left out.
 pub(crate) async fn add(tx: &mut Tx, records: &[AnswerRecord], max: usize) -> Result<(), StoreError> {
     let at = || StoreError::during("store answer");
-    for AnswerRecord { key, answer, icons } in records {
+    for AnswerRecord { key, answer, basis: AnswerBasis { icons, prior_check } } in records {
         let message = answer.encode_to_vec();
         if message.len() > MAX_ANSWER_BYTES {
             continue;
@@ -119,15 +173,19 @@ pub(crate) async fn add(tx: &mut Tx, records: &[AnswerRecord], max: usize) -> Re
             .bind(serde_json::json!(named).to_string())
             .bind(serde_json::json!(others).to_string())
             .bind(&message)
+            .bind(prior_check.as_ref().map(prior_check_text))
             .fetch_optional(&mut tx.conn)
             .await;
         let Some(id) = row.map_err(at())? else { continue };
         for icon in icons {
+            let matched = icon.matched.as_ref();
             let stored = sqlx::query(INSERT_ICON)
                 .bind(id)
                 .bind(icon.quad as i64)
                 .bind(icon.size as i64)
                 .bind(&icon.pixels)
+                .bind(matched.map(|matched| matched.landmark.as_str()))
+                .bind(matched.map(|matched| matches_bytes(&matched.matches)))
                 .execute(&mut tx.conn)
                 .await;
             stored.map_err(at())?;
@@ -154,18 +212,40 @@ pub(crate) async fn about(
     rows.iter().map(answer).collect()
 }
 
-/// One answer, and the indices of the quads whose icons are stored.
-pub(crate) async fn get(
-    db: &sqlx::SqlitePool,
-    id: i64,
-) -> Result<(AnswerRow, v1::Answer, BTreeSet<usize>), StoreError> {
+/// An answer with what it rests on.
+#[derive(Debug)]
+pub(crate) struct OpenedAnswer {
+    pub(crate) row: AnswerRow,
+    pub(crate) answer: v1::Answer,
+    /// By the indices of the quads whose icons are stored: their matches, if they have any.
+    pub(crate) icons: BTreeMap<usize, Option<QuadMatches>>,
+    pub(crate) prior_check: Option<PriorCheck>,
+}
+
+/// The matches that are stored with an icon.
+fn matches_in(row: &SqliteRow) -> Result<(usize, Option<QuadMatches>), sqlx::Error> {
+    let quad: i64 = row.try_get("quad")?;
+    let landmark: Option<String> = row.try_get("matched")?;
+    let bytes: Option<Vec<u8>> = row.try_get("matches")?;
+    let matched = landmark.map(|landmark| QuadMatches {
+        landmark,
+        matches: bytes.as_deref().map(matches_of).unwrap_or_default(),
+    });
+    Ok((quad as usize, matched))
+}
+
+/// One answer with what is stored of it.
+pub(crate) async fn get(db: &sqlx::SqlitePool, id: i64) -> Result<OpenedAnswer, StoreError> {
     let at = || StoreError::during("read answer");
     let row = sqlx::query(GET).bind(id).fetch_optional(db).await.map_err(at())?;
     let row = row.ok_or_else(|| unknown(id))?;
     let message: &[u8] = row.try_get("answer").map_err(at())?;
     let answer = v1::Answer::decode(message).map_err(|e| damaged(e.to_string()))?;
-    let icons = sqlx::query_scalar::<_, i64>(ICONS).bind(id).fetch_all(db).await.map_err(at())?;
-    Ok((answer_row(&row)?, answer, icons.into_iter().map(|quad| quad as usize).collect()))
+    let check: Option<&str> = row.try_get("prior_check").map_err(at())?;
+    let prior_check = check.map(serde_json::from_str).transpose().map_err(|e| damaged(e.to_string()))?;
+    let icons = sqlx::query(ICONS).bind(id).fetch_all(db).await.map_err(at())?;
+    let icons = icons.iter().map(matches_in).collect::<Result<_, _>>().map_err(at())?;
+    Ok(OpenedAnswer { row: answer_row(&row)?, answer, icons, prior_check })
 }
 
 /// The map of an answer.

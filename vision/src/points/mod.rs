@@ -15,5 +15,6 @@ pub mod taught;
 pub mod index;
 pub mod verify;
 pub mod search;
+pub mod shown_matches;
 #[cfg(test)]
 pub(crate) mod tests;

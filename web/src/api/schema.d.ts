@@ -32,8 +32,8 @@ export interface paths {
             cookie?: never;
         };
         /**
-         * One stored answer: quads, the candidates with their distances and thresholds, the gates that refused, both poses, and for
-         *     each quad the paths of its icon and of those of the candidates.
+         * One stored answer: quads, the candidates with their distances and thresholds, the gates that refused, the poses, that before
+         *     the frame, too, and for each quad the paths of its icon and of those of the candidates, and matched points.
          */
         get: operations["get"];
         put?: never;
@@ -849,6 +849,43 @@ export interface paths {
         };
         /** What was learnt of a landmark: thresholds with their error rates, keypoints, points, saliency, sizes. */
         get: operations["model"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/maps/{map}/landmarks/{landmark}/refused-views": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Lists the photographs of a landmark that uploads refused or its last lesson left out, newest first, each with the reason
+         *     and what to do. The newest 50 stay.
+         */
+        get: operations["list"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/maps/{map}/landmarks/{landmark}/refused-views/{refused}/icon": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** A small picture of a refused photograph, PNG. `ETag` is the digest of its grey levels. */
+        get: operations["icon"];
         put?: never;
         post?: never;
         delete?: never;
@@ -3837,6 +3874,44 @@ export interface components {
             total?: number;
         };
         /** @description A page of a list. */
+        Page_RefusedView: {
+            /** @description The items, in order. */
+            items: {
+                /** @description What to do: one sentence for a person. */
+                advice: string;
+                /** @description Who did not take it. */
+                by: components["schemas"]["RefusedBy"];
+                /** @description Path of a small picture of it; null where it could not be decoded. */
+                icon?: string | null;
+                /**
+                 * Format: int64
+                 * @description Its number, never used again.
+                 */
+                id: number;
+                /** @description A code: of the refusal of the upload, `duplicate`, `near_duplicate`, `beyond_limit` or `picture_unreadable`. */
+                reason: string;
+                /**
+                 * Format: int64
+                 * @description ms since the Unix epoch.
+                 */
+                refused_ms: number;
+                /** @description Why: one sentence for a person. */
+                sentence: string;
+                /**
+                 * Format: int64
+                 * @description The view that it repeats, or that the lesson left out; null where that is gone.
+                 */
+                view?: number | null;
+            }[];
+            /** @description Give this as `cursor` for the next page; null on the last. */
+            next?: string | null;
+            /**
+             * Format: int64
+             * @description Items of all pages together.
+             */
+            total?: number;
+        };
+        /** @description A page of a list. */
         Page_Robot: {
             /** @description The items, in order. */
             items: {
@@ -4132,6 +4207,15 @@ export interface components {
             /** @description Views with a robot pose that the place rests on. */
             views_used: number;
         };
+        /** @description A point of a quad that is like a point of a landmark. */
+        PointMatch: {
+            /** @description Whether it agrees with the others on where the landmark is. */
+            agrees: boolean;
+            /** @description Place in the quad's icon: (0, 0) is its top-left corner, (1, 1) its bottom-right one; a little outside is possible. */
+            seen: number[];
+            /** @description Place in the landmark's icon, likewise. */
+            taught: number[];
+        };
         /** @description A pose in the map. */
         PoseBody: {
             /** @description Over (x, y, theta), row-major; absent for a pose that is exactly known. */
@@ -4211,6 +4295,35 @@ export interface components {
          * @enum {string}
          */
         PoseTrust: "unspecified" | "unsupported" | "supported" | "stale" | "contradicted";
+        /** @description The pose of the robot that was known without a picture, and the pose by the picture alone. */
+        PriorCheck: {
+            /**
+             * Format: double
+             * @description Squared Mahalanobis distance of the two, under the sum of their covariances.
+             */
+            distance2?: number | null;
+            /**
+             * Format: double
+             * @description The largest distance that a robot's prior lets pass.
+             */
+            limit: number;
+            /** @description The pose without the picture, map frame, with covariance. */
+            prior: Record<string, never>;
+            /** @description The pose was refused for it: `refusal` is `gate_prior`. */
+            refused: boolean;
+            /**
+             * @description The pose by the landmarks of the picture: of several solutions the nearest to the prior, also where it was refused;
+             *     null where the picture gives none.
+             */
+            seen?: Record<string, never> | null;
+            /** @description Whose pose it is. */
+            source: components["schemas"]["PriorSource"];
+        };
+        /**
+         * @description Whose pose a picture was compared with.
+         * @enum {string}
+         */
+        PriorSource: "robot" | "server";
         /** @description An error as sent. */
         Problem: {
             /** @description Stable name of the error, for programs. */
@@ -4230,6 +4343,13 @@ export interface components {
             type: string;
         } & {
             [key: string]: unknown;
+        };
+        /** @description The points of a quad that are like points of a landmark. */
+        QuadMatches: {
+            /** @description The landmark that is named, else the nearest candidate, by its name at that time. */
+            landmark: string;
+            /** @description At most 100, those that agree first. */
+            matches: components["schemas"]["PointMatch"][];
         };
         /** @description How far the server can do its work. */
         Readiness: {
@@ -4339,6 +4459,11 @@ export interface components {
              */
             sigma_rad?: number | null;
         };
+        /**
+         * @description Who did not take a photograph.
+         * @enum {string}
+         */
+        RefusedBy: "upload" | "lesson";
         /** @description A refused frame of a robot. */
         RefusedFrame: {
             /**
@@ -4352,6 +4477,34 @@ export interface components {
             detail: string;
             /** @description The field at fault. */
             field: string;
+        };
+        /** @description A photograph that was not taken for a landmark, or not in its last lesson. */
+        RefusedView: {
+            /** @description What to do: one sentence for a person. */
+            advice: string;
+            /** @description Who did not take it. */
+            by: components["schemas"]["RefusedBy"];
+            /** @description Path of a small picture of it; null where it could not be decoded. */
+            icon?: string | null;
+            /**
+             * Format: int64
+             * @description Its number, never used again.
+             */
+            id: number;
+            /** @description A code: of the refusal of the upload, `duplicate`, `near_duplicate`, `beyond_limit` or `picture_unreadable`. */
+            reason: string;
+            /**
+             * Format: int64
+             * @description ms since the Unix epoch.
+             */
+            refused_ms: number;
+            /** @description Why: one sentence for a person. */
+            sentence: string;
+            /**
+             * Format: int64
+             * @description The view that it repeats, or that the lesson left out; null where that is gone.
+             */
+            view?: number | null;
         };
         /** @description How far a robot's relocalisation has come. */
         RelocalisationStatus: {
@@ -4731,6 +4884,7 @@ export interface components {
         StoredAnswer: {
             /** @description `Answer` of protos/waymark/v1/waymark.proto as JSON: quads with candidates, distances and thresholds, poses. */
             answer: Record<string, never>;
+            prior_check?: components["schemas"]["PriorCheck"] | null;
             /** @description The pictures of its quads, in the order of `answer.quads`. */
             quads: components["schemas"]["StoredQuad"][];
             /** @description In brief. */
@@ -4774,6 +4928,7 @@ export interface components {
             icon?: string | null;
             /** @description The landmarks it was compared with, in the order of the answer's candidates. */
             landmarks: components["schemas"]["LandmarkIcon"][];
+            matched?: components["schemas"]["QuadMatches"] | null;
         };
         /** @description A threshold with its evidence. A distance is accepted only when it is strictly below. */
         ThresholdBody: {
@@ -11485,6 +11640,166 @@ export interface operations {
                 };
             };
             /** @description unknown_map, unknown_landmark, not_learnt, not_found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description timeout; `may_be_done: true` if it is a change that had begun */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description internal; not_published, with `may_be_done: true` */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description busy, storage_failed */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    list: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                map: string;
+                landmark: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Page_RefusedView"];
+                };
+            };
+            /** @description unauthenticated: the role viewer is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description host_not_allowed, origin_not_allowed; forbidden: less than the role viewer; page_header_missing */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description not_found */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description timeout; `may_be_done: true` if it is a change that had begun */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description internal; not_published, with `may_be_done: true` */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description busy, storage_failed */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    icon: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                map: string;
+                landmark: string;
+                refused: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "image/png": unknown;
+                };
+            };
+            /** @description `If-None-Match` has it */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description unauthenticated: the role viewer is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description host_not_allowed, origin_not_allowed; forbidden: less than the role viewer; page_header_missing */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description not_found */
             404: {
                 headers: {
                     [name: string]: unknown;

@@ -8,6 +8,8 @@ import type { Point } from "./geometry";
 const TRAIL_POINTS = 600;
 /** A step of a trail, m: nearer points are left out. */
 const TRAIL_STEP_M = 0.05;
+/** Robots are drawn anew at most so often, ms: fifty of them send hundreds of poses a second. */
+const DRAWN_EVERY_MS = 100;
 /** A pose that is older is no pose, ms. */
 export const STALE_MS = 2000;
 
@@ -62,6 +64,8 @@ export class LiveMap {
   #stream: Stream;
   #heard = new Map<string, LiveRobot>();
   #pending = false;
+  #told_ms = 0;
+  #timer: ReturnType<typeof setTimeout> | undefined;
 
   constructor(map: string, changed: () => void) {
     this.#stream = new Stream(address(path`/maps/${map}/live`), {
@@ -87,6 +91,7 @@ export class LiveMap {
   }
 
   close(): void {
+    clearTimeout(this.#timer);
     this.#stream.close();
   }
 
@@ -132,14 +137,16 @@ export class LiveMap {
     if (extend(this.#of(robot)[track], pose)) this.#tell();
   }
 
-  /** Tells readers at most once for each picture that the browser draws. */
+  /** Tells readers of all that came meanwhile, at most once in `DRAWN_EVERY_MS`, just before the browser draws. */
   #tell(): void {
     if (this.#pending) return;
     this.#pending = true;
-    requestAnimationFrame(() => {
-      this.#pending = false;
+    const tell = () => {
+      [this.#pending, this.#told_ms] = [false, performance.now()];
       this.robots = new Map([...this.#heard].map(([name, robot]) => [name, { ...robot }]));
-    });
+    };
+    const wait_ms = Math.max(0, this.#told_ms + DRAWN_EVERY_MS - performance.now());
+    this.#timer = setTimeout(() => requestAnimationFrame(tell), wait_ms);
   }
 }
 

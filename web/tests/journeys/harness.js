@@ -6,7 +6,7 @@ import { mkdirSync, readFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import { chromium } from "playwright-core";
 
-const PROGRAM = process.env.WAYMARK_PROGRAM ?? new URL("../../../target/debug/waymark", import.meta.url).pathname;
+export const PROGRAM = process.env.WAYMARK_PROGRAM ?? new URL("../../../target/debug/waymark", import.meta.url).pathname;
 const CHROMIUM = process.env.CHROMIUM ?? "/usr/bin/chromium";
 const OUTPUT = new URL("../output/", import.meta.url).pathname;
 const AXE = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
@@ -20,20 +20,42 @@ export const PHONE = { width: 390, height: 844 };
 
 /** Starts `waymark demo --stay`: a corridor whose posters are taught, and robots that drive. */
 export async function demo() {
-  const child = spawn(PROGRAM, ["demo", "--stay", "--legs", "40", "--robots", "2", "--rate-hz", "1", "--http", "127.0.0.1:0"], {
-    stdio: ["ignore", "pipe", "pipe"],
-  });
+  const { found, stop } = await started(["demo", "--stay", "--legs", "40", "--robots", "2", "--rate-hz", "1", "--http", "127.0.0.1:0"], /https?:\/\/[^\s/]+\/open\?code=\S+/);
+  return { link: found[0], origin: new URL(found[0]).origin, stop };
+}
+
+/** Starts `waymark serve`. It prints no link where no person reads: its token gives one. */
+export async function serve(...args) {
+  const { found, stop } = await started(["serve", "--http", "127.0.0.1:0", ...args], /pages\s+\S+:(\d+)\/\s+robots\s+(\S+)\s+token\s+(\S+)\n/);
+  const [, port, robots, file] = found;
+  // With encryption, too, plain text is served to this machine.
+  const origin = `http://127.0.0.1:${port}`;
+  const headers = { authorization: `Bearer ${readFileSync(file, "utf8").trim()}` };
+  const answer = await fetch(`${origin}/api/v1/session/links`, { method: "POST", headers });
+  assert.ok(answer.ok, `a link: ${answer.status} ${await answer.clone().text()}`);
+  return { link: `${origin}${(await answer.json()).path}`, origin, robots, stop };
+}
+
+/** Starts the program, and waits until it says this. */
+async function started(args, says) {
+  // The server takes variables of this prefix for its settings.
+  const env = Object.fromEntries(Object.entries(process.env).filter(([name]) => !name.startsWith("WAYMARK_")));
+  const child = spawn(PROGRAM, args, { stdio: ["ignore", "pipe", "pipe"], env });
   let said = "";
-  const link = await new Promise((found, failed) => {
+  const found = await new Promise((done, failed) => {
     const hear = (text) => {
+      // What is said afterwards is read and dropped: a full pipe would stop the server.
+      if (said === undefined) return;
       said += text;
-      const match = /http:\/\/[^\s/]+\/open\?code=\S+/.exec(said);
-      if (match) found(match[0]);
+      const match = says.exec(said);
+      if (!match) return;
+      done(match);
+      said = undefined;
     };
     child.stdout.setEncoding("utf8").on("data", hear);
     child.stderr.setEncoding("utf8").on("data", hear);
     child.on("exit", (code) => failed(new Error(`the server has ended with ${code}: ${said}`)));
-    setTimeout(() => failed(new Error(`no link of the page within 5 min: ${said}`)), 300_000).unref();
+    setTimeout(() => failed(new Error(`it did not say ${says} within 5 min: ${said}`)), 300_000).unref();
   });
   const stop = () => new Promise((ended) => {
     child.removeAllListeners("exit");
@@ -41,18 +63,40 @@ export async function demo() {
     child.kill("SIGINT");
     setTimeout(() => child.kill("SIGKILL"), 20_000).unref();
   });
-  return { link, origin: new URL(link).origin, stop };
+  return { found, stop };
 }
 
 /** A browser that is signed in by a link. */
 export async function browser({ link, origin }) {
   const args = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync"];
-  const started = await chromium.launch({ executablePath: CHROMIUM, args });
-  const context = await started.newContext({ viewport: DESKTOP, baseURL: origin });
+  const launched = await chromium.launch({ executablePath: CHROMIUM, args });
+  const context = await launched.newContext({ viewport: DESKTOP, baseURL: origin, ignoreHTTPSErrors: true });
   const first = await context.newPage();
   await first.goto(link);
   await first.close();
-  return { context, close: () => started.close() };
+  return { context, close: () => launched.close() };
+}
+
+/** Asks the API as the page does, with the session of the browser. */
+export const asker = ({ context }, { origin }) => async (method, path, body, headers = {}) => {
+  const answer = await context.request.fetch(`${origin}/api/v1${path}`, {
+    method,
+    headers: { "x-waymark-page": "1", ...headers },
+    ...(body && { data: body }),
+  });
+  assert.ok(answer.ok(), `${method} ${path}: ${answer.status()} ${await answer.text()}`);
+  return answer.status() === 204 ? undefined : answer.json();
+};
+
+/** Asks again until there is an answer. */
+export async function eventually(what, ask) {
+  const until = Date.now() + SOON;
+  for (;;) {
+    const found = await ask();
+    if (found) return found;
+    assert.ok(Date.now() < until, `there is no ${what} within ${SOON / 1000} s`);
+    await new Promise((later) => setTimeout(later, 500));
+  }
 }
 
 /** Opens an address, and collects what may not happen. */

@@ -2,12 +2,13 @@
 import assert from "node:assert/strict";
 import { readFile } from "node:fs/promises";
 import { after, afterEach, before, test } from "node:test";
-import { PHONE, browser, check, demo, open } from "./harness.js";
+import { PHONE, asker, browser, check, demo, open } from "./harness.js";
 
-let server, its;
+let server, its, api;
 before(async () => {
   server = await demo();
   its = await browser(server);
+  api = asker(its, server);
 });
 after(async () => {
   await its?.close();
@@ -20,15 +21,6 @@ afterEach(() => Promise.all(its.context.pages().map((page) => page.close())));
 const go = (address, size) => open(its.context, server.origin, address, size);
 /** The name of the demo's map. */
 const MAP = "corridor";
-const api = async (method, path, body, headers = {}) => {
-  const answer = await its.context.request.fetch(`${server.origin}/api/v1${path}`, {
-    method,
-    headers: { "x-waymark-page": "1", ...headers },
-    ...(body && { data: body }),
-  });
-  assert.ok(answer.ok(), `${method} ${path}: ${answer.status()} ${await answer.text()}`);
-  return answer.status() === 204 ? undefined : answer.json();
-};
 
 test("maps are made, renamed, copied and deleted", async () => {
   const page = await go("/");

@@ -6,7 +6,8 @@ import type { Landmark } from "../../src/api/types";
 import { ago, bytes, count, degrees } from "../../src/words/amounts";
 import { operation } from "../../src/words/changes";
 import { summaryText } from "../../src/words/difference";
-import { gateText } from "../../src/words/gates";
+import { gateText, poseGateText } from "../../src/words/gates";
+import { priorText } from "../../src/words/prior";
 import { type LiveQuad, named, quadKind, quadText } from "../../src/words/quads";
 import { stateOf } from "../../src/words/states";
 import { area, proposals } from "../../src/pages/teach/photograph";
@@ -25,6 +26,21 @@ test("every gate of the wire has words", () => {
   const gates = listed.replace(/\/\/|\([^)]*\)/gs, " ").split(",").map((gate) => gate.trim()).filter(Boolean);
   expect(gates.length).toBeGreaterThan(8);
   for (const gate of gates) expect(gateText(gate), gate).toMatch(/ /);
+});
+
+test("every reason for no position has words", () => {
+  const fixes = readFileSync("../engine/src/fixes.rs", "utf8");
+  const codes = [...fixes.matchAll(/=> "([a-z_]+)"/g)].map((found) => found[1] ?? "");
+  expect(codes.length).toBeGreaterThan(8);
+  for (const code of codes) expect(poseGateText(code), code).not.toBe(code.replaceAll("_", " "));
+});
+
+test("the gate of the known position is told with its number and limit", () => {
+  const check = { prior: {}, seen: {}, distance2: 20.25, limit: 11.34, source: "robot" as const, refused: true };
+  expect(priorText(check)).toBe("Refused: the position by the picture lies 4.5 standard deviations (squared Mahalanobis distance 20.3) from the one that the robot sent; at most 3.4 (11.3) is let pass.");
+  expect(priorText({ ...check, distance2: 1, refused: false })).toMatch(/^Let pass: .* 1\.0 standard deviations/);
+  expect(priorText({ ...check, distance2: 1, refused: false, source: "server" })).toMatch(/refuses nothing.* within 3\.4 \(11\.3\)\.$/);
+  expect(priorText({ ...check, distance2: null })).toMatch(/gave no position/);
 });
 
 const landmark = (fields: Partial<Landmark>): Landmark => ({

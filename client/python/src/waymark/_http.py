@@ -141,6 +141,8 @@ OPERATIONS: dict[str, tuple[str, str]] = {
     "views": ("GET", "/maps/{map}/landmarks/{landmark}/views"),
     "delete_view": ("DELETE", "/maps/{map}/landmarks/{landmark}/views/{view}"),
     "view_icon": ("GET", "/maps/{map}/landmarks/{landmark}/views/{view}/icon"),
+    "refused_views": ("GET", "/maps/{map}/landmarks/{landmark}/refused-views"),
+    "refused_view_icon": ("GET", "/maps/{map}/landmarks/{landmark}/refused-views/{refused}/icon"),
     "make_backup": ("POST", "/backups"),
     "backups": ("GET", "/backups"),
     "backup": ("GET", "/backups/{backup}"),

@@ -3,11 +3,33 @@
 use super::{teaching::blocks, *};
 use crate::store::stored_answers;
 use engine::{
-    answer_records::{AnswerRecord, QuadIcon},
+    answer_records::{AnswerBasis, AnswerRecord, MAX_MATCHES, QuadIcon, QuadMatches},
+    prior_check::{PriorCheck, PriorSource},
     slots::SlotKey,
 };
+use map::pose2::{Pose2, Pose2Covariance};
+use nalgebra::Matrix3;
 use protos::{Name, v1};
 use serde_json::json;
+use vision::points::shown_matches::ShownMatch;
+
+/// A pose 2 m from the prior, which refuses it, and as many matches as are stored.
+fn basis() -> AnswerBasis {
+    let pose = |x_m| Pose2Covariance::new(Pose2::new(x_m, 1.0, 0.5), Matrix3::identity() * 0.1).unwrap();
+    let prior_check = PriorCheck {
+        source: PriorSource::Robot,
+        prior: pose(0.0),
+        seen: Some(pose(2.0)),
+        distance2: pose(2.0).distance2(&pose(0.0)),
+        limit: 11.3,
+        is_refused: true,
+    };
+    let one = ShownMatch { seen: [0.25, -0.1], taught: [0.3333, 1.05], agrees: true };
+    let matches = vec![one; MAX_MATCHES];
+    let matched = Some(QuadMatches { landmark: "sign".into(), matches });
+    let icon = QuadIcon { quad: 0, size: 2, pixels: vec![0, 80, 160, 240], matched };
+    AnswerBasis { icons: vec![icon], prior_check: Some(prior_check) }
+}
 
 impl Service {
     /// Stores an answer with a quad that was compared with `sign`.
@@ -28,8 +50,7 @@ impl Service {
             ..v1::Answer::default()
         };
         let key = SlotKey { robot: Name::new(robot).unwrap(), camera: Name::new("front").unwrap() };
-        let icons = vec![QuadIcon { quad: 0, size: 2, pixels: vec![0, 80, 160, 240] }];
-        let record = AnswerRecord { key, answer: Arc::new(answer), icons };
+        let record = AnswerRecord { key, answer: Arc::new(answer), basis: basis() };
         let stored = self.store.write(|tx| {
             Box::pin(async move { stored_answers::add(tx, std::slice::from_ref(&record), 3).await })
         });
@@ -59,6 +80,18 @@ async fn a_stored_answer_is_opened_again_with_its_pictures() {
     assert_eq!((&summary["candidates"], &summary["landmarks"]), (&json!(["sign"]), &json!([])));
     assert_eq!(found["answer"]["quads"][0]["candidates"][0]["threshold"], 0.4);
     assert_eq!(found["quads"][1]["icon"], Value::Null);
+    assert_eq!(found["quads"][1]["matched"], Value::Null);
+    let matched = &found["quads"][0]["matched"];
+    assert_eq!(
+        (&matched["landmark"], matched["matches"].as_array().unwrap().len()),
+        (&json!("sign"), MAX_MATCHES)
+    );
+    let first = json!({ "seen": [0.25, -0.1], "taught": [0.3333, 1.05], "agrees": true });
+    assert_eq!(matched["matches"][0], first);
+    let check = &found["prior_check"];
+    assert_eq!((&check["source"], &check["refused"]), (&json!("robot"), &json!(true)));
+    assert_eq!((&check["prior"]["pose"]["x_m"], &check["seen"]["pose"]["x_m"]), (&json!(0.0), &json!(2.0)));
+    assert!((check["distance2"].as_f64().unwrap() - 20.0).abs() < 1e-9 && check["limit"] == 11.3, "{check}");
     let paths = [
         found["quads"][0]["icon"].as_str().unwrap(),
         found["quads"][0]["landmarks"][0]["icon"].as_str().unwrap(),
@@ -86,6 +119,28 @@ async fn a_stored_answer_is_opened_again_with_its_pictures() {
     for path in ["/api/v1/answers/2", "/api/v1/answers/1/quads/1/icon"] {
         assert_eq!(service.get(path).await.1["code"], "unknown_answer", "{path}");
     }
+}
+
+#[tokio::test]
+async fn an_answer_of_an_earlier_build_opens_without_what_it_does_not_have() {
+    let service = Service::start(Limits::default()).await;
+    service.answered("hall", "r1", v1::Status::NoMatch).await;
+    let older = service.store.write(|tx| {
+        Box::pin(async move {
+            let sql = "UPDATE stored_answers SET prior_check = NULL; \
+                       UPDATE stored_answer_icons SET matched = NULL, matches = NULL";
+            sqlx::raw_sql(sql)
+                .execute(tx.conn())
+                .await
+                .map(drop)
+                .map_err(crate::store::StoreError::during("age"))
+        })
+    });
+    older.await.unwrap();
+    let (status, found) = service.get("/api/v1/answers/1").await;
+    assert_eq!((status, &found["prior_check"]), (200, &Value::Null), "{found}");
+    let quad = &found["quads"][0];
+    assert!(quad["matched"].is_null() && quad["icon"].is_string(), "{quad}");
 }
 
 #[tokio::test]
@@ -204,7 +259,7 @@ async fn what_points_said_for_a_landmark_is_counted_by_strength() {
     ];
     let answer = v1::Answer { map: "hall".into(), quads, ..v1::Answer::default() };
     let key = SlotKey { robot: Name::new("r1").unwrap(), camera: Name::new("front").unwrap() };
-    let record = AnswerRecord { key, answer: Arc::new(answer), icons: vec![] };
+    let record = AnswerRecord { key, answer: Arc::new(answer), basis: AnswerBasis::default() };
     let stored = service
         .store
         .write(|tx| Box::pin(async move { stored_answers::add(tx, std::slice::from_ref(&record), 3).await }));

@@ -17,11 +17,15 @@ export interface StoredQuadBody extends Omit<LiveQuad, "candidates"> {
   points?: { matches: number; inliers: number; checked: number; agreeing: number; log10_false_alarms: number; agreement: string[] };
 }
 
-interface PoseBody {
+export interface PoseBody {
   pose?: { x_m: number; y_m: number; theta_rad: number };
+  /** Over (x, y, theta), row-major. */
+  covariance?: number[];
 }
 
-export interface AnswerBody extends Omit<LiveAnswer, "quads"> {
+export interface AnswerBody extends Omit<LiveAnswer, "quads" | "pose_refusal_detail"> {
+  pose_refusal?: string;
+  pose_refusal_detail?: { sentence: string; chi2: number; limit: number };
   quads: StoredQuadBody[];
   map_from_robot?: PoseBody;
   guided_map_from_robot?: PoseBody;

@@ -22,6 +22,7 @@ from waymark.api import (
     NumberOrder,
     Order,
     Place,
+    RefusedView,
     Size,
     TrainingView,
     VisibilityAreaBody,
@@ -156,6 +157,15 @@ class AsyncLandmarks(AsyncBase):
     async def delete_view(self, map: str, landmark: str, view: int) -> None:
         """Deletes a view. The model stays until the landmark is learnt again."""
         await self._done("delete_view", map, landmark, view)
+
+    async def refused_views(self, map: str, landmark: str) -> tuple[RefusedView, ...]:
+        """The photographs that uploads refused or the last lesson left out, newest first, at most 50, each with the
+        reason."""
+        return await self._all(RefusedView, "refused_views", map, landmark)
+
+    async def refused_view_icon(self, map: str, landmark: str, refused: int) -> bytes:
+        """A small picture of a refused photograph: PNG."""
+        return await self._bytes("refused_view_icon", map, landmark, refused)
 
     async def view_icon(self, map: str, landmark: str, view: int) -> bytes:
         """The rectified picture of a view, PNG."""

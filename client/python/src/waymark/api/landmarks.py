@@ -13,6 +13,7 @@ LandmarkStatus = Literal["not_learnt", "learning", "active", "inactive"]
 LandmarkHealth = Literal["sound", "flagged", "quarantined"]
 NumberOrder = Literal["number", "-number"]
 UploadOutcome = Literal["new", "duplicate", "near_duplicate"]
+RefusedBy = Literal["upload", "lesson"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,6 +181,21 @@ class TrainingView:
     created_ms: int
     outcome: UploadOutcome | None = None
     placing: PlacementReportBody | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class RefusedView:
+    """A photograph that was not taken for a landmark, or not in its last lesson: `reason` is a code, `sentence` and
+    `advice` are for people. `view` is the one that it repeats, or that the lesson left out."""
+
+    id: int
+    refused_ms: int
+    by: RefusedBy
+    reason: str
+    sentence: str
+    advice: str
+    view: int | None = None
+    icon: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
