@@ -6,8 +6,8 @@ use super::{
     events,
     examples::with_examples,
     gathering, guard, health, history, landmark_models, landmarks, learning, live, localise, mapping, maps,
-    metrics, modalities, page_session, pages, pose_by_hand, recognise, reference_runs, refused_views, relocalisation,
-    replay, reused_answers, revision, robot_activity, robot_certificates, robots, ros2,
+    metrics, modalities, page_session, pages, pose_by_hand, recognise, reference_runs, refused_views,
+    relocalisation, replay, reused_answers, revision, robot_activity, robot_certificates, robots, ros2,
     security::with_security,
     stored_answers, tokens, underlay, views, visibility, visibility_settings, walls,
 };
