@@ -19,6 +19,7 @@ mod job;
 mod landmark;
 pub mod map;
 mod names;
+mod notify;
 pub mod parameters;
 pub mod pictures;
 mod recognise;
@@ -41,7 +42,7 @@ mod view;
 
 use clap::{CommandFactory as _, Parser, Subcommand};
 use failure::{EXIT_STATUSES, Failure};
-use std::process::ExitCode;
+use std::{process::ExitCode, time::Duration};
 
 /// Maps and landmarks for fleets of robots: teach the pictures and doors of a building once, and every robot that
 /// sends camera frames learns where it is.
@@ -53,6 +54,26 @@ struct Cli {
     /// What to log, as in `info,server=debug`; default `info`.
     #[arg(long, global = true, env = "WAYMARK_LOG", value_name = "FILTER")]
     log: Option<String>,
+    /// How to log: lines for people, or an object of JSON a line.
+    #[arg(
+        long,
+        global = true,
+        env = "WAYMARK_LOG_FORMAT",
+        value_enum,
+        default_value = "text",
+        value_name = "FORMAT"
+    )]
+    log_format: LogFormat,
+}
+
+/// How the log is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum LogFormat {
+    /// Lines for people.
+    Text,
+    /// An object a line: `timestamp`, `level`, `target`, `fields` with the event as `message`, and the `span` of a
+    /// request or a frame.
+    Json,
 }
 
 #[derive(Debug, Subcommand)]
@@ -179,6 +200,9 @@ enum Command {
     Man(shell::ManArgs),
 }
 
+/// Longest wait for work that blocks a thread when a command is done.
+const RUNTIME_ENDS: Duration = Duration::from_secs(1);
+
 /// Runs the program.
 pub fn main() -> ExitCode {
     let cli = match Cli::try_parse() {
@@ -189,7 +213,7 @@ pub fn main() -> ExitCode {
     // A running server logs what it does; the other commands print results.
     let default =
         if matches!(cli.command, Command::Serve(_)) { "info,zenoh=warn" } else { "warn,zenoh=error" };
-    start_log(cli.log.as_deref(), default);
+    start_log(cli.log.as_deref(), default, cli.log_format);
     let done = |()| ExitCode::SUCCESS;
     let result = match &cli.command {
         Command::Demo(args) => run(demo::run(args)),
@@ -249,17 +273,21 @@ fn wrong_use(error: &clap::Error) -> Failure {
 }
 
 fn run<T>(work: impl Future<Output = anyhow::Result<T>>) -> anyhow::Result<T> {
-    tokio::runtime::Builder::new_multi_thread().enable_all().build()?.block_on(work)
+    let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build()?;
+    let done = runtime.block_on(work);
+    // A part of a server that has stalled does not end: the program ends all the same.
+    runtime.shutdown_timeout(RUNTIME_ENDS);
+    done
 }
 
 /// Starts the log on standard error (standard output belongs to results), with `filter` or else with `default`.
-pub fn start_log(filter: Option<&str>, default: &str) {
+pub fn start_log(filter: Option<&str>, default: &str, format: LogFormat) {
     let filter = tracing_subscriber::EnvFilter::builder().parse_lossy(filter.unwrap_or(default));
-    tracing_subscriber::fmt()
-        .with_env_filter(filter)
-        .with_writer(std::io::stderr)
-        .with_ansi(screen::has_colour(&std::io::stderr()))
-        .init();
+    let log = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr);
+    match format {
+        LogFormat::Text => log.with_ansi(screen::has_colour(&std::io::stderr())).init(),
+        LogFormat::Json => log.json().with_span_list(false).init(),
+    }
 }
 
 #[cfg(test)]

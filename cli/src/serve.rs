@@ -1,5 +1,6 @@
 //! `waymark serve`: the server, until Ctrl-C or SIGTERM.
 
+use super::notify::Supervisor;
 use anyhow::{Context, anyhow};
 use clap::Args;
 use engine::vitals::Failure;
@@ -14,7 +15,7 @@ use std::{
 };
 
 /// Time that the other parts have to end after one has failed.
-const STOP_AFTER_FAILURE: Duration = Duration::from_secs(20);
+const STOP_AFTER_FAILURE: Duration = Duration::from_secs(10);
 
 /// What `--help` teaches.
 const HELP: &str = r"Runs the server: zenoh for robots, HTTP for people and programs, one SQLite file for everything that lasts.
@@ -57,6 +58,9 @@ pub(super) struct Serve {
     /// Where robots connect; port 0 takes a free one [default: tcp/127.0.0.1:7447, with encryption tls/127.0.0.1:7447].
     #[arg(long, value_name = "ENDPOINT")]
     zenoh: Option<String>,
+    /// Where metrics are served without a token, besides /metrics for viewers; port 0 takes a free one [default: nowhere].
+    #[arg(long, value_name = "ADDR")]
+    metrics: Option<String>,
     /// Name in every key, waymark/1/{fleet}/... [default: default].
     #[arg(long, value_name = "NAME")]
     fleet: Option<String>,
@@ -88,6 +92,9 @@ impl Serve {
         if let Some(zenoh) = self.zenoh {
             raw.zenoh = zenoh;
         }
+        if let Some(metrics) = self.metrics {
+            raw.metrics = metrics;
+        }
         if let Some(fleet) = self.fleet {
             raw.fleet = fleet;
         }
@@ -106,11 +113,16 @@ impl Serve {
         let data = config.data.clone();
         let server = Server::start(config).await?;
         ready(&server);
-        tracing::info!(data = %data.display(), http = %server.http_addr, zenoh = server.zenoh_endpoint, "ready");
+        let metrics = server.metrics_addr.map(|address| address.to_string()).unwrap_or_default();
+        tracing::info!(data = %data.display(), http = %server.http_addr, zenoh = server.zenoh_endpoint, metrics, "ready");
+        let supervisor = Supervisor::of_environment();
+        supervisor.tell("READY=1");
         tokio::select! {
             stopped = stop_signal() => stopped?,
             failure = server.failed() => return Err(after(&failure, server).await),
+            never = supervisor.keep_alive(server.vitals()) => match never {},
         }
+        supervisor.tell("STOPPING=1");
         tracing::info!("stopping");
         server.stop().await;
         Ok(())

@@ -24,28 +24,24 @@ pub(crate) struct Args {
 enum Verb {
     /// Whether the server is ready, its version, maps and robots. Exit status 0 only if everything is in order.
     Status,
+    /// Whether the server does its work now: what a container or a load balancer asks. Needs no token.
+    Health,
 }
 
 /// Runs the command.
 pub(crate) async fn run(args: &Args) -> anyhow::Result<()> {
-    let Verb::Status = args.verb;
     let session = args.server.session()?;
-    let done = status(&session).await;
+    let done = match args.verb {
+        Verb::Status => status(&session).await,
+        Verb::Health => health(&session).await,
+    };
     session.explained(done).await
 }
 
 async fn status(session: &Session) -> anyhow::Result<()> {
     let maps = session.maps();
     let version = maps.version().await?;
-    let readiness = match maps.readiness().await {
-        Ok(readiness) => readiness,
-        Err(ClientError::Refused { status: 503, code, detail, .. }) => {
-            return Err(
-                Failure::new(Class::Failed, &code, format!("The server is not ready: {detail}.")).into()
-            );
-        }
-        Err(error) => return Err(error.into()),
-    };
+    let readiness = ready(session).await?;
     let (all, robots) = (maps.maps().await?, maps.robots().await?);
     let counts = Counts {
         maps: all.len() as u64,
@@ -66,6 +62,23 @@ async fn status(session: &Session) -> anyhow::Result<()> {
         return Ok(());
     };
     Err(Failure::new(Class::Failed, "degraded", sentence).into())
+}
+
+/// Its readiness, or why it is not ready.
+async fn ready(session: &Session) -> anyhow::Result<Readiness> {
+    match session.maps().readiness().await {
+        Ok(readiness) => Ok(readiness),
+        Err(ClientError::Refused { status: 503, code, detail, .. }) => {
+            let sentence = format!("The server is not ready: {detail}.");
+            Err(Failure::new(Class::Failed, &code, sentence).into())
+        }
+        Err(error) => Err(error.into()),
+    }
+}
+
+async fn health(session: &Session) -> anyhow::Result<()> {
+    let readiness = ready(session).await?;
+    session.show(&json!({ "status": readiness.status }), &readiness.status)
 }
 
 /// What is on a server.
@@ -123,6 +136,7 @@ mod tests {
                 newest_ms: Some(0),
                 failed: Some("no space".into()),
             },
+            parts_still_s: [("the outbox".to_owned(), 0)].into(),
             panics: [("a frame".to_owned(), 2), ("a write".to_owned(), 0)].into(),
         };
         let counts = Counts { maps: 1, landmarks: 2, robots: 0, connected: 0 };

@@ -37,6 +37,9 @@ pub mod frame_analysis;
 pub mod frame_answer;
 pub mod frame_context;
 pub mod frame_tap;
+pub mod histogram;
+pub mod frame_times;
+pub mod heartbeats;
 pub mod vitals;
 pub mod workers;
 #[cfg(any(test, feature = "scene"))]

@@ -39,6 +39,8 @@ pub struct RobotActivity {
     pub last_message: Duration,
     /// Time since the last frame in which a landmark was named.
     pub last_recognised: Option<Duration>,
+    /// Time since the last frame that gave a fix.
+    pub last_fix: Option<Duration>,
     /// Answered frames in a second, over the last [`RATE_SECONDS`] whole seconds, or all since its first message.
     pub frames_per_s: f64,
 }
@@ -90,6 +92,7 @@ struct Record {
     refused: BTreeMap<String, u64>,
     refusal: Option<(v1::Rejection, Instant)>,
     recognised: Option<Instant>,
+    fixed: Option<Instant>,
     rate: FrameRate,
 }
 
@@ -102,6 +105,7 @@ impl Record {
             refused: BTreeMap::new(),
             refusal: None,
             recognised: None,
+            fixed: None,
             rate: FrameRate::default(),
         }
     }
@@ -131,6 +135,9 @@ impl RobotActivities {
             |q: &v1::QuadAnswer| q.verdict() == v1::Verdict::Unique || !q.guided_landmark.is_empty();
         if answer.quads.iter().any(is_named) {
             record.recognised = Some(now);
+        }
+        if answer.map_from_robot.is_some() || answer.guided_map_from_robot.is_some() {
+            record.fixed = Some(now);
         }
     }
 
@@ -162,6 +169,7 @@ impl RobotActivities {
             last_refusal: record.refusal.as_ref().map(refusal),
             last_message: ago(record.last),
             last_recognised: record.recognised.map(ago),
+            last_fix: record.fixed.map(ago),
             frames_per_s: record.rate.per_second(record.second(now)),
         })
     }

@@ -114,6 +114,7 @@ pub fn engine(maps: &[Arc<MapSnapshot>]) -> Engine {
         kept_frames: Arc::new(KeptFrames::new(1 << 20)),
         relocalisers: Arc::default(),
         frame_tap: Arc::new(crate::frame_tap::NoTap),
+        times: Arc::default(),
         search_every_frame: true,
     }
 }

@@ -3,6 +3,7 @@
 //! processed, superseded, expired, rejected, and the counts say so at every moment. Knows no vision and no transport;
 //! time is passed in.
 
+use crate::limits::MAX_ROBOTS;
 use protos::{Code, Name, Rejection};
 use std::{
     collections::{BTreeMap, VecDeque},
@@ -80,6 +81,13 @@ pub struct SequenceTracker {
 }
 
 impl SequenceTracker {
+    /// Numbers that are left out before (epoch, seq): messages that were sent and did not arrive.
+    pub fn gap(&self, epoch: u64, seq: u64) -> u64 {
+        self.last
+            .filter(|(current, last)| *current == epoch && *last < seq)
+            .map_or(0, |(_, last)| seq - last - 1)
+    }
+
     /// Takes (epoch, seq) as the newest, or refuses it as not newer than the last of its epoch.
     pub fn advance(&mut self, epoch: u64, seq: u64) -> Result<(), Rejection> {
         let place = self.past.iter().position(|(past, _)| *past == epoch);
@@ -123,7 +131,28 @@ struct State<T> {
     /// Slots with a waiting frame and none in work, in turn.
     ready: VecDeque<SlotKey>,
     counts: FrameCounts,
+    missed: MissedFrames,
     closed: bool,
+}
+
+/// Frames whose numbers were left out: sent, and lost on the way.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct MissedFrames {
+    /// Of all robots.
+    pub total: u64,
+    /// By robot, at most [`MAX_ROBOTS`].
+    pub by_robot: BTreeMap<Name, u64>,
+}
+
+impl MissedFrames {
+    fn add(&mut self, robot: &Name, count: u64) {
+        self.total += count;
+        if let Some(all) = self.by_robot.get_mut(robot) {
+            *all += count;
+        } else if self.by_robot.len() < MAX_ROBOTS {
+            self.by_robot.insert(robot.clone(), count);
+        }
+    }
 }
 
 /// The slots of all cameras.
@@ -141,6 +170,7 @@ impl<T> Slots<T> {
             slots: BTreeMap::new(),
             ready: VecDeque::new(),
             counts: FrameCounts::default(),
+            missed: MissedFrames::default(),
             closed: false,
         };
         Self { state: Mutex::new(state), ready: Condvar::new(), limit: max_slots }
@@ -161,8 +191,12 @@ impl<T> Slots<T> {
             return state.refuse(refusal);
         }
         let slot = state.slots.entry(key.clone()).or_insert_with(|| Slot::new(now));
+        let gap = slot.order.gap(order.0, order.1);
         if let Err(refusal) = slot.order.advance(order.0, order.1) {
             return state.refuse(refusal);
+        }
+        if gap > 0 {
+            state.missed.add(&key.robot, gap);
         }
         slot.touched = now;
         if slot.waiting.replace(job).is_some() {
@@ -227,6 +261,24 @@ impl<T> Slots<T> {
     /// Counts of all frames so far.
     pub fn counts(&self) -> FrameCounts {
         self.lock().counts.clone()
+    }
+
+    /// Frames that were sent and did not arrive, by their numbers.
+    pub fn missed(&self) -> MissedFrames {
+        self.lock().missed.clone()
+    }
+
+    /// For how long the oldest frame has waited that waits now.
+    pub fn oldest_wait(&self, now: Instant) -> Option<Duration> {
+        let state = self.lock();
+        let waiting = state.slots.values().filter(|slot| slot.waiting.is_some());
+        // The newest frame is the one that waits, so its slot was touched when it came.
+        waiting.map(|slot| now.saturating_duration_since(slot.touched)).max()
+    }
+
+    /// Cameras with a slot.
+    pub fn cameras(&self) -> usize {
+        self.lock().slots.len()
     }
 
     /// Ends the wait of every worker; frames that wait are counted as expired.

@@ -2,14 +2,17 @@
 //! [`Pulse`] while it runs. A part that ends before the server is told to stop has failed. Then the server is not ready any
 //! more, and [`Vitals::failed`] gives the reason to whoever ends the process.
 
-use crate::panics::Panics;
+use crate::{
+    heartbeats::{Heartbeat, Heartbeats, STALLED},
+    panics::Panics,
+};
 use std::{
     collections::BTreeMap,
     sync::{
         Arc, Mutex, PoisonError,
-        atomic::{AtomicBool, Ordering},
+        atomic::{AtomicBool, AtomicU64, Ordering},
     },
-    time::Duration,
+    time::{Duration, Instant},
 };
 use tokio::sync::watch;
 
@@ -37,6 +40,9 @@ pub struct Vitals {
     failure: watch::Sender<Option<Failure>>,
     probes: Mutex<Vec<(&'static str, Probe)>>,
     unpublished: Mutex<BTreeMap<String, String>>,
+    hearts: Heartbeats,
+    /// A part that is still for longer has failed; 0: none has.
+    stall_limit_ms: AtomicU64,
 }
 
 impl std::fmt::Debug for Vitals {
@@ -49,6 +55,21 @@ impl Vitals {
     /// Counters of caught panics, of all parts.
     pub fn panics(&self) -> &Arc<Panics> {
         &self.panics
+    }
+
+    /// Heartbeats of the parts that work or are probed.
+    pub fn hearts(&self) -> &Heartbeats {
+        &self.hearts
+    }
+
+    /// From now on a part that is still for longer than `limit` has failed.
+    pub fn fail_stalled_after(&self, limit: Duration) {
+        self.stall_limit_ms.store(limit.as_millis() as u64, Ordering::Relaxed);
+    }
+
+    /// The part that has been still for longer than [`STALLED`]: it does not do its work now.
+    pub fn stalled(&self) -> Option<Arc<Heartbeat>> {
+        self.hearts.stalled(STALLED)
     }
 
     /// Registers a part that begins to run. It runs until the pulse is dropped.
@@ -103,10 +124,27 @@ impl Vitals {
         }
     }
 
-    /// Probes the parts that have a probe, until one has failed.
+    /// Probes the parts that have a probe, and looks for parts that are still, until one has failed.
     pub async fn watch(self: Arc<Self>) {
+        let (mut looked, mut stalled) = (Instant::now(), None);
         while self.failure().is_none() {
             tokio::time::sleep(PROBE_EVERY).await;
+            self.hearts.tick(looked.elapsed());
+            looked = Instant::now();
+            let part = self.stalled().map(|heart| heart.part().to_owned());
+            if part != stalled {
+                if let Some(part) = &part {
+                    tracing::error!(part, follows = "the server is not ready", "part_stalled");
+                } else {
+                    tracing::info!("part_goes_on");
+                }
+                stalled = part;
+            }
+            let limit = Duration::from_millis(self.stall_limit_ms.load(Ordering::Relaxed));
+            if let Some(heart) = self.hearts.stalled(limit).filter(|_| !limit.is_zero()) {
+                let seconds = heart.still().as_secs();
+                self.fail(heart.part(), format!("it has not gone on for {seconds} s"));
+            }
         }
     }
 

@@ -22,11 +22,15 @@ use super::{
     snapshot::{MapSnapshot, Snapshots},
 };
 use crate::frame_tap::{AnalysedFrame, FrameTap};
+use crate::frame_times::FrameTimes;
 use crate::vitals::Vitals;
 use map::pose2::Pose2Covariance;
 use protos::{CheckedFrame, Code, Name, Rejection, v1};
-use std::{cell::Cell, sync::Arc, thread::JoinHandle, time::Instant};
+use std::{cell::Cell, sync::Arc, time::Instant};
 use vision::{frame::GrayImage, model::LandmarkId, pipeline::FrameAnalysis};
+
+mod threads;
+pub use threads::Workers;
 
 /// Takes answers and poses. Never waits.
 pub trait Publish: Send + Sync + 'static {
@@ -61,62 +65,10 @@ pub struct Engine {
     pub relocalisers: Arc<Relocalisers>,
     /// Takes frames of robots that gather views.
     pub frame_tap: Arc<dyn FrameTap>,
+    /// How long frames take.
+    pub times: Arc<FrameTimes>,
     /// Whether every frame is searched for all landmarks of its map.
     pub search_every_frame: bool,
-}
-
-/// The threads.
-#[derive(Debug)]
-pub struct Workers {
-    slots: Arc<Slots<FrameJob>>,
-    motion: Arc<MotionTracker>,
-    threads: Vec<JoinHandle<()>>,
-}
-
-impl Workers {
-    /// Starts `count` threads for frames, at least one, and one for laser scans.
-    pub fn start(engine: &Engine, count: usize, publish: &Arc<impl Publish>) -> std::io::Result<Self> {
-        let mut threads = Vec::with_capacity(count + 1);
-        for i in 0..count.max(1) {
-            let (engine, publish) = (engine.clone(), publish.clone());
-            let name = format!("vision-{i}");
-            let pulse = engine.vitals.begin(format!("the worker thread {name}"));
-            threads.push(std::thread::Builder::new().name(name).spawn(move || {
-                // Dropped with the thread, however that ends.
-                let _pulse = pulse;
-                while let Some((key, job)) = engine.slots.take() {
-                    let outcome = engine.answer_frame(&key, &job, publish.as_ref());
-                    engine.slots.finish(&key, outcome);
-                }
-            })?);
-        }
-        let (laser, publish) = (engine.clone(), publish.clone());
-        let named = std::thread::Builder::new().name("laser".to_owned());
-        let pulse = engine.vitals.begin("the laser thread");
-        threads.push(named.spawn(move || {
-            let _pulse = pulse;
-            while let Some((robot, job)) = laser.motion.scans().take() {
-                let what = format_args!("a scan of robot {robot}");
-                laser.vitals.panics().catch(Edge::Scan, what, "it corrects nothing", || {
-                    if let Some(pose) = laser.motion.fix_by_scan(&robot, &job, Instant::now()) {
-                        publish.pose(&robot, &pose);
-                    }
-                });
-            }
-        })?);
-        Ok(Self { slots: engine.slots.clone(), motion: engine.motion.clone(), threads })
-    }
-
-    /// Returns when every frame in work is answered. Waits: not for an async thread.
-    pub fn stop(self) {
-        self.slots.close();
-        self.motion.scans().close();
-        for thread in self.threads {
-            if thread.join().is_err() {
-                tracing::error!("worker_panicked");
-            }
-        }
-    }
 }
 
 /// A frame after its analysis.
@@ -366,6 +318,8 @@ impl Engine {
         } else {
             self.live.publish_refusal(key, answer.clone(), now);
         }
+        self.times.add(&answer);
+        tracing::debug!(status = answer.status().as_str_name(), ms = answer.latency_ms, "frame_answered");
         // Last, so that who has the answer finds it counted.
         publish.answer(key, &answer);
     }

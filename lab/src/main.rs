@@ -42,7 +42,7 @@ enum Command {
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
-    cli::start_log(cli.log.as_deref(), "warn,zenoh=error");
+    cli::start_log(cli.log.as_deref(), "warn,zenoh=error", cli::LogFormat::Text);
     let done = match &cli.command {
         Command::Evaluate(command) => evaluate::run(command),
         Command::Bench(args) => bench::run(args),

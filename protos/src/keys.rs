@@ -199,6 +199,11 @@ impl Keys {
         format!("{}robot/*/rpc/hello", self.prefix)
     }
 
+    /// Key of a server's question to itself: `server/{id}/ping`, with the id of its zenoh session.
+    pub fn ping(&self, id: &str) -> String {
+        format!("{}server/{id}/ping", self.prefix)
+    }
+
     /// Key expression of the versions of all maps.
     pub fn all_map_versions(&self) -> String {
         format!("{}map/*/version", self.prefix)

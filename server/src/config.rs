@@ -6,19 +6,20 @@
 
 mod addresses;
 mod backup;
+mod limits;
 mod ros2;
 mod tls;
 
 pub use backup::BackupSettings;
 pub(crate) use backup::MAX_KEPT;
+pub use limits::Limits;
 pub use ros2::{
     MAX_DOMAIN, MAX_KEY_PREFIX_BYTES, MAX_ROS2_ROBOTS, MAX_TRANSFORM_TOLERANCE_S, Middleware, PoseSource,
     RawRos2, RawRos2Camera, RawRos2Robot, Ros2Outputs, Ros2Robot,
 };
 pub use tls::{MAX_TLS_NAMES, OwnCertificate, RawTls, Tls};
 
-use addresses::{is_loopback, zenoh_address, zenoh_endpoint};
-use engine::decode::ImageLimits;
+use addresses::{is_loopback, socket_address, zenoh_address, zenoh_endpoint};
 use figment::{
     Figment,
     providers::{Env, Format, Toml},
@@ -34,7 +35,7 @@ use std::{
 use vision::{model::MAX_LANDMARKS, params::Params};
 
 /// Variables that begin with `WAYMARK_` but are read by the command line, not by the settings.
-const NOT_SETTINGS: [&str; 6] = ["config", "server", "map", "log", "token", "robot_file"];
+const NOT_SETTINGS: [&str; 7] = ["config", "server", "map", "log", "log_format", "token", "robot_file"];
 /// Most vision threads that can be asked for.
 pub const MAX_WORKERS: usize = 256;
 
@@ -76,6 +77,8 @@ pub struct RawConfig {
     /// Where the zenoh router listens, as zenoh writes it; port 0 takes a free one. Empty: `tcp/127.0.0.1:7447`, or
     /// `tls/127.0.0.1:7447` with encryption.
     pub zenoh: String,
+    /// Address and port of a listener for metrics alone, which asks for no token; empty: none. Port 0 takes a free one.
+    pub metrics: String,
     /// Name in every key: `waymark/1/{fleet}/...`.
     pub fleet: String,
     /// Vision threads; 0 takes one per core.
@@ -104,6 +107,7 @@ impl Default for RawConfig {
             data: PathBuf::from("waymark-data"),
             http: "127.0.0.1:8080".into(),
             zenoh: String::new(),
+            metrics: String::new(),
             fleet: "default".into(),
             workers: 0,
             search_every_frame: true,
@@ -114,158 +118,6 @@ impl Default for RawConfig {
             limits: Limits::default(),
             algorithm: Params::default(),
         }
-    }
-}
-
-/// Every bound of the server, each with its unit. A value beyond a bound is refused, never cut.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Limits {
-    /// Largest message from a robot, in bytes. Up to 60 000 bytes fit one zenoh batch and are not fragmented. Raw colour of
-    /// 640 x 480 takes 921 600, of 1280 x 1024 (the default's largest) 3 932 160. Each camera may have one frame waiting, so
-    /// `cameras` times this bounds their memory.
-    pub frame_bytes: usize,
-    /// Largest frame, in pixels.
-    pub frame_pixels: usize,
-    /// Largest uploaded image, in bytes.
-    pub upload_bytes: usize,
-    /// Largest bundle of a map that is taken, in bytes.
-    pub bundle_bytes: usize,
-    /// Largest uploaded image, in pixels.
-    pub upload_pixels: usize,
-    /// Largest JSON request, in bytes.
-    pub json_bytes: usize,
-    /// Oldest frame that work is still started on, in ms after receipt; a robot may ask for less.
-    pub frame_deadline_ms: u32,
-    /// Maps.
-    pub maps: usize,
-    /// Landmarks in one map.
-    pub landmarks: usize,
-    /// Views of one landmark.
-    pub views: usize,
-    /// Wall segments of one map.
-    pub laser_segments: usize,
-    /// Robots.
-    pub robots: usize,
-    /// Cameras with a slot.
-    pub cameras: usize,
-    /// HTTP connections at a time.
-    pub connections: usize,
-    /// Live event streams (SSE) at a time.
-    pub streams: usize,
-    /// Seconds until the head of a request must be there.
-    pub header_timeout_s: u64,
-    /// Seconds until a request must be answered; event streams are not bound by it.
-    pub request_timeout_s: u64,
-    /// Longest time for a request that brings or takes the bundle of a map, in seconds.
-    pub bundle_timeout_s: u64,
-    /// Seconds for which a client may leave an answer unread before its connection is closed; event streams that have
-    /// nothing to send are not bound by it.
-    pub write_timeout_s: u64,
-    /// Requests at a time with a body of more than 64 KiB, or of unknown length: what their bodies take in memory is
-    /// bounded by this times the largest body.
-    pub uploads: usize,
-    /// Seconds that such a request waits for its place before it is refused.
-    pub upload_wait_s: u64,
-    /// Most items on a page of a list.
-    pub page: usize,
-    /// Commands waiting for the writer.
-    pub write_queue: usize,
-    /// Jobs waiting or running.
-    pub jobs: usize,
-    /// Finished jobs that are retained.
-    pub jobs_kept: usize,
-    /// Answers to frames that are stored; the oldest go.
-    pub stored_answers: usize,
-    /// Bytes of frames that are kept in memory to try drafts with; the oldest go.
-    pub replay_bytes: usize,
-    /// Answers to creations that are kept for repeats, for a day at most; the oldest go.
-    pub kept_answers: usize,
-    /// Commits of each map that are kept; the oldest go.
-    pub kept_commits: usize,
-    /// Bytes of each map that are stored only for its kept commits, about; the oldest commits go.
-    pub history_bytes: usize,
-    /// Entries of the audit log; the oldest are forgotten.
-    pub audit_entries: usize,
-}
-
-impl Default for Limits {
-    fn default() -> Self {
-        Self {
-            frame_bytes: 4 << 20,
-            frame_pixels: 2_304_000,
-            upload_bytes: 16 << 20,
-            bundle_bytes: 1 << 30,
-            upload_pixels: vision::frame::MAX_AREA_PX,
-            json_bytes: 2 << 20,
-            frame_deadline_ms: 500,
-            maps: 200,
-            landmarks: 2_000,
-            views: 200,
-            laser_segments: 20_000,
-            robots: 1_000,
-            cameras: 2_000,
-            connections: 256,
-            streams: 64,
-            header_timeout_s: 5,
-            request_timeout_s: 30,
-            bundle_timeout_s: 600,
-            write_timeout_s: 20,
-            uploads: 16,
-            upload_wait_s: 5,
-            page: 500,
-            write_queue: 256,
-            jobs: 64,
-            jobs_kept: 1_000,
-            stored_answers: 2_000,
-            replay_bytes: 64 << 20,
-            kept_answers: 10_000,
-            kept_commits: 1_000,
-            history_bytes: 4 << 30,
-            audit_entries: 100_000,
-        }
-    }
-}
-
-impl Limits {
-    /// Name and value of every bound that must not be 0.
-    fn counts(&self) -> [(&'static str, usize); 29] {
-        [
-            ("limits.frame_bytes", self.frame_bytes),
-            ("limits.frame_pixels", self.frame_pixels),
-            ("limits.upload_bytes", self.upload_bytes),
-            ("limits.bundle_bytes", self.bundle_bytes),
-            ("limits.bundle_timeout_s", self.bundle_timeout_s as usize),
-            ("limits.upload_pixels", self.upload_pixels),
-            ("limits.json_bytes", self.json_bytes),
-            ("limits.frame_deadline_ms", self.frame_deadline_ms as usize),
-            ("limits.maps", self.maps),
-            ("limits.landmarks", self.landmarks),
-            ("limits.views", self.views),
-            ("limits.laser_segments", self.laser_segments),
-            ("limits.robots", self.robots),
-            ("limits.cameras", self.cameras),
-            ("limits.connections", self.connections),
-            ("limits.header_timeout_s", self.header_timeout_s as usize),
-            ("limits.request_timeout_s", self.request_timeout_s as usize),
-            ("limits.write_timeout_s", self.write_timeout_s as usize),
-            ("limits.uploads", self.uploads),
-            ("limits.upload_wait_s", self.upload_wait_s as usize),
-            ("limits.page", self.page),
-            ("limits.write_queue", self.write_queue),
-            ("limits.jobs", self.jobs),
-            ("limits.stored_answers", self.stored_answers),
-            ("limits.replay_bytes", self.replay_bytes),
-            ("limits.kept_answers", self.kept_answers),
-            ("limits.kept_commits", self.kept_commits),
-            ("limits.history_bytes", self.history_bytes),
-            ("limits.audit_entries", self.audit_entries),
-        ]
-    }
-
-    /// Limits of an uploaded picture.
-    pub fn upload(&self) -> ImageLimits {
-        ImageLimits { bytes: self.upload_bytes, pixels: self.upload_pixels }
     }
 }
 
@@ -293,6 +145,8 @@ pub struct Config {
     pub http_addr: SocketAddr,
     /// Where the zenoh router listens, `tcp/HOST:PORT` or `tls/HOST:PORT`; port 0 takes a free one.
     pub zenoh_endpoint: String,
+    /// Where metrics are served without a token; `None`: nowhere.
+    pub metrics_addr: Option<SocketAddr>,
     /// Name in every key.
     pub fleet: Name,
     /// Vision threads, at least 1.
@@ -318,7 +172,9 @@ impl Config {
         let zenoh = zenoh_address("zenoh", &self.zenoh_endpoint).ok().filter(is_plain);
         let is_http_plain = self.tls.is_none() && !is_loopback(self.http_addr.ip());
         let http = is_http_plain.then(|| ("http", self.http_addr.to_string()));
-        http.into_iter().chain(zenoh.map(|_| ("zenoh", self.zenoh_endpoint.clone()))).collect()
+        let metrics = self.metrics_addr.filter(|address| !is_loopback(address.ip()));
+        let metrics = metrics.map(|address| ("metrics", address.to_string()));
+        http.into_iter().chain(zenoh.map(|_| ("zenoh", self.zenoh_endpoint.clone()))).chain(metrics).collect()
     }
 }
 
@@ -326,10 +182,11 @@ impl TryFrom<RawConfig> for Config {
     type Error = ConfigError;
 
     fn try_from(raw: RawConfig) -> Result<Self, ConfigError> {
-        let http_addr: SocketAddr = raw
-            .http
-            .parse()
-            .map_err(|e| invalid("http", format!("`{}` is not ADDRESS:PORT ({e})", raw.http)))?;
+        let http_addr = socket_address("http", &raw.http)?;
+        let metrics_addr = match raw.metrics.as_str() {
+            "" => None,
+            address => Some(socket_address("metrics", address)?),
+        };
         let tls = tls::checked(raw.tls)?;
         let zenoh_endpoint = zenoh_endpoint(raw.zenoh, tls.is_some());
         let (zenoh_is_tls, zenoh_addr) = zenoh_address("zenoh", &zenoh_endpoint)?;
@@ -339,6 +196,12 @@ impl TryFrom<RawConfig> for Config {
         for (field, value, is_plain, ip) in [
             ("http", &raw.http, tls.is_none(), http_addr.ip()),
             ("zenoh", &zenoh_endpoint, !zenoh_is_tls, zenoh_addr.ip()),
+            (
+                "metrics",
+                &raw.metrics,
+                metrics_addr.is_some(),
+                metrics_addr.map_or(http_addr.ip(), |at| at.ip()),
+            ),
         ] {
             if is_plain && !raw.insecure && !is_loopback(ip) {
                 return Err(ConfigError::NotLoopback { field, value: value.clone() });
@@ -372,6 +235,7 @@ impl TryFrom<RawConfig> for Config {
             data: raw.data,
             http_addr,
             zenoh_endpoint,
+            metrics_addr,
             fleet,
             workers: if raw.workers == 0 { cores } else { raw.workers },
             search_every_frame: raw.search_every_frame,

@@ -17,10 +17,13 @@ mod failed_gates;
 mod recording_answers;
 mod localise_body;
 mod jobs;
+mod live_probes;
+mod metrics;
 pub mod gather;
 pub mod calibrating;
 mod http;
 mod running;
+mod serving;
 mod server;
 
 pub use running::RunningServer;

@@ -5,6 +5,7 @@ use crate::{
     identity::{Sessions, TokenId, local_token::LocalToken},
     publication::CatalogueTasks,
     ros2::Ros2,
+    serving::Serving,
 };
 use engine::{
     intake::FrameJob,
@@ -27,6 +28,8 @@ use tokio::{sync::watch, task::JoinHandle};
 pub struct RunningServer {
     /// Where HTTP listens, with the real port.
     pub http_addr: SocketAddr,
+    /// Where metrics are served without a token, if anywhere, with the real port.
+    pub metrics_addr: Option<SocketAddr>,
     /// Where robots connect, with the real port.
     pub zenoh_endpoint: String,
     /// Maps and robots as the workers see them.
@@ -51,7 +54,7 @@ pub struct RunningServer {
 pub(crate) struct Tasks {
     pub(crate) workers: Workers,
     pub(crate) bus: Bus,
-    pub(crate) http: JoinHandle<()>,
+    pub(crate) serving: Serving,
     pub(crate) jobs: JoinHandle<()>,
     /// Of findings, stored answers and events.
     pub(crate) recorders: [JoinHandle<()>; 3],
@@ -59,7 +62,6 @@ pub(crate) struct Tasks {
     pub(crate) pictures: JoinHandle<()>,
     pub(crate) backups: JoinHandle<()>,
     pub(crate) writer: CatalogueTasks,
-    pub(crate) watch: JoinHandle<()>,
 }
 
 impl RunningServer {
@@ -107,9 +109,9 @@ impl RunningServer {
         self.vitals.stop();
         self.local_token.remove();
         self.stop.send_replace(true);
-        let Tasks { workers, bus, http, jobs, recorders, gather, pictures, backups, writer, watch } =
+        let Tasks { workers, bus, mut serving, jobs, recorders, gather, pictures, backups, writer } =
             self.tasks;
-        watch.abort();
+        serving.unwatch().await;
         // Workers first: what they have in work is still answered over the open bus.
         let workers = tokio::task::spawn_blocking(move || workers.stop());
         if let Err(error) = workers.await {
@@ -119,7 +121,6 @@ impl RunningServer {
         bus.close().await;
         let [findings, answers, events] = recorders;
         let others = [
-            ("HTTP", http),
             ("jobs", jobs),
             ("findings", findings),
             ("stored answers", answers),
@@ -128,7 +129,7 @@ impl RunningServer {
             ("the check of the pictures", pictures),
             ("the timetable of backups", backups),
         ];
-        for (what, task) in others {
+        for (what, task) in serving.tasks().chain(others) {
             if let Err(error) = task.await {
                 tracing::error!(%error, what, "task_panicked");
             }

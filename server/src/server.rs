@@ -6,7 +6,7 @@ use crate::{
     config::{Config, Tls},
     events::{EventLog, watch_changes::watch_changes},
     gather::{self, Gatherer, GatheringTap, OfferedFrame},
-    http::{self, App, Enrolment, Services},
+    http::{App, Enrolment, Services},
     identity::{
         Sessions,
         certificates::{CertificateRegistry, Certificates},
@@ -17,6 +17,7 @@ use crate::{
     recording_answers::store_answers,
     ros2::Ros2,
     running::{RunningServer, Tasks},
+    serving::{Listeners, Serving},
     store::{OpenError, StoreError, actor::Actor, landmarks, now_ms, pictures},
 };
 use engine::{
@@ -36,11 +37,9 @@ use engine::{
 use protos::Name;
 use std::{net::SocketAddr, sync::Arc, time::Duration};
 use tokio::{
-    net::TcpListener,
     sync::{mpsc::Receiver, watch},
     task::JoinHandle,
 };
-use tokio_rustls::TlsAcceptor;
 
 /// Why the server did not start.
 #[derive(Debug, thiserror::Error)]
@@ -90,10 +89,12 @@ impl Server {
     /// Starts a server. When this returns, it answers.
     pub async fn start(config: Config) -> Result<RunningServer, StartError> {
         let config = Arc::new(config);
+        crate::metrics::process::started();
         let (store, writer) = Catalogue::open(&config).await?;
         let (stop, stopping) = watch::channel(false);
         let certificates = open_certificates(&config, &stopping)?;
-        let (listener, tls, http_addr) = listen(&config, certificates.as_ref()).await?;
+        let listeners = Listeners::open(&config, certificates.as_ref()).await?;
+        let (http_addr, metrics_addr) = (listeners.http_addr, listeners.metrics_addr);
         let local_token = write_local_token(&config, &store, http_addr.port())?;
         let sessions = Arc::<Sessions>::default();
         let (snapshots, vitals) = (store.snapshots().clone(), store.vitals().clone());
@@ -106,7 +107,7 @@ impl Server {
         let pictures = tokio::spawn(pictures::check_all((*store).clone(), stopping.clone()));
         let (live, slots) = (engine.live.clone(), engine.slots.clone());
         let to = receivers(&config, &engine, certificates.as_ref().map(|_| store.certificates().clone()));
-        let bus = Bus::open(&config, to.clone(), certificates.clone()).await?;
+        let mut bus = Bus::open(&config, to.clone(), certificates.clone()).await?;
         let outbox = bus.outbox().clone();
         let ros2 = Arc::new(Ros2::open(bus.session(), &config.ros2, (&to, &outbox)).await?);
         let publisher = Arc::new(ros2.publisher(outbox.clone()));
@@ -123,26 +124,25 @@ impl Server {
             enrolment: enrolment(certificates.as_ref(), bus.endpoint()),
             local_token_file: Some(local_token.path().to_owned()),
         };
-        let app = App::new(config.clone(), store, services, &engine, stopping.clone());
-        let http = serve((listener, tls), app, &config, vitals.begin("the HTTP listener"), stopping);
-        let watch = tokio::spawn(vitals.clone().watch());
+        let probed = ((*store).clone(), publisher.outbox().clone(), bus.take_pinger());
+        let app = Arc::new(App::new(config.clone(), store, services, &engine, stopping.clone()));
+        let serving = Serving::start(listeners, &app, probed, &stopping);
         let zenoh_endpoint = bus.endpoint().to_owned();
-        let first_name = |tls: &Tls| tls.names.first().cloned();
-        let tls_name = config.tls.as_ref().map(|tls| first_name(tls).unwrap_or(http_addr.ip().to_string()));
+        let tls_name = tls_name(&config, http_addr);
         let tasks = Tasks {
             workers,
             bus,
-            http,
+            serving,
             jobs: teaching.jobs_task,
             recorders,
             gather: teaching.gather_task,
             pictures,
             backups: backups_task,
             writer,
-            watch,
         };
         Ok(RunningServer {
             http_addr,
+            metrics_addr,
             zenoh_endpoint,
             snapshots,
             live,
@@ -158,17 +158,10 @@ impl Server {
     }
 }
 
-/// The listener of HTTP, how it encrypts, and its address.
-async fn listen(
-    config: &Config,
-    certificates: Option<&Arc<Certificates>>,
-) -> Result<(TcpListener, Option<TlsAcceptor>, SocketAddr), StartError> {
-    let tls = certificates.map(|all| http::encryption::acceptor(all.current())).transpose();
-    let tls = tls.map_err(|e| StartError::Certificates(e.to_string()))?;
-    let at = |source| StartError::Http { addr: config.http_addr, source };
-    let listener = TcpListener::bind(config.http_addr).await.map_err(at)?;
-    let http_addr = listener.local_addr().map_err(at)?;
-    Ok((listener, tls, http_addr))
+/// The first name of the certificate, or else the address; `None` without encryption.
+fn tls_name(config: &Config, http_addr: SocketAddr) -> Option<String> {
+    let first_name = |tls: &Tls| tls.names.first().cloned();
+    config.tls.as_ref().map(|tls| first_name(tls).unwrap_or(http_addr.ip().to_string()))
 }
 
 /// Drives that an earlier server was mapping go on.
@@ -249,20 +242,6 @@ fn recorders(
     [tokio::spawn(findings), tokio::spawn(answers), tokio::spawn(events)]
 }
 
-fn serve(
-    (listener, tls): (TcpListener, Option<TlsAcceptor>),
-    app: App,
-    config: &Config,
-    pulse: Pulse,
-    stopping: watch::Receiver<bool>,
-) -> JoinHandle<()> {
-    let (router, limits) = (http::router(app), config.limits.clone());
-    tokio::spawn(async move {
-        http::listen::serve(listener, router, tls, limits, stopping).await;
-        drop(pulse);
-    })
-}
-
 /// Whom a backup tells of its panics and of its end.
 fn told(store: &Catalogue) -> (Arc<Panics>, Arc<EventLog>) {
     (store.vitals().panics().clone(), store.events().clone())
@@ -289,6 +268,7 @@ fn engine(
         kept_frames: Arc::new(KeptFrames::new(config.limits.replay_bytes)),
         relocalisers: Arc::default(),
         frame_tap: Arc::new(frame_tap),
+        times: Arc::default(),
         search_every_frame: config.search_every_frame,
     };
     (engine, recorded)

@@ -5,10 +5,12 @@ use std::{path::Path, process::Command};
 use tests::{documents::markdown, guide_files, guides, machines, skipped};
 
 /// Guides that are run by tests of another part.
-const ELSEWHERE: [(&str, &str); 2] = [
+const ELSEWHERE: [(&str, &str); 3] = [
     ("python", "client/python/tests/test_guide.py"),
     // It names what is on the pages; journeys in a browser use it.
     ("administrator", "web/tests/unit/guide.test.ts"),
+    // It has no commands; it is compared with the code.
+    ("log-events", "tests/end_to_end/log_events.rs"),
 ];
 
 fn run(name: &str) {
@@ -100,6 +102,11 @@ fn the_commands_of_take_a_change_back_work() {
 #[test]
 fn the_commands_of_deploy_work() {
     run("deploy");
+}
+
+#[test]
+fn the_commands_of_monitor_work() {
+    run("monitor");
 }
 
 #[test]

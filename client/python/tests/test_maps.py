@@ -61,6 +61,7 @@ def hall(maps: MapClient, name: str) -> None:
 def test_the_server_says_how_it_is(server: Server) -> None:
     with server.maps() as maps:
         assert (maps.health().status, maps.readiness().status) == ("ok", "ready")
+        assert "waymark_ready 1" in maps.metrics()
         version = maps.version()
         assert (version.name, version.api, version.protocol) == ("waymark", "v1", "1")
 

@@ -1,6 +1,9 @@
 //! Health, readiness and version of the server.
 
-use super::{map_client::MapClient, operation::operations};
+use super::{
+    map_client::{MapClient, whole},
+    operation::operations,
+};
 use crate::ClientError;
 use protos::api::{Health, Readiness, Version};
 
@@ -8,6 +11,7 @@ operations! {
     HEALTH: GET "/healthz" => health,
     READINESS: GET "/readyz" => readiness,
     VERSION: GET "/version" => version,
+    METRICS: GET "/metrics" => metrics,
 }
 
 impl MapClient {
@@ -19,6 +23,12 @@ impl MapClient {
     /// Whether every part of the server runs and the database answers; an error with status 503 otherwise.
     pub async fn readiness(&self) -> Result<Readiness, ClientError> {
         self.send(self.ask(&READINESS, &[])?).await
+    }
+
+    /// Metrics, in the text format of Prometheus.
+    pub async fn metrics(&self) -> Result<String, ClientError> {
+        let text = whole(self.checked(self.ask(&METRICS, &[])?).await?).await?;
+        Ok(String::from_utf8_lossy(&text).into_owned())
     }
 
     /// Version of the server.

@@ -54,6 +54,11 @@ impl Scans {
         }
     }
 
+    /// Scans that wait.
+    pub fn waiting(&self) -> usize {
+        self.lock().waiting.len()
+    }
+
     /// Ends the wait and drops the scans that wait.
     pub fn close(&self) {
         let mut state = self.lock();

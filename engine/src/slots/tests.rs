@@ -204,3 +204,36 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn numbers_that_are_left_out_are_counted_in_their_epoch_and_by_robot() {
+    let slots = Slots::new(4);
+    let now = Instant::now();
+    for (epoch, seq) in [(1, 5), (1, 6), (1, 9), (2, 40), (2, 41), (1, 12)] {
+        slots.offer(key("r1", "front"), (epoch, seq), 0, now).unwrap();
+    }
+    assert!(slots.offer(key("r1", "front"), (1, 3), 0, now).is_err(), "old");
+    let missed = slots.missed();
+    // 7 and 8; a first number, another epoch and one that comes back say nothing.
+    assert_eq!((missed.total, missed.by_robot.into_values().collect()), (2, vec![2]));
+    let mut many = MissedFrames::default();
+    for i in 0..=MAX_ROBOTS {
+        many.add(&Name::new(format!("r{i}")).unwrap(), 1);
+    }
+    assert_eq!((many.total, many.by_robot.len()), (MAX_ROBOTS as u64 + 1, MAX_ROBOTS));
+}
+
+#[test]
+fn the_oldest_wait_is_that_of_a_frame_that_waits_now() {
+    let slots = Slots::new(4);
+    let now = Instant::now();
+    let at = |ms| now + Duration::from_millis(ms);
+    assert_eq!(slots.oldest_wait(at(9)), None);
+    slots.offer(key("r1", "front"), (1, 1), 0, at(0)).unwrap();
+    slots.offer(key("r2", "front"), (1, 1), 0, at(3)).unwrap();
+    assert_eq!(slots.oldest_wait(at(10)), Some(Duration::from_millis(10)));
+    slots.offer(key("r1", "front"), (1, 2), 0, at(6)).unwrap();
+    assert_eq!(slots.oldest_wait(at(10)), Some(Duration::from_millis(7)), "a newer one replaced the oldest");
+    while slots.try_take().is_some() {}
+    assert_eq!(slots.oldest_wait(at(10)), None);
+}

@@ -291,3 +291,50 @@ fn a_robot_that_was_carried_away_is_found_out_although_searches_are_spared() {
     }
     assert!(robot.off_m(1) < 0.2, "{}", robot.off_m(1));
 }
+
+/// Does not come back from an answer until it is let go.
+struct Stuck(Mutex<std::sync::mpsc::Receiver<()>>);
+
+impl Publish for Stuck {
+    fn answer(&self, _: &SlotKey, _: &v1::Answer) {
+        self.0.lock().unwrap().recv().ok();
+    }
+
+    fn pose(&self, _: &Name, _: &v1::RobotPose) {}
+}
+
+#[test]
+fn a_worker_that_does_not_come_to_the_end_of_a_frame_stalls() {
+    let (engine, (release, held)) = (hall(), std::sync::mpsc::channel());
+    let workers = Workers::start(&engine, 2, &Arc::new(Stuck(Mutex::new(held)))).unwrap();
+    let intake = intake(&engine, Duration::from_mins(1));
+    let seconds = |n| {
+        for _ in 0..n {
+            engine.vitals.hearts().tick(Duration::from_secs(1));
+        }
+    };
+    seconds(9);
+    assert!(engine.vitals.stalled().is_none(), "they have nothing to do");
+    intake.receive(key(0), message(1, 768)).unwrap();
+    while engine.slots.counts().in_work == 0 {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    seconds(1);
+    // The worker may begin to work after the frame was taken.
+    while engine.vitals.stalled().is_none() {
+        seconds(1);
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    let stalled = engine.vitals.stalled().unwrap();
+    assert!(stalled.part().starts_with("the worker thread vision-"), "{}", stalled.part());
+    drop(release);
+    while engine.slots.counts().in_work > 0 {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    while engine.vitals.stalled().is_some() {
+        seconds(1);
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    engine.vitals.stop();
+    workers.stop();
+}

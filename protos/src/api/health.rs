@@ -29,6 +29,9 @@ pub struct Readiness {
     /// The newest backup, and why the last attempt failed.
     #[serde(default)]
     pub backup: BackupHealth,
+    /// For how many seconds each part that has work, or is probed, has not gone on. Beyond a few the server is not ready.
+    #[serde(default)]
+    pub parts_still_s: BTreeMap<String, u64>,
     /// Panics caught since the start, by where: what they met was refused or dropped, everything else went on. Each is in
     /// the log. Anything but 0 is a fault of the program.
     pub panics: BTreeMap<String, u64>,

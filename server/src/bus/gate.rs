@@ -40,7 +40,7 @@ pub(super) struct GateSettings {
     pub(super) endpoint: String,
     /// Where the server's own router listens for it.
     pub(super) link_endpoint: String,
-    pub(super) link: LinkCertificates,
+    pub(super) link: Arc<LinkCertificates>,
     pub(super) keys: Keys,
     pub(super) certificates: Arc<Certificates>,
     pub(super) registry: Arc<CertificateRegistry>,

@@ -107,6 +107,7 @@ fn frame(keys: &Keys, to: &Receivers, outbox: &Outbox, sample: &Sample) {
 
 /// Passes a message of a camera image to the intake. A refusal is answered.
 pub(crate) fn take_frame(to: &Receivers, outbox: &Outbox, kind: FrameKind, slot: &SlotKey, message: Bytes) {
+    let _span = tracing::debug_span!("camera", robot = %slot.robot, camera = %slot.camera).entered();
     if !to.admits(&slot.robot) {
         tracing::debug!(?slot, "frame_of_a_revoked_robot");
         return to.intake.slots.refuse(protos::Code::UnknownRobot);
@@ -116,7 +117,8 @@ pub(crate) fn take_frame(to: &Receivers, outbox: &Outbox, kind: FrameKind, slot:
     let received =
         panics.catch(Edge::Message, "frame", follows, || to.intake.take(kind, slot.clone(), message.clone()));
     if let Err(answer) = received.unwrap_or_else(|| Err(internal(kind, message))) {
-        tracing::debug!(?slot, rejection = ?answer.rejection, "frame_refused");
+        let (epoch, seq) = (answer.epoch, answer.seq);
+        tracing::debug!(epoch, seq, rejection = ?answer.rejection, "frame_refused");
         let answer: Arc<v1::Answer> = answer.into();
         to.live.publish_refusal(slot, answer.clone(), Instant::now());
         // Last, so that who has the answer finds it counted.

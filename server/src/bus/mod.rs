@@ -11,6 +11,7 @@ mod hello;
 mod inbox;
 mod localise;
 mod outbox;
+mod ping;
 mod router;
 mod versions;
 #[cfg(test)]
@@ -18,6 +19,7 @@ mod tests;
 
 pub(crate) use inbox::{announce_presence, take_frame};
 pub use outbox::Outbox;
+pub(crate) use ping::Pinger;
 
 use crate::{
     config::Config,
@@ -102,7 +104,8 @@ pub struct Bus {
     outbox: Outbox,
     changes: JoinHandle<()>,
     subscribers: Vec<Subscriber<()>>,
-    queryables: [Queryable<()>; 3],
+    queryables: [Queryable<()>; 4],
+    pinger: Option<Pinger>,
     localiser: Localiser,
     gate: Option<Gate>,
 }
@@ -122,9 +125,10 @@ impl Bus {
     ) -> Result<Self, BusError> {
         let endpoint = router::endpoint(&config.zenoh_endpoint)?;
         let encrypted = certificates.filter(|_| endpoint.starts_with("tls/"));
-        let (session, link) = match &encrypted {
-            None => (router::open(&plain(config, vec![endpoint.clone()])).await?, None),
-            Some(_) => linked(config).await.map(|(session, link)| (session, Some(link)))?,
+        let (session, link) = if encrypted.is_some() {
+            linked(config).await.map(|(session, link)| (session, Some(link)))?
+        } else {
+            (router::open(&plain(config, vec![endpoint.clone()])).await?, None)
         };
         let keys = Keys::new(&config.fleet);
         let outbox = Outbox::start(session.clone(), keys.clone(), &to)?;
@@ -134,7 +138,10 @@ impl Bus {
             to.vitals.begin("the task that forwards map changes"),
         ));
         let subscribers = inbox::subscribe(&session, &keys, &to, &outbox).await?;
+        let asked = link.clone().map_or((endpoint.clone(), None), |(at, link)| (at, Some(link)));
+        let (pings, pinger) = ping::answer_pings(&session, &keys, &to, asked).await?;
         let queryables = [
+            pings,
             gaze::answer_gaze(&session, &keys, &to).await?,
             versions::answer_versions(&session, &keys, &to).await?,
             hello::answer_hellos(&session, &keys, &to).await?,
@@ -160,7 +167,8 @@ impl Bus {
             }
         };
         tracing::info!(endpoint, fleet = %config.fleet, "robots may connect");
-        Ok(Self { endpoint, session, outbox, changes, subscribers, queryables, localiser, gate })
+        let pinger = Some(pinger);
+        Ok(Self { endpoint, session, outbox, changes, subscribers, queryables, pinger, localiser, gate })
     }
 
     /// Where robots connect, with the real port.
@@ -171,6 +179,11 @@ impl Bus {
     /// The session of the router, for robots of other middleware.
     pub(crate) fn session(&self) -> &zenoh::Session {
         &self.session
+    }
+
+    /// Who asks the server itself. Taken once.
+    pub(crate) fn take_pinger(&mut self) -> Option<Pinger> {
+        self.pinger.take()
     }
 
     /// Where answers and poses are put.
@@ -209,7 +222,7 @@ fn plain(config: &Config, listen: Vec<String>) -> RouterSettings<'_> {
 }
 
 /// The server's own router behind a gate: it listens for the gate, and on the plain endpoint of the settings.
-async fn linked(config: &Config) -> Result<(zenoh::Session, (String, LinkCertificates)), BusError> {
+async fn linked(config: &Config) -> Result<(zenoh::Session, (String, Arc<LinkCertificates>)), BusError> {
     let endpoint = router::endpoint("tls/127.0.0.1:0")?;
     let made = LinkCertificates::new(now_ms());
     let link = made.map_err(|e| BusError::Listen { endpoint: endpoint.clone(), detail: e.to_string() })?;
@@ -221,7 +234,7 @@ async fn linked(config: &Config) -> Result<(zenoh::Session, (String, LinkCertifi
         client: None,
     };
     let session = router::open(&RouterSettings { tls: Some(tls), ..plain(config, listen) }).await?;
-    Ok((session, (endpoint, link)))
+    Ok((session, (endpoint, Arc::new(link))))
 }
 
 /// A zenoh callback that catches panics: a panic would end the task that receives from a robot. `kind` names the message.

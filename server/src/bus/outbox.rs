@@ -6,6 +6,7 @@
 
 use super::{BusError, Receivers};
 use engine::{
+    heartbeats::Heartbeat,
     panics::{Edge, Panics},
     slots::SlotKey,
     workers::Publish,
@@ -33,15 +34,23 @@ struct OutgoingMessage {
     priority: Priority,
 }
 
+enum Queued {
+    Message(OutgoingMessage),
+    /// Shows that the thread goes on.
+    Probe,
+}
+
 /// Puts answers, poses and map changes on zenoh.
 #[derive(Clone)]
 pub struct Outbox {
     keys: Keys,
     /// Who may get messages.
     to: Receivers,
-    queue: Arc<Mutex<Option<SyncSender<OutgoingMessage>>>>,
+    queue: Arc<Mutex<Option<SyncSender<Queued>>>>,
     thread: Arc<Mutex<Option<JoinHandle<()>>>>,
     dropped: Arc<AtomicU64>,
+    waiting: Arc<AtomicU64>,
+    heart: Arc<Heartbeat>,
 }
 
 impl std::fmt::Debug for Outbox {
@@ -54,9 +63,11 @@ impl Outbox {
     pub(super) fn start(session: zenoh::Session, keys: Keys, to: &Receivers) -> Result<Self, BusError> {
         let panics = to.vitals.panics().clone();
         let (queue, messages) = sync_channel(QUEUE);
+        let (heart, waiting) = (to.vitals.hearts().begin("the outbox"), Arc::<AtomicU64>::default());
+        let counted = (heart.clone(), waiting.clone());
         let thread = std::thread::Builder::new()
             .name("outbox".into())
-            .spawn(move || deliver(&session, &messages, &panics))
+            .spawn(move || deliver(&session, &messages, &panics, &counted))
             .map_err(|source| BusError::Thread { name: "outbox", source })?;
         Ok(Self {
             keys,
@@ -64,6 +75,8 @@ impl Outbox {
             queue: Arc::new(Mutex::new(Some(queue))),
             thread: Arc::new(Mutex::new(Some(thread))),
             dropped: Arc::default(),
+            waiting,
+            heart,
         })
     }
 
@@ -78,13 +91,36 @@ impl Outbox {
         self.dropped.load(Ordering::Relaxed)
     }
 
+    /// Messages that wait to be sent.
+    pub fn waiting(&self) -> u64 {
+        self.waiting.load(Ordering::Relaxed)
+    }
+
+    /// Beats with each message that is sent.
+    pub(crate) fn heart(&self) -> &Heartbeat {
+        &self.heart
+    }
+
+    /// Has the sending thread beat, once what waits before is sent.
+    pub(crate) fn probe(&self) {
+        let queue = self.queue.lock().unwrap_or_else(PoisonError::into_inner);
+        self.waiting.fetch_add(1, Ordering::Relaxed);
+        // A full queue beats by its messages, and one that is drained needs no probe.
+        if queue.as_ref().is_none_or(|queue| queue.try_send(Queued::Probe).is_err()) {
+            self.waiting.fetch_sub(1, Ordering::Relaxed);
+        }
+    }
+
     pub(super) fn send(&self, key: &Key, message: &impl Message) {
         let priority =
             if matches!(key, Key::MapChanged(_)) { Priority::Data } else { Priority::InteractiveHigh };
         let message = OutgoingMessage { key: self.keys.build(key), bytes: message.encode_to_vec(), priority };
         let queue = self.queue.lock().unwrap_or_else(PoisonError::into_inner);
-        let sent = queue.as_ref().is_some_and(|queue| queue.try_send(message).is_ok());
+        // Counted first: the thread may have sent it before this one goes on.
+        self.waiting.fetch_add(1, Ordering::Relaxed);
+        let sent = queue.as_ref().is_some_and(|queue| queue.try_send(Queued::Message(message)).is_ok());
         if !sent {
+            self.waiting.fetch_sub(1, Ordering::Relaxed);
             self.dropped.fetch_add(1, Ordering::Relaxed);
         }
     }
@@ -116,8 +152,16 @@ impl Publish for Outbox {
     }
 }
 
-fn deliver(session: &zenoh::Session, messages: &Receiver<OutgoingMessage>, panics: &Panics) {
-    for OutgoingMessage { key, bytes, priority } in messages {
+fn deliver(
+    session: &zenoh::Session,
+    messages: &Receiver<Queued>,
+    panics: &Panics,
+    (heart, waiting): &(Arc<Heartbeat>, Arc<AtomicU64>),
+) {
+    for queued in messages {
+        waiting.fetch_sub(1, Ordering::Relaxed);
+        heart.beat();
+        let Queued::Message(OutgoingMessage { key, bytes, priority }) = queued else { continue };
         let put = || {
             let put = session.put(key.as_str(), bytes).express(true);
             put.congestion_control(CongestionControl::Drop).priority(priority).wait()

@@ -6,8 +6,8 @@ use base64::{Engine as _, prelude::BASE64_STANDARD};
 use serde_json::{Value, json};
 use std::{net::TcpListener, time::Duration};
 
-/// Sessions beyond the robots: tools and a second connection while the first times out.
-const SPARE_SESSIONS: usize = 8;
+/// Sessions beyond the robots: tools, a second connection while the first times out, and the server's own probe.
+const SPARE_SESSIONS: usize = 9;
 /// Room for keys and headers besides the largest frame.
 const MESSAGE_SPARE_BYTES: usize = 64 << 10;
 /// A robot whose link is silent for so long is gone.
@@ -68,6 +68,26 @@ pub(super) async fn open(settings: &RouterSettings<'_>) -> Result<zenoh::Session
         Ok(opened) => opened.map_err(|e| fault(e.to_string())),
         Err(_) => Err(fault(format!("not open after {OPEN_TIMEOUT:?}"))),
     }
+}
+
+/// Opens a client of a router of this process.
+pub(super) async fn open_client(
+    endpoint: &str,
+    tls: Option<&RouterTls<'_>>,
+) -> Result<zenoh::Session, BusError> {
+    let fault = |detail: String| BusError::Listen { endpoint: endpoint.to_owned(), detail };
+    let mut config = json!({
+        "mode": "client",
+        "connect": { "endpoints": [endpoint], "timeout_ms": OPEN_TIMEOUT.as_millis() as u64 },
+        "scouting": { "delay": 0, "multicast": { "enabled": false }, "gossip": { "enabled": false } },
+        "adminspace": { "enabled": false },
+        "transport": { "link": { "tx": { "lease": LEASE_MS } }, "shared_memory": { "enabled": false } },
+    });
+    if let Some(tls) = tls {
+        config["transport"]["link"]["tls"] = tls_config(tls);
+    }
+    let config = zenoh::Config::from_json5(&config.to_string()).map_err(|e| fault(e.to_string()))?;
+    zenoh::open(config).await.map_err(|e| fault(e.to_string()))
 }
 
 fn config(settings: &RouterSettings<'_>) -> zenoh::Result<zenoh::Config> {
@@ -154,7 +174,7 @@ mod tests {
     #[test]
     fn the_settings_are_understood() {
         let config = config(&plain("tcp/127.0.0.1:7447")).unwrap();
-        assert_eq!(config.get_json("transport/unicast/max_sessions").unwrap(), "18");
+        assert_eq!(config.get_json("transport/unicast/max_sessions").unwrap(), "19");
         assert_eq!(config.get_json("transport/link/rx/max_message_size").unwrap(), "66536");
         let of_queue =
             |setting: &str| config.get_json(&format!("transport/link/tx/queue/{setting}")).unwrap();

@@ -315,3 +315,45 @@ fn a_callback_that_panics_is_counted_and_receives_on() {
     assert_eq!(*received.lock().unwrap(), [1, 3]);
     assert_eq!((vitals.panics().at(Edge::Message), vitals.failure()), (1, None));
 }
+
+/// A callback on the sending thread's own way: what it sends is never taken.
+#[tokio::test(flavor = "multi_thread")]
+async fn an_outbox_whose_thread_is_held_stalls() {
+    let engine = scene::engine(&[Arc::new(MapSnapshot::empty("hall", 1))]);
+    let running = running(engine, 1).await;
+    let (release, held) = std::sync::mpsc::channel::<()>();
+    let held = std::sync::Mutex::new(held);
+    let blocking = move |_| {
+        held.lock().unwrap().recv().ok();
+    };
+    let keys = Keys::new(&Name::new("test").unwrap());
+    let planted =
+        running.bus.session().declare_subscriber(keys.all_poses()).callback(blocking).await.unwrap();
+    let (outbox, hearts) = (running.bus.outbox().clone(), running.engine.vitals.clone());
+    outbox.heart().beat();
+    let beats_again = || {
+        outbox.probe();
+        hearts.hearts().tick(Duration::from_secs(1));
+        outbox.heart().still() == Duration::ZERO
+    };
+    let until = std::time::Instant::now() + WAIT;
+    hearts.hearts().tick(Duration::from_secs(1));
+    while !beats_again() {
+        assert!(std::time::Instant::now() < until, "it does not beat by probes");
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+    outbox.send(&Key::Pose(Name::new("r1").unwrap()), &v1::RobotPose::default());
+    while hearts.stalled().is_none_or(|heart| heart.part() != "the outbox") {
+        beats_again();
+        assert!(std::time::Instant::now() < until, "it beats though its thread is held");
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+    assert!(outbox.waiting() > 0);
+    drop(release);
+    while !beats_again() {
+        assert!(std::time::Instant::now() < until, "it does not go on");
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+    planted.undeclare().await.unwrap();
+    running.stop().await;
+}

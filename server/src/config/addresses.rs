@@ -8,6 +8,11 @@ pub(super) fn is_loopback(ip: IpAddr) -> bool {
     ip.to_canonical().is_loopback()
 }
 
+/// `ADDRESS:PORT` of a setting.
+pub(super) fn socket_address(field: &'static str, text: &str) -> Result<SocketAddr, ConfigError> {
+    text.parse().map_err(|e| invalid(field, format!("`{text}` is not ADDRESS:PORT ({e})")))
+}
+
 /// Where robots connect if the settings do not say.
 pub(super) fn zenoh_endpoint(asked: String, is_tls: bool) -> String {
     let default = if is_tls { "tls/127.0.0.1:7447" } else { "tcp/127.0.0.1:7447" };

@@ -13,7 +13,7 @@ use super::{
 use crate::config::Limits;
 use axum::{
     body::HttpBody,
-    extract::{Request, State},
+    extract::{MatchedPath, Request, State},
     http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, header},
     middleware::Next,
     response::{IntoResponse, Response},
@@ -23,6 +23,7 @@ use std::{
     net::IpAddr,
     time::{Duration, Instant},
 };
+use tracing::Instrument as _;
 
 /// Headers of an answer with a body, about.
 const MOST_HEADERS: usize = 12;
@@ -51,18 +52,23 @@ pub(super) async fn guard(State(app): State<AppState>, mut request: Request, nex
         Err(error) => error.into_response(),
         Ok(()) => match reused_answers::kept(&app, &request) {
             Some(response) => response,
-            None => match tokio::time::timeout(deadline, placed(&app, request, next)).await {
+            None => match tokio::time::timeout(deadline, placed(&app, request, next).instrument(span(&id)))
+                .await
+            {
                 Ok(response) => response,
                 Err(_elapsed) => timed_out(&method, deadline).into_response(),
             },
         },
     };
-    let ms = started.elapsed().as_secs_f64() * 1e3;
-    let (status, path) = (response.status(), uri.path());
+    let took = started.elapsed();
+    let (status, path, ms) = (response.status(), uri.path(), took.as_secs_f64() * 1e3);
+    let route = response.extensions().get::<MatchedPath>().map(MatchedPath::as_str);
+    let route = route.or_else(|| reused_answers::template(path));
+    app.http_times.add(method.as_str(), route, status.as_u16(), took);
     if is_change(&method, status) {
-        tracing::info!(id = ?id, %method, path, status = status.as_u16(), ms, "changed");
+        tracing::info!(id = id.to_str().unwrap_or_default(), %method, path, status = status.as_u16(), ms, "changed");
     } else {
-        tracing::debug!(id = ?id, %method, path, status = status.as_u16(), ms, "request");
+        tracing::debug!(id = id.to_str().unwrap_or_default(), %method, path, status = status.as_u16(), ms, "request");
     }
     let docs = path.starts_with("/api/docs");
     let headers = response.headers_mut();
@@ -74,6 +80,11 @@ pub(super) async fn guard(State(app): State<AppState>, mut request: Request, nex
     headers.insert(header::REFERRER_POLICY, HeaderValue::from_static("no-referrer"));
     headers.insert("cross-origin-resource-policy", HeaderValue::from_static("same-origin"));
     response
+}
+
+/// Everything that is logged for a request has its id.
+fn span(id: &HeaderValue) -> tracing::Span {
+    tracing::info_span!("request", id = id.to_str().unwrap_or_default())
 }
 
 /// A bundle of a map is large: its way takes longer than that of other requests.

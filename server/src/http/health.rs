@@ -3,7 +3,7 @@
 use super::{AppState, error::ApiError};
 use crate::store::WRITER;
 use axum::{Json, extract::State, http::StatusCode};
-use engine::{panics::Edge, vitals::Failure};
+use engine::{heartbeats::Heartbeat, panics::Edge, vitals::Failure};
 use protos::api::{Health, Problem, Readiness, Version};
 use serde_json::json;
 use utoipa_axum::{router::OpenApiRouter, routes};
@@ -18,14 +18,17 @@ async fn healthz() -> Json<Health> {
     Json(Health { status: "ok".to_owned() })
 }
 
-/// Every part of the server runs and the database answers. 503 with the `part` that has ended: the process is about to end
-/// with an error, too.
+/// Every part of the server runs and goes on, and the database answers. 503 with the `part` that has ended or stands still:
+/// the process is about to end with an error, too, unless the part goes on again.
 #[utoipa::path(get, path = "/readyz", tag = "health", responses((status = 200, body = Readiness),
-    (status = 503, body = Problem, description = "storage_failed, part_ended")))]
+    (status = 503, body = Problem, description = "storage_failed, part_ended, part_stalled")))]
 async fn readyz(State(app): State<AppState>) -> Result<Json<Readiness>, ApiError> {
     let vitals = app.store.vitals();
     if let Some(failure) = vitals.failure() {
         return Err(not_ready(&failure));
+    }
+    if let Some(heart) = vitals.stalled() {
+        return Err(stalled(&heart, app.config.limits.stalled_s));
     }
     crate::store::maps::page(app.store.reads(), "", 1).await?;
     let maps_not_in_use = vitals.all_unpublished();
@@ -36,7 +39,18 @@ async fn readyz(State(app): State<AppState>) -> Result<Json<Readiness>, ApiError
     let status = if is_degraded { "degraded" } else { "ready" };
     let panics =
         Edge::ALL.into_iter().map(|edge| (edge.name().to_owned(), vitals.panics().at(edge))).collect();
-    Ok(Json(Readiness { status: status.to_owned(), maps_not_in_use, damaged_pictures, backup, panics }))
+    let hearts = vitals.hearts().all();
+    let parts_still_s =
+        hearts.iter().map(|heart| (heart.part().to_owned(), heart.still().as_secs())).collect();
+    let status = status.to_owned();
+    Ok(Json(Readiness { status, maps_not_in_use, damaged_pictures, backup, parts_still_s, panics }))
+}
+
+fn stalled(heart: &Heartbeat, limit_s: u64) -> ApiError {
+    let (part, still_s) = (heart.part(), heart.still().as_secs());
+    let detail =
+        format!("{part} has not gone on for {still_s} s; after {limit_s} s the server ends with an error");
+    ApiError::new(StatusCode::SERVICE_UNAVAILABLE, "part_stalled", detail).with("part", json!(part))
 }
 
 fn not_ready(failure: &Failure) -> ApiError {

@@ -30,6 +30,7 @@ mod live;
 mod localise;
 mod mapping;
 mod maps;
+mod metrics;
 mod modalities;
 mod page_session;
 mod pages;
@@ -62,6 +63,7 @@ pub(crate) mod listen;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use metrics::alone as metrics_alone;
 pub(crate) use router::router;
 
 use crate::{
@@ -70,6 +72,7 @@ use crate::{
     gather::Gatherer,
     identity::Sessions,
     jobs::Jobs,
+    metrics::http_times::HttpTimes,
     publication::Catalogue,
     ros2::{Ros2, Ros2Publisher},
     store::now_ms,
@@ -77,8 +80,8 @@ use crate::{
 use authorise::Asker;
 use axum::http::StatusCode;
 use engine::{
-    kept_frames::KeptFrames, live::LiveHub, motion::MotionTracker, panics::Edge, relocalise::Relocalisers,
-    workers::Engine,
+    frame_times::FrameTimes, intake::FrameJob, kept_frames::KeptFrames, live::LiveHub, motion::MotionTracker,
+    panics::Edge, relocalise::Relocalisers, slots::Slots, workers::Engine,
 };
 use error::ApiError;
 use reused_answers::ReusedAnswers;
@@ -111,6 +114,12 @@ pub(crate) struct App {
     pub(crate) kept_frames: Arc<KeptFrames>,
     /// Where those may be that do not know.
     pub(crate) searches: Arc<Relocalisers>,
+    /// Frames that wait, and counts of all.
+    pub(crate) slots: Arc<Slots<FrameJob>>,
+    /// How long frames take.
+    pub(crate) frame_times: Arc<FrameTimes>,
+    /// How long requests take.
+    pub(crate) http_times: HttpTimes,
     /// Robots of ROS 2.
     pub(crate) ros2: Arc<Ros2>,
     /// Where poses go that were not asked for by a message; absent without a bus.
@@ -165,6 +174,7 @@ impl App {
         let streams = Arc::new(Semaphore::new(config.limits.streams));
         let uploads = Semaphore::new(config.limits.uploads);
         let (live, motion) = (engine.live.clone(), engine.motion.clone());
+        let (slots, frame_times) = (engine.slots.clone(), engine.times.clone());
         let (searches, kept_frames) = (engine.relocalisers.clone(), engine.kept_frames.clone());
         Self {
             config,
@@ -175,6 +185,9 @@ impl App {
             motion,
             kept_frames,
             searches,
+            slots,
+            frame_times,
+            http_times: HttpTimes::default(),
             ros2,
             publisher,
             sessions,

@@ -32,6 +32,14 @@ const REUSED: [&str; 5] = [
     "/maps/{map}/walls",
     "/whoami",
 ];
+/// The same as the router writes them.
+const ROUTES: [&str; 5] = [
+    "/api/v1/maps/{map}",
+    "/api/v1/maps/{map}/landmarks",
+    "/api/v1/maps/{map}/landmarks/{landmark}",
+    "/api/v1/maps/{map}/walls",
+    "/api/v1/whoami",
+];
 /// How their paths begin.
 const BEGINNINGS: [&str; 2] = ["/maps/", "/whoami"];
 /// Larger answers are made anew, bytes: they are sent rarely, and cost more to send than to make.
@@ -120,6 +128,17 @@ pub(super) fn kept(app: &AppState, request: &Request) -> Option<Response> {
     let token = app.store.tokens().principal_of(token, now_ms()).ok()?.token;
     let question = Question { token, path_and_query: request.uri().path_and_query()?.as_str().to_owned() };
     Some(app.reused.get(stamp(app), &question)?.into_response())
+}
+
+/// The route of an answer that is given before the request has found it, as the router writes it.
+pub(super) fn template(path: &str) -> Option<&'static str> {
+    let path = path.strip_prefix(API)?;
+    let fits = |route: &str| {
+        let pairs = || route.split('/').zip(path.split('/'));
+        let is_as_long = route.split('/').count() == path.split('/').count();
+        is_as_long && pairs().all(|(a, b)| a == b || a.starts_with('{'))
+    };
+    ROUTES.into_iter().find(|route| fits(&route[API.len()..]))
 }
 
 /// Answers a read of a map as before if nothing has changed; lets everything else pass.

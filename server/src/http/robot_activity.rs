@@ -22,8 +22,9 @@ fn ms(ago: Duration) -> u64 {
 /// What a robot has done.
 pub(super) fn activity_shown(live: &LiveHub, robot: &Name, now: Instant) -> Option<api::RobotActivity> {
     let activity = live.activity(robot, now)?;
-    let RobotActivity { answered, refused, last_refusal, last_message, last_recognised, frames_per_s } =
-        activity;
+    let RobotActivity {
+        answered, refused, last_refusal, last_message, last_recognised, frames_per_s, ..
+    } = activity;
     let refusal = |RefusedFrame { code, field, detail, ago }| api::RefusedFrame {
         code,
         field,

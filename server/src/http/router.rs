@@ -6,15 +6,15 @@ use super::{
     events,
     examples::with_examples,
     gathering, guard, health, history, landmark_models, landmarks, learning, live, localise, mapping, maps,
-    modalities, page_session, pages, pose_by_hand, recognise, reference_runs, refused_views, relocalisation,
-    replay, reused_answers, revision, robot_activity, robot_certificates, robots, ros2,
+    metrics, modalities, page_session, pages, pose_by_hand, recognise, reference_runs, refused_views,
+    relocalisation, replay, reused_answers, revision, robot_activity, robot_certificates, robots, ros2,
     security::with_security,
     stored_answers, tokens, underlay, views, visibility, visibility_settings, walls,
 };
 use crate::config::Limits;
 use axum::{
     Json, Router,
-    extract::{Request, State},
+    extract::{MatchedPath, Request, State},
     http::StatusCode,
     middleware::{Next, from_fn_with_state},
     response::{IntoResponse, Response},
@@ -77,6 +77,7 @@ fn api(limits: &Limits) -> OpenApiRouter<AppState> {
         .merge(audit::router())
         .merge(page_session::api())
         .merge(health::router())
+        .merge(metrics::router())
 }
 
 /// Routes and their OpenAPI document.
@@ -89,14 +90,15 @@ pub(super) fn parts(limits: &Limits) -> (Router<AppState>, openapi::OpenApi) {
 }
 
 /// The whole service.
-pub(crate) fn router(app: App) -> Router {
-    let app = Arc::new(app);
+pub(crate) fn router(app: &Arc<App>) -> Router {
+    let app = app.clone();
     let panics = app.store.vitals().panics().clone();
     let (routes, document) = parts(&app.config.limits);
     let (health, _) = health::router().split_for_parts();
     let config = utoipa_swagger_ui::Config::from(format!("{API}/openapi.json"));
     let docs: Router<AppState> = SwaggerUi::new("/api/docs").config(config).into();
     let router = routes
+        .merge(metrics::at_root())
         .route_layer(from_fn_with_state(app.clone(), operation))
         .route(&format!("{API}/openapi.json"), get(move || async move { Json(document) }))
         .merge(health)
@@ -116,12 +118,22 @@ pub(crate) fn router(app: App) -> Router {
 
 /// Around every operation. One layer and not three: each layer copies all that is below it, for each request.
 async fn operation(State(app): State<AppState>, request: Request, next: Next) -> Response {
-    let (request, actor) = match authorise::authorise(&app, request).await {
+    let route = request.extensions().get::<MatchedPath>().cloned();
+    let mut response = admitted(&app, request, next).await;
+    if let Some(route) = route {
+        // For the guard, which knows no routes.
+        response.extensions_mut().insert(route);
+    }
+    response
+}
+
+async fn admitted(app: &AppState, request: Request, next: Next) -> Response {
+    let (request, actor) = match authorise::authorise(app, request).await {
         Ok(admitted) => admitted,
         Err(refused) => return *refused,
     };
-    let Some(actor) = actor else { return reused_answers::reused(&app, request, next).await };
-    actor.scope(creation::keyed(&app, request, next)).await
+    let Some(actor) = actor else { return reused_answers::reused(app, request, next).await };
+    actor.scope(creation::keyed(app, request, next)).await
 }
 
 fn panicked(panics: &Panics, cause: &(dyn Any + Send)) -> Response {

@@ -5,6 +5,7 @@ mod creation;
 mod earlier_build;
 mod events;
 mod lists;
+mod metrics;
 mod localise;
 mod openapi;
 mod page_sessions;
@@ -100,7 +101,8 @@ impl Service {
         let secret = Secret::random().unwrap();
         store.tokens().set_local(&secret);
         let local = TokenText::local(80, &secret);
-        Self { router: router(app), store, engine, local, _writer: writer, _stop: stop, _data: data }
+        let router = router(&Arc::new(app));
+        Self { router, store, engine, local, _writer: writer, _stop: stop, _data: data }
     }
 
     /// Asks with the local token, unless the request says who asks.

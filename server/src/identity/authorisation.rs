@@ -73,6 +73,8 @@ pub(crate) const TABLE: &[Rule] = &[
     open("GET", "/healthz"),
     open("GET", "/readyz"),
     open("GET", "/version"),
+    // It tells of all robots and maps at once.
+    server("GET", "/metrics", Viewer),
     own("GET", "/whoami", Viewer),
     own("POST", "/session/links", Viewer),
     server("GET", "/tokens", Admin),

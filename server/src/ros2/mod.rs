@@ -117,6 +117,13 @@ pub struct Ros2Publisher {
     ros2: Arc<Ros2>,
 }
 
+impl Ros2Publisher {
+    /// Where what is not for robots of ROS alone goes.
+    pub(crate) fn outbox(&self) -> &Outbox {
+        &self.outbox
+    }
+}
+
 impl Publish for Ros2Publisher {
     fn answer(&self, key: &SlotKey, answer: &v1::Answer) {
         self.outbox.answer(key, answer);

@@ -50,7 +50,7 @@ pub(crate) use open::OpenError;
 pub(crate) use writer::{PART as WRITER, Tx};
 
 use crate::config::Config;
-use engine::vitals::Vitals;
+use engine::{heartbeats::Heartbeat, vitals::Vitals};
 use futures::future::BoxFuture;
 use protos::api::AuditHead;
 use sha2::{Digest as _, Sha256};
@@ -61,7 +61,7 @@ use std::{
         Arc,
         atomic::{AtomicU64, Ordering},
     },
-    time::SystemTime,
+    time::{Duration, Instant, SystemTime},
 };
 use tokio::sync::{Mutex, MutexGuard, Notify, mpsc, oneshot};
 
@@ -80,6 +80,18 @@ pub(crate) struct Store {
     kept_answers: usize,
     /// Most entries of the audit log.
     audit_entries: usize,
+    heart: Arc<Heartbeat>,
+    /// Wait of the last probe, ms.
+    probe_ms: Arc<AtomicU64>,
+}
+
+/// What waits for the writer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct WriteQueue {
+    /// Commands.
+    pub(crate) waiting: usize,
+    /// How long the last probe waited.
+    pub(crate) last_wait: Duration,
 }
 
 /// Awaited so that the file is closed in good order.
@@ -132,14 +144,28 @@ impl Store {
         let (commands, received) = mpsc::channel(config.limits.write_queue);
         let commits = Arc::<AtomicU64>::default();
         let parts = (on_commit, vitals.clone(), jobs.clone(), commits.clone());
-        let writer = writer::Writer::new(conn, received, history, parts);
+        let heart = vitals.hearts().begin(WRITER);
+        let writer = writer::Writer::new(conn, received, history, parts, heart.clone());
         let (close, closed) = oneshot::channel();
         let task = tokio::spawn(writer.run(closed, vitals.begin(WRITER)));
         let task = WriterTask { task, close, reads: opened.reads.clone(), _lock: opened.lock };
         let (turn, keys) = (Arc::default(), kept_answers::KeysAtWork::default());
         let (kept_answers, audit_entries) = (config.limits.kept_answers, config.limits.audit_entries);
-        let reads = opened.reads;
-        Ok((Self { commands, reads, vitals, jobs, commits, turn, keys, kept_answers, audit_entries }, task))
+        let (reads, probe_ms) = (opened.reads, Arc::default());
+        let store = Self {
+            commands,
+            reads,
+            vitals,
+            jobs,
+            commits,
+            turn,
+            keys,
+            kept_answers,
+            audit_entries,
+            heart,
+            probe_ms,
+        };
+        Ok((store, task))
     }
 
     /// Runs `write` in its own transaction. When this returns `Ok`, it is committed and visible. A caller that drops this
@@ -161,6 +187,27 @@ impl Store {
         let answer = answer.await;
         drop(caller);
         answer.map_err(|_gone| StoreError::Closed)?
+    }
+
+    /// Returns when the writer has done what was asked for before. Writes nothing.
+    pub(crate) async fn probe(&self) -> Result<(), StoreError> {
+        let asked = Instant::now();
+        let (reply, answer) = oneshot::channel();
+        self.commands.send(writer::Command::Probe(reply)).await.map_err(|_gone| StoreError::Closed)?;
+        answer.await.map_err(|_gone| StoreError::Closed)?;
+        self.probe_ms.store(asked.elapsed().as_millis() as u64, Ordering::Relaxed);
+        Ok(())
+    }
+
+    /// Beats while the writer goes on.
+    pub(crate) fn heart(&self) -> &Heartbeat {
+        &self.heart
+    }
+
+    /// What waits for the writer.
+    pub(crate) fn queue(&self) -> WriteQueue {
+        let waiting = self.commands.max_capacity() - self.commands.capacity();
+        WriteQueue { waiting, last_wait: Duration::from_millis(self.probe_ms.load(Ordering::Relaxed)) }
     }
 
     /// The turn to prepare a write from stored data: one at a time, so that no preparation makes another obsolete.

@@ -19,6 +19,7 @@ use super::{
     on_commit::{CommittedChange, OnCommit},
 };
 use engine::{
+    heartbeats::Heartbeat,
     panics::Edge,
     vitals::{Pulse, Vitals},
 };
@@ -78,19 +79,26 @@ impl Tx {
 type Acknowledge = Box<dyn FnOnce(Result<(), StoreError>) + Send>;
 
 /// The outcome of a write's closure. `acknowledge` holds its value or error until the transaction has ended.
-struct WriteOutcome {
+pub(super) struct WriteOutcome {
     keep: bool,
     fatal: bool,
     panic: Option<Box<dyn Any + Send>>,
     acknowledge: Acknowledge,
 }
 
-type Run = Box<dyn for<'t> FnOnce(&'t mut Tx) -> BoxFuture<'t, WriteOutcome> + Send>;
+pub(super) type Run = Box<dyn for<'t> FnOnce(&'t mut Tx) -> BoxFuture<'t, WriteOutcome> + Send>;
 
-/// A write on its way to the writer.
-pub(super) struct Command {
-    run: Run,
-    caller: Weak<()>,
+/// What is on its way to the writer.
+pub(super) enum Command {
+    /// A write.
+    Write {
+        /// What it does.
+        run: Run,
+        /// It is wanted for as long as this is there.
+        caller: Weak<()>,
+    },
+    /// Shows that the writer goes on; writes nothing.
+    Probe(oneshot::Sender<()>),
 }
 
 /// What goes into the transaction of a write besides its change.
@@ -145,7 +153,7 @@ where
             WriteOutcome { keep, fatal, panic, acknowledge }
         })
     });
-    (Command { run, caller: Arc::downgrade(caller) }, answer)
+    (Command::Write { run, caller: Arc::downgrade(caller) }, answer)
 }
 
 /// Writes the audit log: of every change that somebody asked for, and of what the server changes for all to see.
@@ -168,7 +176,12 @@ pub(super) struct Writer {
     jobs: Arc<Notify>,
     /// Counts what was committed.
     commits: Arc<AtomicU64>,
+    /// Beats by probes, and by what the database does for a long write.
+    heart: Arc<Heartbeat>,
 }
+
+/// Steps of the database's machine between two beats: a beat costs a thousandth of them.
+const STEPS_A_BEAT: i32 = 1000;
 
 /// Its name among the parts of the server.
 pub(crate) const PART: &str = "the writer of the store";
@@ -179,14 +192,19 @@ impl Writer {
         commands: mpsc::Receiver<Command>,
         history: HistoryLimits,
         (on_commit, vitals, jobs, commits): (Arc<dyn OnCommit>, Arc<Vitals>, Arc<Notify>, Arc<AtomicU64>),
+        heart: Arc<Heartbeat>,
     ) -> Self {
         let tx = Tx { conn, author: Author::default(), history, changes: Vec::new(), after: Vec::new() };
-        Self { tx, commands, on_commit, vitals, jobs, commits }
+        Self { tx, commands, on_commit, vitals, jobs, commits, heart }
     }
 
     /// Runs until told to close and what is queued is done, or until an error after which nothing may be written.
     pub(super) async fn run(mut self, mut close: oneshot::Receiver<()>, pulse: Pulse) {
         let mut open = true;
+        if let Err(error) = beat_with(&mut self.tx.conn, &self.heart).await {
+            tracing::error!(%error, "store_failed: no more writes");
+            return self.vitals.fail(PART, error.to_string());
+        }
         loop {
             let command = tokio::select! {
                 biased;
@@ -217,14 +235,23 @@ impl Writer {
     }
 
     async fn one(&mut self, command: Command) -> Result<(), StoreError> {
-        if command.caller.strong_count() == 0 {
+        let (run, caller) = match command {
+            Command::Write { run, caller } => (run, caller),
+            Command::Probe(answer) => {
+                self.heart.beat();
+                // An error means that nobody waits for it any more.
+                answer.send(()).ok();
+                return Ok(());
+            }
+        };
+        if caller.strong_count() == 0 {
             tracing::debug!("write_skipped: its caller has gone");
             return Ok(());
         }
         self.tx.changes.clear();
         self.tx.after.clear();
         self.execute("BEGIN IMMEDIATE", "begin").await?;
-        let outcome = (command.run)(&mut self.tx).await;
+        let outcome = run(&mut self.tx).await;
         if let Some(cause) = &outcome.panic {
             let follows = "it is rolled back; other writes go on";
             self.vitals.panics().caught(Edge::Write, cause.as_ref(), "a write", follows);
@@ -293,6 +320,17 @@ impl Writer {
         sqlx::raw_sql(sql).execute(&mut self.tx.conn).await.map_err(StoreError::during(operation))?;
         Ok(())
     }
+}
+
+/// Has a long statement beat: it is at work, and not stuck.
+async fn beat_with(conn: &mut SqliteConnection, heart: &Arc<Heartbeat>) -> Result<(), StoreError> {
+    let heart = heart.clone();
+    let mut handle = conn.lock_handle().await.map_err(StoreError::during("watch"))?;
+    handle.set_progress_handler(STEPS_A_BEAT, move || {
+        heart.beat();
+        true
+    });
+    Ok(())
 }
 
 /// Moves the write-ahead log into the file and empties it, so that the file alone is complete. Closing the connection does

@@ -1307,6 +1307,23 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/metrics": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** Metrics in the text format of Prometheus 0.0.4, or of `OpenMetrics` 1.0 where `Accept` names it. Also at `/metrics`. */
+        get: operations["metrics"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/readyz": {
         parameters: {
             query?: never;
@@ -1315,8 +1332,8 @@ export interface paths {
             cookie?: never;
         };
         /**
-         * Every part of the server runs and the database answers. 503 with the `part` that has ended: the process is about to end
-         *     with an error, too.
+         * Every part of the server runs and goes on, and the database answers. 503 with the `part` that has ended or stands still:
+         *     the process is about to end with an error, too, unless the part goes on again.
          */
         get: operations["readyz"];
         put?: never;
@@ -4372,6 +4389,10 @@ export interface components {
              *     the log. Anything but 0 is a fault of the program.
              */
             panics: {
+                [key: string]: number;
+            };
+            /** @description For how many seconds each part that has work, or is probed, has not gone on. Beyond a few the server is not ready. */
+            parts_still_s?: {
                 [key: string]: number;
             };
             /**
@@ -15271,6 +15292,71 @@ export interface operations {
             };
         };
     };
+    metrics: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "text/plain": string;
+                    "application/openmetrics-text": string;
+                };
+            };
+            /** @description unauthenticated: the role viewer is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description host_not_allowed, origin_not_allowed; forbidden: less than the role viewer, for all maps; page_header_missing */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description timeout; `may_be_done: true` if it is a change that had begun */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description internal; not_published, with `may_be_done: true` */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description busy, storage_failed */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
     readyz: {
         parameters: {
             query?: never;
@@ -15315,7 +15401,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_failed, part_ended, busy */
+            /** @description storage_failed, part_ended, part_stalled, busy */
             503: {
                 headers: {
                     [name: string]: unknown;

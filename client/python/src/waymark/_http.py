@@ -64,6 +64,7 @@ OPERATIONS: dict[str, tuple[str, str]] = {
     "health": ("GET", "/healthz"),
     "readiness": ("GET", "/readyz"),
     "version": ("GET", "/version"),
+    "metrics": ("GET", "/metrics"),
     "add_landmarks": ("POST", "/maps/{map}/bulk/create-landmarks"),
     "delete_landmarks": ("POST", "/maps/{map}/bulk/delete-landmarks"),
     "jobs": ("GET", "/jobs"),

@@ -65,6 +65,10 @@ class AsyncMaps(AsyncBase):
         """Version of the server."""
         return await self._send(Version, "version")
 
+    async def metrics(self) -> str:
+        """Metrics of the server, in the text format of Prometheus."""
+        return (await self._bytes("metrics")).decode()
+
     async def make_backup(self) -> Backup:
         """Begins a backup in the server's data directory; `backup` tells how far it is."""
         return await self._send(Backup, "make_backup")

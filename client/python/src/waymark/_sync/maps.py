@@ -66,6 +66,10 @@ class Maps(Base):
         """Version of the server."""
         return self._send(Version, "version")
 
+    def metrics(self) -> str:
+        """Metrics of the server, in the text format of Prometheus."""
+        return (self._bytes("metrics")).decode()
+
     def make_backup(self) -> Backup:
         """Begins a backup in the server's data directory; `backup` tells how far it is."""
         return self._send(Backup, "make_backup")

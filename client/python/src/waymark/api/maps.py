@@ -140,6 +140,7 @@ class Readiness:
     panics: dict[str, int]
     damaged_pictures: tuple[str, ...] = ()
     backup: BackupHealth | None = None
+    parts_still_s: dict[str, int] | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,38 @@
+//! `GET /metrics`: for Prometheus, in its text format or that of `OpenMetrics`. Also below `/api/v1`, and on a listener of its
+//! own if the settings name one.
+
+use super::{App, AppState, error::ApiError, guard};
+use crate::metrics::{self, exposition::Format};
+use axum::{
+    Router,
+    extract::State,
+    http::{HeaderMap, header},
+    middleware::from_fn_with_state,
+    response::{IntoResponse, Response},
+    routing::get,
+};
+use std::sync::Arc;
+use utoipa_axum::{router::OpenApiRouter, routes};
+
+pub(super) fn router() -> OpenApiRouter<AppState> {
+    OpenApiRouter::new().routes(routes!(metrics))
+}
+
+/// The same where Prometheus looks for it.
+pub(super) fn at_root() -> Router<AppState> {
+    Router::new().route("/metrics", get(metrics))
+}
+
+/// A service of metrics alone, for a listener that only trusted programs reach: it asks for no token.
+pub(crate) fn alone(app: &Arc<App>) -> Router {
+    at_root().layer(from_fn_with_state(app.clone(), guard::guard)).with_state(app.clone())
+}
+
+/// Metrics in the text format of Prometheus 0.0.4, or of `OpenMetrics` 1.0 where `Accept` names it. Also at `/metrics`.
+#[utoipa::path(get, path = "/metrics", tag = "health",
+    responses((status = 200, content((String = "text/plain"), (String = "application/openmetrics-text")))))]
+async fn metrics(State(app): State<AppState>, headers: HeaderMap) -> Result<Response, ApiError> {
+    let format = Format::of(headers.get(header::ACCEPT).and_then(|accept| accept.to_str().ok()));
+    let text = metrics::text(&app, format).await?;
+    Ok(([(header::CONTENT_TYPE, format.content_type())], text).into_response())
+}

@@ -1,0 +1,112 @@
+//! Metrics for Prometheus: what the counters of the server say at one time. In: the parts of the server. Out: the text of
+//! `GET /metrics`. Nothing is counted here but requests; names begin with `waymark_`, those of the process as exporters of
+//! Prometheus name them.
+
+pub(crate) mod exposition;
+pub(crate) mod http_times;
+pub(crate) mod process;
+mod robots;
+
+use crate::{
+    http::App,
+    store::{StoreError, jobs, now_ms},
+};
+use engine::panics::Edge;
+use exposition::{Exposition, Format};
+use std::time::Instant;
+
+/// States of jobs that are not over.
+const JOB_STATES: [&str; 2] = ["queued", "running"];
+
+/// The metrics of a server. Errors: the database does not answer.
+pub(crate) async fn text(app: &App, format: Format) -> Result<String, StoreError> {
+    let mut open_jobs = Vec::with_capacity(JOB_STATES.len());
+    for state in JOB_STATES {
+        let filter = jobs::JobFilter { state: Some(state), ..jobs::JobFilter::default() };
+        open_jobs.push((state, jobs::count(app.store.reads(), &filter).await?));
+    }
+    let (mut all, now) = (Exposition::new(format), Instant::now());
+    all.gauge("waymark_build_info", "What runs here.").value(
+        &[("version", env!("CARGO_PKG_VERSION")), ("protocol", protos::keys::PROTOCOL), ("api", "v1")],
+        1,
+    );
+    robots::write_frames(&mut all, app, now);
+    robots::write_messages(&mut all, app);
+    robots::write_robots(&mut all, app, now);
+    robots::write_maps(&mut all, app);
+    write_parts(&mut all, app);
+    let mut jobs = all.gauge("waymark_jobs", "Jobs that wait and run.");
+    for (state, count) in open_jobs {
+        jobs.value(&[("state", state)], count);
+    }
+    write_backups(&mut all, app);
+    write_requests(&mut all, app);
+    Ok(all.finish_with_process(&app.config.data).await)
+}
+
+impl Exposition {
+    /// Adds what the system says of the process, off the runtime.
+    async fn finish_with_process(mut self, data: &std::path::Path) -> String {
+        let data = data.to_owned();
+        let written = tokio::task::spawn_blocking(move || {
+            process::write(&mut self, &data);
+            self.finish()
+        });
+        // An error means that the server stops.
+        written.await.unwrap_or_default()
+    }
+}
+
+fn write_parts(all: &mut Exposition, app: &App) {
+    let vitals = app.store.vitals();
+    let is_ready = vitals.failure().is_none() && vitals.stalled().is_none();
+    all.gauge("waymark_ready", "1 while every part of the server runs and goes on.")
+        .value(&[], u8::from(is_ready));
+    let mut still = all.gauge(
+        "waymark_part_still_seconds",
+        "Time for which a part that has work, or is probed, has not gone on.",
+    );
+    for heart in vitals.hearts().all() {
+        still.value(&[("part", heart.part())], heart.still().as_secs_f64());
+    }
+    let mut panics = all.counter("waymark_panics_total", "Caught faults of the program, by where.");
+    for edge in Edge::ALL {
+        panics.value(&[("edge", edge.name())], vitals.panics().at(edge));
+    }
+    let queue = app.store.queue();
+    all.gauge("waymark_writes_waiting", "Writes that wait for the writer.").value(&[], queue.waiting);
+    all.gauge("waymark_write_wait_seconds", "Time that the last probe of the writer waited in its queue.")
+        .value(&[], queue.last_wait.as_secs_f64());
+    all.counter("waymark_commits_total", "Committed transactions.").value(&[], app.store.commits());
+    let outbox = app.publisher.as_ref().map(|publisher| publisher.outbox());
+    all.counter(
+        "waymark_messages_dropped_total",
+        "Messages to robots that were dropped: their queue was full.",
+    )
+    .known(&[], outbox.map(crate::bus::Outbox::dropped));
+    all.gauge("waymark_messages_waiting", "Messages to robots that wait to be sent.")
+        .known(&[], outbox.map(crate::bus::Outbox::waiting));
+}
+
+fn write_backups(all: &mut Exposition, app: &App) {
+    let health = app.backups.health();
+    let age = health.newest_ms.map(|made| (now_ms() - made).max(0) as f64 / 1e3);
+    all.gauge("waymark_backup_age_seconds", "Age of the newest complete backup; absent without one.")
+        .known(&[], age);
+    all.gauge("waymark_backup_interval_seconds", "Time between scheduled backups; 0: none is scheduled.")
+        .value(&[], u64::from(health.every_hours) * 3600);
+    all.gauge("waymark_backup_failed", "1 if the last backup failed.")
+        .value(&[], u8::from(health.failed.is_some()));
+}
+
+fn write_requests(all: &mut Exposition, app: &App) {
+    let mut counts = all.counter("waymark_http_requests_total", "Requests by method, route and status.");
+    for ((method, route, status), count) in app.http_times.counts() {
+        let status = status.to_string();
+        counts.value(&[("method", method), ("route", &route), ("status", &status)], count);
+    }
+    let mut times = all.histogram("waymark_http_request_duration_seconds", "Time of requests by route.");
+    for (route, copy) in app.http_times.times() {
+        times.times(&[("route", &route)], &copy);
+    }
+}

@@ -1,0 +1,110 @@
+//! The listeners of HTTP and of metrics, what is served there, and what looks after the parts of the server meanwhile.
+
+use crate::{
+    bus::{Outbox, Pinger},
+    config::{Config, Limits},
+    http::{self, App},
+    identity::certificates::Certificates,
+    live_probes::LiveProbes,
+    server::StartError,
+    store::Store,
+};
+use axum::Router;
+use engine::vitals::Pulse;
+use std::{net::SocketAddr, sync::Arc, time::Duration};
+use tokio::{net::TcpListener, sync::watch, task::JoinHandle};
+use tokio_rustls::TlsAcceptor;
+
+/// Connections of the listener for metrics at a time.
+const METRICS_CONNECTIONS: usize = 8;
+
+/// Open ports.
+pub(crate) struct Listeners {
+    http: TcpListener,
+    tls: Option<TlsAcceptor>,
+    metrics: Option<TcpListener>,
+    /// With the real port.
+    pub(crate) http_addr: SocketAddr,
+    /// The same, if metrics have a listener of their own.
+    pub(crate) metrics_addr: Option<SocketAddr>,
+}
+
+impl Listeners {
+    /// Takes the ports of the settings.
+    pub(crate) async fn open(
+        config: &Config,
+        certificates: Option<&Arc<Certificates>>,
+    ) -> Result<Self, StartError> {
+        let tls = certificates.map(|all| http::encryption::acceptor(all.current())).transpose();
+        let tls = tls.map_err(|e| StartError::Certificates(e.to_string()))?;
+        let (http, http_addr) = bind(config.http_addr).await?;
+        let metrics = match config.metrics_addr {
+            Some(addr) => Some(bind(addr).await?),
+            None => None,
+        };
+        let (metrics, metrics_addr) = metrics.unzip();
+        Ok(Self { http, tls, metrics, http_addr, metrics_addr })
+    }
+}
+
+async fn bind(addr: SocketAddr) -> Result<(TcpListener, SocketAddr), StartError> {
+    let at = |source| StartError::Http { addr, source };
+    let listener = TcpListener::bind(addr).await.map_err(at)?;
+    let real = listener.local_addr().map_err(at)?;
+    Ok((listener, real))
+}
+
+/// What is served, and the watch over the parts.
+#[derive(Debug)]
+pub(crate) struct Serving {
+    http: JoinHandle<()>,
+    metrics: Option<JoinHandle<()>>,
+    probes: LiveProbes,
+    watch: JoinHandle<()>,
+}
+
+impl Serving {
+    /// Begins to serve, to probe and to watch.
+    pub(crate) fn start(
+        listeners: Listeners,
+        app: &Arc<App>,
+        probed: (Store, Outbox, Option<Pinger>),
+        stopping: &watch::Receiver<bool>,
+    ) -> Self {
+        let (vitals, limits) = (app.store.vitals().clone(), &app.config.limits);
+        let probes = LiveProbes::start(probed, &vitals, stopping);
+        let metrics = listeners.metrics.map(|listener| {
+            let limits = Limits { connections: METRICS_CONNECTIONS, ..limits.clone() };
+            let pulse = vitals.begin("the listener for metrics");
+            serve((listener, None, pulse), http::metrics_alone(app), limits, stopping)
+        });
+        let listener = (listeners.http, listeners.tls, vitals.begin("the HTTP listener"));
+        let http = serve(listener, http::router(app), limits.clone(), stopping);
+        vitals.fail_stalled_after(Duration::from_secs(limits.stalled_s));
+        Self { http, metrics, probes, watch: tokio::spawn(vitals.watch()) }
+    }
+
+    /// Ends the probes and the watch: from now on parts end because they are told to.
+    pub(crate) async fn unwatch(&mut self) {
+        self.watch.abort();
+        self.probes.close().await;
+    }
+
+    /// What ends when the server stops.
+    pub(crate) fn tasks(self) -> impl Iterator<Item = (&'static str, JoinHandle<()>)> {
+        self.metrics.map(|task| ("metrics", task)).into_iter().chain([("HTTP", self.http)])
+    }
+}
+
+fn serve(
+    (listener, tls, pulse): (TcpListener, Option<TlsAcceptor>, Pulse),
+    router: Router,
+    limits: Limits,
+    stopping: &watch::Receiver<bool>,
+) -> JoinHandle<()> {
+    let stopping = stopping.clone();
+    tokio::spawn(async move {
+        http::listen::serve(listener, router, tls, limits, stopping).await;
+        drop(pulse);
+    })
+}
