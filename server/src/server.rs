@@ -256,7 +256,7 @@ fn serve(
     pulse: Pulse,
     stopping: watch::Receiver<bool>,
 ) -> JoinHandle<()> {
-    let (router, limits) = (http::router(app), config.limits.clone());
+    let (router, limits) = (http::router(Arc::new(app)), config.limits.clone());
     tokio::spawn(async move {
         http::listen::serve(listener, router, tls, limits, stopping).await;
         drop(pulse);

@@ -42,6 +42,7 @@ from waymark.api import (
     NewLandmark,
     Parent,
     PoseBody,
+    ReadinessCounts,
     Ros2Status,
     UploadedView,
     UploadedViews,
@@ -61,6 +62,7 @@ def hall(maps: MapClient, name: str) -> None:
 def test_the_server_says_how_it_is(server: Server) -> None:
     with server.maps() as maps:
         assert (maps.health().status, maps.readiness().status) == ("ok", "ready")
+        assert maps.readiness().counts == ReadinessCounts(0, 0)
         version = maps.version()
         assert (version.name, version.api, version.protocol) == ("waymark", "v1", "1")
 

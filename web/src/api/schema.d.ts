@@ -1315,8 +1315,10 @@ export interface paths {
             cookie?: never;
         };
         /**
-         * Every part of the server runs and the database answers. 503 with the `part` that has ended: the process is about to end
-         *     with an error, too.
+         * Every part of the server runs and the database answers. 503: a part has ended, and the process is about to end with
+         *     an error, too.
+         * @description Open to everybody, so that monitors need no token: without a valid one the answer has status and counts. A token or a
+         *     session adds the names of what its maps contain, one for all maps the part that has ended, the reason of a failed backup and the name of the newest.
          */
         get: operations["readyz"];
         put?: never;
@@ -4353,16 +4355,18 @@ export interface components {
         };
         /** @description How far the server can do its work. */
         Readiness: {
-            /** @description The newest backup, and why the last attempt failed. */
+            /** @description The newest backup, and why the last attempt failed. A token for all maps is told the name and the reason. */
             backup?: components["schemas"]["BackupHealth"];
+            /** @description How many there are of what is wrong, for whoever asks. */
+            counts?: components["schemas"]["ReadinessCounts"];
             /**
-             * @description Views, tracks and underlays whose stored picture is damaged, at most 100. The picture is not used; the same
-             *     photograph, uploaded again, mends it.
+             * @description Views, tracks and underlays whose stored picture is damaged, at most 100, of maps of the token that asks: none
+             *     without one. The picture is not used; the same photograph, uploaded again, mends it.
              */
             damaged_pictures?: string[];
             /**
              * @description Maps whose stored version cannot be made ready, with the reason: an earlier version is used, or none since the
-             *     server started. A later change of the map tries again.
+             *     server started. A later change of the map tries again. Only maps of the token that asks: none without one.
              */
             maps_not_in_use: {
                 [key: string]: string;
@@ -4374,11 +4378,21 @@ export interface components {
             panics: {
                 [key: string]: number;
             };
-            /**
-             * @description `ready`, or `degraded`: everything runs, but something is named in `maps_not_in_use` or
-             *     `damaged_pictures`, or the last scheduled backup failed.
-             */
+            /** @description `ready`, or `degraded`: everything runs, but one of `counts` is not 0, or the last scheduled backup failed. */
             status: string;
+        };
+        /** @description How many things are wrong, named or not. */
+        ReadinessCounts: {
+            /**
+             * Format: int64
+             * @description Views, tracks and underlays whose stored picture is damaged.
+             */
+            damaged_pictures: number;
+            /**
+             * Format: int64
+             * @description Maps whose stored version is not in use.
+             */
+            maps_not_in_use: number;
         };
         /** @description A recording as it stands. */
         RecordingStatusBody: {
