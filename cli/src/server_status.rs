@@ -52,9 +52,9 @@ async fn status(session: &Session) -> anyhow::Result<()> {
     let shown = json!({ "version": version, "readiness": readiness, "maps": counts.maps, "landmarks": counts.landmarks,
         "robots": counts.robots, "robots_connected": counts.connected });
     session.show(&shown, &text(&version, &readiness, &counts))?;
-    let sentence = if !readiness.maps_not_in_use.is_empty() {
+    let sentence = if readiness.counts.maps_not_in_use > 0 {
         "The server is degraded: not every map is in use."
-    } else if !readiness.damaged_pictures.is_empty() {
+    } else if readiness.counts.damaged_pictures > 0 {
         "The server is degraded: stored pictures are damaged."
     } else if readiness.status == "degraded" {
         "The server is degraded: the last scheduled backup failed."
@@ -104,6 +104,11 @@ fn text(version: &Version, readiness: &Readiness, counts: &Counts) -> String {
         lines.push("  no backup yet".to_owned());
     }
     lines.extend(failed.iter().map(|why| format!("  the last backup failed: {why}")));
+    let counts = readiness.counts;
+    let hidden = counts.maps_not_in_use.saturating_sub(readiness.maps_not_in_use.len() as u64);
+    lines.extend((hidden > 0).then(|| format!("  {} of other tokens not in use", counted(hidden, "map"))));
+    let hidden = counts.damaged_pictures.saturating_sub(readiness.damaged_pictures.len() as u64);
+    lines.extend((hidden > 0).then(|| format!("  {} not named here", counted(hidden, "damaged picture"))));
     let unused = readiness.maps_not_in_use.iter();
     lines.extend(unused.map(|(map, why)| format!("  map {map} is not in use: {why}")));
     let damaged = readiness.damaged_pictures.iter();
@@ -116,6 +121,7 @@ fn text(version: &Version, readiness: &Readiness, counts: &Counts) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use client::api::ReadinessCounts;
 
     #[test]
     fn a_status_names_maps_that_are_not_in_use_and_faults() {
@@ -128,6 +134,7 @@ mod tests {
         };
         let readiness = Readiness {
             status: "degraded".into(),
+            counts: ReadinessCounts { maps_not_in_use: 3, damaged_pictures: 1 },
             maps_not_in_use: [("office".to_owned(), "damaged".to_owned())].into(),
             damaged_pictures: vec!["view 3 of landmark door, map office".into()],
             backup: BackupHealth {
@@ -150,6 +157,8 @@ mod tests {
             lines.contains("newest backup 20261123-140530 (UTC)\n  the last backup failed: no space"),
             "{lines}"
         );
+        assert!(lines.contains("  2 maps of other tokens not in use\n"), "{lines}");
+        assert!(!lines.contains("not named here"), "{lines}");
         assert!(lines.contains("damaged picture: view 3 of landmark door, map office; "), "{lines}");
         assert!(lines.ends_with("2 faults of the program caught in a frame: see its log"), "{lines}");
     }

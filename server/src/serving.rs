@@ -79,7 +79,7 @@ impl Serving {
             serve((listener, None, pulse), http::metrics_alone(app), limits, stopping)
         });
         let listener = (listeners.http, listeners.tls, vitals.begin("the HTTP listener"));
-        let http = serve(listener, http::router(app), limits.clone(), stopping);
+        let http = serve(listener, http::router(app.clone()), limits.clone(), stopping);
         vitals.fail_stalled_after(Duration::from_secs(limits.stalled_s));
         Self { http, metrics, probes, watch: tokio::spawn(vitals.watch()) }
     }

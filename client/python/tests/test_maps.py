@@ -42,6 +42,7 @@ from waymark.api import (
     NewLandmark,
     Parent,
     PoseBody,
+    ReadinessCounts,
     Ros2Status,
     UploadedView,
     UploadedViews,
@@ -62,6 +63,7 @@ def test_the_server_says_how_it_is(server: Server) -> None:
     with server.maps() as maps:
         assert (maps.health().status, maps.readiness().status) == ("ok", "ready")
         assert "waymark_ready 1" in maps.metrics()
+        assert maps.readiness().counts == ReadinessCounts(0, 0)
         version = maps.version()
         assert (version.name, version.api, version.protocol) == ("waymark", "v1", "1")
 

@@ -16,25 +16,38 @@ pub struct Health {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct Readiness {
-    /// `ready`, or `degraded`: everything runs, but something is named in `maps_not_in_use` or
-    /// `damaged_pictures`, or the last scheduled backup failed.
+    /// `ready`, or `degraded`: everything runs, but one of `counts` is not 0, or the last scheduled backup failed.
     pub status: String,
+    /// How many there are of what is wrong, for whoever asks.
+    #[serde(default)]
+    pub counts: ReadinessCounts,
     /// Maps whose stored version cannot be made ready, with the reason: an earlier version is used, or none since the
-    /// server started. A later change of the map tries again.
+    /// server started. A later change of the map tries again. Only maps of the token that asks: none without one.
     pub maps_not_in_use: BTreeMap<String, String>,
-    /// Views, tracks and underlays whose stored picture is damaged, at most 100. The picture is not used; the same
-    /// photograph, uploaded again, mends it.
+    /// Views, tracks and underlays whose stored picture is damaged, at most 100, of maps of the token that asks: none
+    /// without one. The picture is not used; the same photograph, uploaded again, mends it.
     #[serde(default)]
     pub damaged_pictures: Vec<String>,
-    /// The newest backup, and why the last attempt failed.
+    /// The newest backup, and why the last attempt failed. A token for all maps is told the name and the reason.
     #[serde(default)]
     pub backup: BackupHealth,
     /// For how many seconds each part that has work, or is probed, has not gone on. Beyond a few the server is not ready.
+    /// Empty for whoever does not see all maps.
     #[serde(default)]
     pub parts_still_s: BTreeMap<String, u64>,
     /// Panics caught since the start, by where: what they met was refused or dropped, everything else went on. Each is in
     /// the log. Anything but 0 is a fault of the program.
     pub panics: BTreeMap<String, u64>,
+}
+
+/// How many things are wrong, named or not.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct ReadinessCounts {
+    /// Maps whose stored version is not in use.
+    pub maps_not_in_use: u64,
+    /// Views, tracks and underlays whose stored picture is damaged.
+    pub damaged_pictures: u64,
 }
 
 /// What runs here.

@@ -297,6 +297,31 @@ mod tests {
     }
 
     #[test]
+    fn a_file_that_is_not_what_the_manifest_says_is_refused_whatever_seal_and_checksum_say() {
+        let digest =
+            |bytes: &[u8]| FileDigest { bytes: bytes.len() as u64, sha256: hex(&Sha256::digest(bytes)) };
+        let manifest = |of: &[u8]| {
+            let files = BTreeMap::from([("map.json".to_owned(), digest(of))]);
+            serde_json::to_vec(&Manifest::new("hall", files)).unwrap()
+        };
+        // The zip is written with the checksum of what it holds, and `refusal` seals it.
+        for said in [&b"[]"[..], b"{ }"] {
+            let manifest = manifest(said);
+            let zip = packed([("map.json", &b"{}"[..], PLAIN), (MANIFEST, &manifest[..], PLAIN)]);
+            assert_eq!(refusal(zip), (Fault::Damaged, "map.json".to_owned()));
+        }
+        let right = manifest(b"{}");
+        let without = packed([(MANIFEST, &right[..], PLAIN)]);
+        assert_eq!(refusal(without), (Fault::Missing, "map.json".to_owned()));
+        let more = packed([
+            ("map.json", &b"{}"[..], PLAIN),
+            ("more.json", &b"{}"[..], PLAIN),
+            (MANIFEST, &right[..], PLAIN),
+        ]);
+        assert_eq!(refusal(more), (Fault::BadPath, "more.json".to_owned()));
+    }
+
+    #[test]
     fn a_packed_file_is_refused() {
         let mut zip = packed([("map.json", &b"{}"[..], PLAIN)]);
         let list = zip.windows(4).position(|bytes| bytes == b"PK\x01\x02").unwrap();

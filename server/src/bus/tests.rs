@@ -25,6 +25,14 @@ struct Running {
 }
 
 async fn running(engine: Engine, workers: usize) -> Running {
+    running_with(engine, workers, None).await
+}
+
+async fn running_with(
+    engine: Engine,
+    workers: usize,
+    certificates: Option<Arc<CertificateRegistry>>,
+) -> Running {
     let raw = RawConfig { zenoh: "tcp/127.0.0.1:0".into(), fleet: "test".into(), ..RawConfig::default() };
     let config = Config::try_from(raw).unwrap();
     let intake = Arc::new(Intake {
@@ -41,7 +49,7 @@ async fn running(engine: Engine, workers: usize) -> Running {
         live: engine.live.clone(),
         gazes: Arc::default(),
         vitals: engine.vitals.clone(),
-        certificates: None,
+        certificates,
     };
     let bus = Bus::open(&config, to, None).await.unwrap();
     let workers = Workers::start(&engine, workers, &Arc::new(bus.outbox().clone())).unwrap();

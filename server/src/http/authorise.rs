@@ -111,6 +111,11 @@ fn principal(app: &AppState, parts: &Parts, role: Role) -> Result<Principal, Api
     Ok(principal)
 }
 
+/// Who asks for what everybody may ask for. `None` for a stranger, and for one whose token or session is not valid.
+pub(super) fn asker(app: &AppState, parts: &Parts) -> Option<Principal> {
+    principal(app, parts, Role::Viewer).ok()
+}
+
 /// The token of a header.
 pub(super) fn bearer(value: &HeaderValue) -> Option<&str> {
     let (scheme, token) = value.to_str().ok()?.split_once(' ')?;

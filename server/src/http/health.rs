@@ -1,10 +1,17 @@
 //! `/healthz` (the process lives), `/readyz` (it can do its work), `/version`.
 
-use super::{AppState, error::ApiError};
-use crate::store::WRITER;
-use axum::{Json, extract::State, http::StatusCode};
+use super::{AppState, authorise, error::ApiError};
+use crate::{
+    identity::Principal,
+    store::{WRITER, pictures},
+};
+use axum::{
+    Json,
+    extract::State,
+    http::{StatusCode, request::Parts},
+};
 use engine::{heartbeats::Heartbeat, panics::Edge, vitals::Failure};
-use protos::api::{Health, Problem, Readiness, Version};
+use protos::api::{BackupHealth, Health, Problem, Readiness, ReadinessCounts, Version};
 use serde_json::json;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
@@ -18,45 +25,64 @@ async fn healthz() -> Json<Health> {
     Json(Health { status: "ok".to_owned() })
 }
 
-/// Every part of the server runs and goes on, and the database answers. 503 with the `part` that has ended or stands still:
-/// the process is about to end with an error, too, unless the part goes on again.
+/// Every part of the server runs and goes on, and the database answers. 503: a part has ended or stands still, and the
+/// process is about to end with an error, too, unless the part goes on again.
+///
+/// Open to everybody, so that monitors need no token: without a valid one the answer has status and counts. A token or a
+/// session adds the names of what its maps contain; one for all maps the parts, the reason of a failed backup and the name
+/// of the newest.
 #[utoipa::path(get, path = "/readyz", tag = "health", responses((status = 200, body = Readiness),
     (status = 503, body = Problem, description = "storage_failed, part_ended, part_stalled")))]
-async fn readyz(State(app): State<AppState>) -> Result<Json<Readiness>, ApiError> {
+async fn readyz(State(app): State<AppState>, parts: Parts) -> Result<Json<Readiness>, ApiError> {
+    let asker = authorise::asker(&app, &parts);
+    let sees_all = asker.as_ref().is_some_and(|asker| asker.maps.is_none());
     let vitals = app.store.vitals();
     if let Some(failure) = vitals.failure() {
-        return Err(not_ready(&failure));
+        return Err(not_ready(&failure, sees_all));
     }
     if let Some(heart) = vitals.stalled() {
-        return Err(stalled(&heart, app.config.limits.stalled_s));
+        return Err(stalled(&heart, app.config.limits.stalled_s, sees_all));
     }
     crate::store::maps::page(app.store.reads(), "", 1).await?;
-    let maps_not_in_use = vitals.all_unpublished();
-    let damaged_pictures = crate::store::pictures::damaged(app.store.reads()).await?;
-    let backup = app.backups.health();
+    let mut maps_not_in_use = vitals.all_unpublished();
+    // Nobody's maps are none, not all.
+    let visible = asker.as_ref().map_or_else(|| Some(Vec::new()), |asker| asker.visible_maps(None));
+    let (damaged, damaged_pictures) = pictures::damaged(app.store.reads(), visible.as_deref()).await?;
+    let counts = ReadinessCounts { maps_not_in_use: maps_not_in_use.len() as u64, damaged_pictures: damaged };
+    maps_not_in_use.retain(|map, _| asker.as_ref().is_some_and(|asker: &Principal| asker.may_see(map)));
+    let mut backup = app.backups.health();
     let scheduled_failed = backup.every_hours > 0 && backup.failed.is_some();
-    let is_degraded = !maps_not_in_use.is_empty() || !damaged_pictures.is_empty() || scheduled_failed;
-    let status = if is_degraded { "degraded" } else { "ready" };
+    if !sees_all {
+        backup = BackupHealth { newest: None, failed: None, ..backup };
+    }
+    let is_degraded = counts != ReadinessCounts::default() || scheduled_failed;
+    let status = if is_degraded { "degraded" } else { "ready" }.to_owned();
     let panics =
         Edge::ALL.into_iter().map(|edge| (edge.name().to_owned(), vitals.panics().at(edge))).collect();
     let hearts = vitals.hearts().all();
-    let parts_still_s =
-        hearts.iter().map(|heart| (heart.part().to_owned(), heart.still().as_secs())).collect();
-    let status = status.to_owned();
-    Ok(Json(Readiness { status, maps_not_in_use, damaged_pictures, backup, parts_still_s, panics }))
+    let seen = hearts.iter().filter(|_| sees_all);
+    let parts_still_s = seen.map(|heart| (heart.part().to_owned(), heart.still().as_secs())).collect();
+    Ok(Json(Readiness { status, counts, maps_not_in_use, damaged_pictures, backup, parts_still_s, panics }))
 }
 
-fn stalled(heart: &Heartbeat, limit_s: u64) -> ApiError {
+fn stalled(heart: &Heartbeat, limit_s: u64, sees_all: bool) -> ApiError {
+    let new = |detail| ApiError::new(StatusCode::SERVICE_UNAVAILABLE, "part_stalled", detail);
+    let follows = format!("after {limit_s} s the server ends with an error");
+    if !sees_all {
+        return new(format!("a part of the server stands still; {follows}"));
+    }
     let (part, still_s) = (heart.part(), heart.still().as_secs());
-    let detail =
-        format!("{part} has not gone on for {still_s} s; after {limit_s} s the server ends with an error");
-    ApiError::new(StatusCode::SERVICE_UNAVAILABLE, "part_stalled", detail).with("part", json!(part))
+    new(format!("{part} has not gone on for {still_s} s; {follows}")).with("part", json!(part))
 }
 
-fn not_ready(failure: &Failure) -> ApiError {
+/// Names of parts may hold those of robots, reasons anything: only who may see all is told.
+fn not_ready(failure: &Failure, sees_all: bool) -> ApiError {
     let code = if failure.part == WRITER { "storage_failed" } else { "part_ended" };
-    let detail = format!("{failure}; the server must be started again");
-    ApiError::new(StatusCode::SERVICE_UNAVAILABLE, code, detail).with("part", json!(failure.part))
+    let new = |detail| ApiError::new(StatusCode::SERVICE_UNAVAILABLE, code, detail);
+    if !sees_all {
+        return new("a part of the server has ended; the server must be started again".to_owned());
+    }
+    new(format!("{failure}; the server must be started again")).with("part", json!(failure.part))
 }
 
 /// What runs here.

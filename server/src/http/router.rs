@@ -1,7 +1,7 @@
 //! Every route, with the layers around them and the OpenAPI document made from them.
 
 use super::{
-    API, App, AppState, audit, authorise, backups, bulk, bundles, cameras, creation, documented, drafts,
+    API, AppState, audit, authorise, backups, bulk, bundles, cameras, creation, documented, drafts,
     error::{ApiError, method_not_allowed, not_found},
     events,
     examples::with_examples,
@@ -21,7 +21,7 @@ use axum::{
     routing::get,
 };
 use engine::panics::{Edge, Panics};
-use std::{any::Any, sync::Arc};
+use std::any::Any;
 use tower::ServiceBuilder;
 use tower_http::catch_panic::CatchPanicLayer;
 use utoipa::{OpenApi, openapi};
@@ -90,8 +90,7 @@ pub(super) fn parts(limits: &Limits) -> (Router<AppState>, openapi::OpenApi) {
 }
 
 /// The whole service.
-pub(crate) fn router(app: &Arc<App>) -> Router {
-    let app = app.clone();
+pub(crate) fn router(app: AppState) -> Router {
     let panics = app.store.vitals().panics().clone();
     let (routes, document) = parts(&app.config.limits);
     let (health, _) = health::router().split_for_parts();
@@ -117,7 +116,7 @@ pub(crate) fn router(app: &Arc<App>) -> Router {
 }
 
 /// Around every operation. One layer and not three: each layer copies all that is below it, for each request.
-async fn operation(State(app): State<AppState>, request: Request, next: Next) -> Response {
+pub(super) async fn operation(State(app): State<AppState>, request: Request, next: Next) -> Response {
     let route = request.extensions().get::<MatchedPath>().cloned();
     let mut response = admitted(&app, request, next).await;
     if let Some(route) = route {

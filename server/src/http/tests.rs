@@ -9,6 +9,7 @@ mod metrics;
 mod localise;
 mod openapi;
 mod page_sessions;
+mod readiness;
 mod revision;
 mod refused_views;
 mod stored_answers;
@@ -34,6 +35,7 @@ use vision::recognise::DistanceKind;
 
 /// A service on a fresh database with map `hall` and robot `r1` on it.
 struct Service {
+    app: AppState,
     router: Router,
     store: Catalogue,
     engine: Engine,
@@ -101,8 +103,17 @@ impl Service {
         let secret = Secret::random().unwrap();
         store.tokens().set_local(&secret);
         let local = TokenText::local(80, &secret);
-        let router = router(&Arc::new(app));
-        Self { router, store, engine, local, _writer: writer, _stop: stop, _data: data }
+        let app = Arc::new(app);
+        Self {
+            router: router(app.clone()),
+            app,
+            store,
+            engine,
+            local,
+            _writer: writer,
+            _stop: stop,
+            _data: data,
+        }
     }
 
     /// Asks with the local token, unless the request says who asks.
@@ -150,31 +161,6 @@ async fn a_panic_in_a_write_is_answered_and_counted_and_the_server_stays_ready()
     let made = service.ask(request("POST", "/api/v1/maps", r#"{"name": "after"}"#)).await;
     assert_eq!(made.status(), StatusCode::CREATED);
     assert_eq!(service.store.vitals().panics().at(Edge::Write), 1);
-}
-
-#[tokio::test]
-async fn a_part_that_has_ended_makes_the_server_not_ready() {
-    let service = Service::start(Limits::default()).await;
-    assert_eq!(service.get("/readyz").await.0, 200);
-    drop(service.store.vitals().begin("the laser thread"));
-    let (status, problem) = service.get("/readyz").await;
-    assert_eq!(
-        (status, &problem["code"], &problem["part"]),
-        (503, &"part_ended".into(), &"the laser thread".into())
-    );
-}
-
-#[tokio::test]
-async fn a_writer_that_has_ended_makes_the_server_not_ready() {
-    let service = Service::start(Limits::default()).await;
-    let fatal = service.store.write(|_| {
-        let source = sqlx::Error::WorkerCrashed;
-        Box::pin(async move { Err::<(), _>(StoreError::Database { operation: "planted", source }) })
-    });
-    assert!(fatal.await.is_err());
-    service.store.vitals().failed().await;
-    let (status, problem) = service.get("/readyz").await;
-    assert_eq!((status, &problem["code"]), (503, &"storage_failed".into()));
 }
 
 /// A recorded drive of `r1` along x, and the body that tells its path.

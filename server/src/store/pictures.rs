@@ -17,13 +17,17 @@ statements! {
     NEXT = "SELECT sha256 FROM pictures WHERE sha256 > ?1 ORDER BY sha256 LIMIT 1";
     NOTE = "INSERT INTO damaged_pictures (sha256, reason, found_ms) SELECT ?1, ?2, ?3 \
             WHERE EXISTS (SELECT 1 FROM pictures WHERE sha256 = ?1) ON CONFLICT DO NOTHING";
-    DAMAGED = "SELECT 'view ' || v.id || ' of landmark ' || l.name || ', map ' || m.name FROM damaged_pictures d \
+    DAMAGED = "WITH shown (map, what) AS (\
+               SELECT m.name, 'view ' || v.id || ' of landmark ' || l.name || ', map ' || m.name FROM damaged_pictures d \
                JOIN views v ON v.image_sha256 = d.sha256 JOIN landmarks l ON l.id = v.landmark_id \
                JOIN maps m ON m.id = l.map_id \
-               UNION ALL SELECT 'track ' || v.track || ' of gathering ' || v.gathering_id FROM damaged_pictures d \
-               JOIN track_views v ON v.image_sha256 = d.sha256 \
-               UNION ALL SELECT 'underlay of map ' || m.name FROM damaged_pictures d \
-               JOIN underlays u ON u.image_sha256 = d.sha256 JOIN maps m ON m.id = u.map_id LIMIT ?1";
+               UNION ALL SELECT m.name, 'track ' || v.track || ' of gathering ' || v.gathering_id FROM damaged_pictures d \
+               JOIN track_views v ON v.image_sha256 = d.sha256 JOIN gatherings g ON g.id = v.gathering_id \
+               JOIN maps m ON m.id = g.map_id \
+               UNION ALL SELECT m.name, 'underlay of map ' || m.name FROM damaged_pictures d \
+               JOIN underlays u ON u.image_sha256 = d.sha256 JOIN maps m ON m.id = u.map_id) \
+               SELECT (SELECT count(*) FROM shown), (SELECT json_group_array(what) FROM (SELECT what FROM shown \
+               WHERE ?2 IS NULL OR map IN (SELECT value FROM json_each(?2)) ORDER BY what LIMIT ?1))";
     UNHASHED = "SELECT map_id, image FROM underlays WHERE image IS NOT NULL LIMIT 1";
     HASHED = "UPDATE underlays SET image_sha256 = ?2, image = NULL WHERE map_id = ?1";
 }
@@ -118,10 +122,18 @@ async fn note(store: &Store, sha256: Digest, reason: String) {
     }
 }
 
-/// What shows a damaged picture: views, tracks and underlays, at most [`MAX_NAMED`].
-pub(crate) async fn damaged(db: impl SqliteExecutor<'_>) -> Result<Vec<String>, StoreError> {
-    let found = sqlx::query_scalar(DAMAGED).bind(MAX_NAMED).fetch_all(db).await;
-    found.map_err(StoreError::during("list damaged pictures"))
+/// How many views, tracks and underlays show a damaged picture, and at most [`MAX_NAMED`] of those of these maps, or of
+/// all maps.
+pub(crate) async fn damaged(
+    db: impl SqliteExecutor<'_>,
+    maps: Option<&[String]>,
+) -> Result<(u64, Vec<String>), StoreError> {
+    let at = || StoreError::during("list damaged pictures");
+    let maps = maps.map(|maps| serde_json::json!(maps).to_string());
+    let row = sqlx::query(DAMAGED).bind(MAX_NAMED).bind(maps).fetch_one(db).await.map_err(at())?;
+    let (count, named): (i64, String) = (row.try_get(0).map_err(at())?, row.try_get(1).map_err(at())?);
+    let named = serde_json::from_str(&named).map_err(|e| at()(sqlx::Error::Decode(e.into())))?;
+    Ok((count.unsigned_abs(), named))
 }
 
 /// Digest of the first picture after `after`, in the order of digests.

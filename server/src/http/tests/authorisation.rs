@@ -8,9 +8,13 @@ use crate::{
         tokens::{self, TokenInsert},
     },
 };
+use axum::middleware::from_fn_with_state;
 use protos::{api::Role, v1};
 use serde_json::json;
-use std::collections::{BTreeMap, BTreeSet};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    sync::atomic::{AtomicUsize, Ordering},
+};
 
 /// `hall` with `r1`, job 1 and answer 1 are the principal's own; `yard` with `r2`, job 2 and answer 2 are not.
 const OWN: [&str; 3] = ["hall", "r1", "1"];
@@ -238,6 +242,42 @@ async fn a_refusal_names_the_role_and_the_next_command() {
         service.ask(request("PUT", "/api/v1/maps", "{}")).await.status(),
         StatusCode::METHOD_NOT_ALLOWED
     );
+}
+
+#[tokio::test]
+async fn an_operation_without_a_row_is_refused_to_everybody() {
+    let service = service().await;
+    let admin = token(&service, Role::Admin, None, None).await;
+    // As an operation would be that was added without its row: `/maps` has rows for GET and POST, the other path none.
+    let (forgotten, called) = ("/api/v1/forgotten", Arc::new(AtomicUsize::new(0)));
+    let counted = called.clone();
+    let handler = move || {
+        counted.fetch_add(1, Ordering::Relaxed);
+        async { "done" }
+    };
+    let routes = axum::routing::any(handler);
+    let router = Router::new()
+        .route(forgotten, routes.clone())
+        .route("/api/v1/maps", routes)
+        .route_layer(from_fn_with_state(service.app.clone(), router::operation));
+    let ask = async |method: &str, path: &str, token: Option<&str>| {
+        let asked = match token {
+            Some(token) => with_token(request(method, path, ""), token),
+            None => request(method, path, ""),
+        };
+        read(router.clone().oneshot(asked).await.unwrap()).await
+    };
+    for (method, path) in
+        [("GET", forgotten), ("POST", forgotten), ("HEAD", forgotten), ("DELETE", "/api/v1/maps")]
+    {
+        for who in [admin.as_str(), service.local.as_str()] {
+            assert_eq!(ask(method, path, Some(who)).await.0, 405, "{method} {path}");
+        }
+        assert_eq!(ask(method, path, None).await.0, 401, "{method} {path}");
+    }
+    assert_eq!(called.load(Ordering::Relaxed), 0, "the handler was called");
+    assert_eq!(ask("GET", "/api/v1/maps", Some(&admin)).await.0, 200, "what has a row is admitted");
+    assert_eq!(called.load(Ordering::Relaxed), 1);
 }
 
 #[tokio::test]

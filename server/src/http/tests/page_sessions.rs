@@ -7,7 +7,7 @@ use super::{
 use protos::api::Role;
 
 /// A request as the browser sends it.
-fn with_cookie(mut request: Request<Body>, cookie: &str) -> Request<Body> {
+pub(super) fn with_cookie(mut request: Request<Body>, cookie: &str) -> Request<Body> {
     request.headers_mut().insert(header::COOKIE, format!("other=1; {cookie}").parse().unwrap());
     request
 }
@@ -18,7 +18,7 @@ fn from_page(mut request: Request<Body>) -> Request<Body> {
 }
 
 /// `NAME=VALUE` of the cookie that an answer sets.
-fn cookie(response: &Response<Body>) -> String {
+pub(super) fn cookie(response: &Response<Body>) -> String {
     let set = response.headers()[header::SET_COOKIE].to_str().unwrap();
     for attribute in ["; HttpOnly", "; SameSite=Strict", "; Path=/", "; Max-Age="] {
         assert!(set.contains(attribute), "{set}");
@@ -26,7 +26,7 @@ fn cookie(response: &Response<Body>) -> String {
     set.split(';').next().unwrap().to_owned()
 }
 
-async fn link(service: &Service, token: &str) -> String {
+pub(super) async fn link(service: &Service, token: &str) -> String {
     let asked = with_token(request("POST", "/api/v1/session/links", ""), token);
     let (status, link) = read(service.ask_as_it_is(asked).await).await;
     assert_eq!((status, &link["valid_s"]), (201, &600.into()));

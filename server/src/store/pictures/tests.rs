@@ -98,8 +98,15 @@ async fn a_damaged_picture_is_named_and_mended_by_the_same_one() {
         .unwrap();
     let (_stop, stopping) = watch::channel(false);
     check_all((*store).clone(), stopping).await;
-    let named = damaged(store.reads()).await.unwrap();
-    assert_eq!(named, [format!("view {first} of landmark p1, map a")]);
+    let named = |maps: Option<&'static str>| {
+        let maps = maps.map(|map| vec![map.to_owned()]);
+        let reads = store.reads().clone();
+        async move { damaged(&reads, maps.as_deref()).await.unwrap() }
+    };
+    let view = format!("view {first} of landmark p1, map a");
+    assert_eq!(named(None).await, (1, vec![view.clone()]));
+    assert_eq!(named(Some("a")).await, (1, vec![view]));
+    assert_eq!(named(Some("b")).await, (1, Vec::new()), "counted, and not named to another map");
     let refused = read(&store, &digest(b"one")).await;
     assert!(
         matches!(&refused, Err(error @ StoreError::PictureDamaged { .. }) if !error.is_fatal()),
@@ -109,7 +116,7 @@ async fn a_damaged_picture_is_named_and_mended_by_the_same_one() {
     // A duplicate mends it, too.
     assert_eq!(teach(&store, "p1", b"one").await, first);
     assert_eq!(read(&store, &digest(b"one")).await.unwrap(), b"one");
-    assert!(damaged(store.reads()).await.unwrap().is_empty());
+    assert_eq!(damaged(store.reads(), None).await.unwrap(), (0, Vec::new()));
     store.write(move |tx| Box::pin(views::delete(tx, "a", "p2", other))).await.unwrap();
     forget(&store).await;
     assert_eq!(count(&store).await, 1);
@@ -149,11 +156,11 @@ async fn damaged_pages_of_pictures_stop_neither_the_start_nor_what_needs_no_pict
     views::icon(store.reads(), "a", "p1", taught).await.unwrap();
     let refused = read(&store, &digest(&large)).await;
     assert!(matches!(refused, Err(StoreError::PictureDamaged { .. })), "{refused:?}");
-    assert_eq!(damaged(store.reads()).await.unwrap().len(), 1);
+    assert_eq!(damaged(store.reads(), None).await.unwrap().0, 1);
     assert_eq!(read(&store, &digest(b"small")).await.unwrap(), b"small");
     // The view can be deleted; what is left of the picture is not touched.
     store.write(move |tx| Box::pin(views::delete(tx, "a", "p1", taught))).await.unwrap();
-    assert_eq!((count(&store).await, damaged(store.reads()).await.unwrap().len()), (2, 0));
+    assert_eq!((count(&store).await, damaged(store.reads(), None).await.unwrap().0), (2, 0));
     teach(&store, "p2", b"new").await;
 }
 

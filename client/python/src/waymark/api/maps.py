@@ -131,9 +131,18 @@ class Health:
 
 
 @dataclass(frozen=True, slots=True)
+class ReadinessCounts:
+    """How many things are wrong, named or not."""
+
+    maps_not_in_use: int
+    damaged_pictures: int
+
+
+@dataclass(frozen=True, slots=True)
 class Readiness:
     """`ready`, or `degraded`: everything runs, but some maps use an earlier version, or none, stored pictures are
-    damaged, or the last scheduled backup failed."""
+    damaged, or the last scheduled backup failed. `counts` has all of them; only those of the token's maps are named,
+    and none without a token."""
 
     status: str
     maps_not_in_use: dict[str, str]
@@ -141,6 +150,7 @@ class Readiness:
     damaged_pictures: tuple[str, ...] = ()
     backup: BackupHealth | None = None
     parts_still_s: dict[str, int] | None = None
+    counts: ReadinessCounts = ReadinessCounts(0, 0)
 
 
 @dataclass(frozen=True, slots=True)
