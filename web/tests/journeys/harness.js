@@ -11,7 +11,7 @@ const CHROMIUM = process.env.CHROMIUM ?? "/usr/bin/chromium";
 const OUTPUT = new URL("../output/", import.meta.url).pathname;
 const AXE = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
 const GUIDE = new URL("../../../docs/pictures/pages/", import.meta.url).pathname;
-const PICTURES = ["map-desk", "landmarks-desk", "landmark-desk", "teach", "answer-desk", "history"];
+const PICTURES = ["map-desk", "landmarks-desk", "landmark-desk", "teach", "answer-evidence-desk", "history"];
 /** Time for anything that a journey waits for, ms: two cores are shared with driving robots. */
 export const SOON = 90_000;
 
