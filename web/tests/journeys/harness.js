@@ -11,7 +11,7 @@ const CHROMIUM = process.env.CHROMIUM ?? "/usr/bin/chromium";
 const OUTPUT = new URL("../output/", import.meta.url).pathname;
 const AXE = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
 const GUIDE = new URL("../../../docs/pictures/pages/", import.meta.url).pathname;
-const PICTURES = ["map-desk", "landmarks-desk", "landmark-desk", "teach", "answer-desk", "history"];
+const PICTURES = ["map-desk", "landmarks-desk", "landmark-desk", "teach", "answer-evidence-desk", "history"];
 /** Time for anything that a journey waits for, ms: two cores are shared with driving robots. */
 export const SOON = 90_000;
 
@@ -74,8 +74,56 @@ export async function browser({ link, origin }) {
   const first = await context.newPage();
   await first.goto(link);
   await first.close();
+  // After the link, whose answer leads on to a page.
+  if (process.env.WAYMARK_PAGES) await replaced(context, process.env.WAYMARK_PAGES);
   return { context, close: () => launched.close() };
 }
+
+/** Takes the pages from a folder (`dist`) instead of those in the program: while pages are changed, that spares building it. */
+async function replaced(context, folder) {
+  const kinds = { js: "text/javascript", css: "text/css" };
+  await context.route(({ pathname }) => pathname.startsWith("/assets/"), (route) => {
+    const { pathname } = new URL(route.request().url());
+    return route.fulfill({ body: readFileSync(folder + pathname), contentType: kinds[pathname.split(".").at(-1)] });
+  });
+  await context.route(({ pathname }) => !/^\/(assets|api|open|icon)/.test(pathname), async (route) => {
+    const headers = (await route.fetch()).headers();
+    return route.fulfill({ body: readFileSync(`${folder}/index.html`), headers });
+  });
+}
+
+/** A map `hall` without robots: two walls and a landmark that is learnt of one picture. */
+export async function hall({ context }, { origin }, api) {
+  await api("POST", "/maps", { name: "hall" });
+  await api("PUT", "/maps/hall/walls", { segments: [{ a: [-4, 2], b: [4, 2] }, { a: [-4, -2], b: [4, -2] }] }, { "if-match": "*" });
+  const page = await context.newPage();
+  await page.goto(origin);
+  const picture = await page.evaluate(() => {
+    const canvas = Object.assign(document.createElement("canvas"), { width: 300, height: 300 });
+    const pen = canvas.getContext("2d");
+    for (let i = 0; i < 400; i++) {
+      pen.fillStyle = `rgb(${(i * 97) % 256},${(i * 57) % 256},${(i * 31) % 256})`;
+      pen.fillRect((i * 53) % 300, (i * 37) % 300, 30, 20);
+    }
+    return canvas.toDataURL("image/png").split(",")[1];
+  });
+  await page.close();
+  const photograph = Buffer.from(picture, "base64");
+  const answer = await uploaded(context, origin, "poster", photograph, { whole_image: "true", create: "true", width_m: "0.6", height_m: "0.6" });
+  assert.equal(answer.status(), 201, await answer.text());
+  const place = { x_m: 0, y_m: 2, z_m: 1.4, theta_rad: -Math.PI / 2, roll_rad: 0, tilt_rad: 0 };
+  await api("PATCH", "/maps/hall/landmarks/poster", { place }, { "if-match": "*" });
+  const { id } = await api("POST", "/maps/hall/landmarks/poster/learn", {});
+  await eventually("end of the lesson", async () => (await api("GET", `/jobs/${id}`)).state === "done");
+  return photograph;
+}
+
+/** Sends a photograph of a landmark of the map `hall`. */
+export const uploaded = (context, origin, landmark, buffer, parts = {}) =>
+  context.request.post(`${origin}/api/v1/maps/hall/landmarks/${landmark}/views`, {
+    headers: { "x-waymark-page": "1" },
+    multipart: { image: { name: "photo.png", mimeType: "image/png", buffer }, ...parts },
+  });
 
 /** Asks the API as the page does, with the session of the browser. */
 export const asker = ({ context }, { origin }) => async (method, path, body, headers = {}) => {

@@ -1,0 +1,194 @@
+// Journeys of administration that need no driving robot: photographs that were refused, deleting and undo, tokens, and what
+// pages say when they are empty or broken, of long names, by keyboard, to a viewer.
+import assert from "node:assert/strict";
+import { mkdtempSync, rmSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { after, afterEach, before, test } from "node:test";
+import { PHONE, asker, browser, check, eventually, hall, open, serve, uploaded } from "./harness.js";
+
+let folder, server, its, api, photograph;
+before(async () => {
+  folder = mkdtempSync(join(tmpdir(), "waymark-pages-"));
+  server = await serve("--data", folder, "--zenoh", "tcp/127.0.0.1:0");
+  its = await browser(server);
+  api = asker(its, server);
+  photograph = await hall(its, server, api);
+  await api("PUT", "/robots/mower", { map: MAP });
+});
+after(async () => {
+  await its?.close();
+  await server?.stop();
+  if (folder) rmSync(folder, { recursive: true, force: true });
+});
+afterEach(() => Promise.all(its.context.pages().map((page) => page.close())));
+
+const go = (address, size) => open(its.context, server.origin, address, size);
+const MAP = "hall";
+const landmarksOf = async () => (await api("GET", `/maps/${MAP}/landmarks`)).items;
+
+for (const [size, where] of [[undefined, "desk"], [PHONE, "phone"]]) {
+  test(`photographs that were refused are shown with the reason, at the ${where}`, async () => {
+    const upload = (buffer, parts) => uploaded(its.context, server.origin, "poster", buffer, parts);
+    const page = await go("/maps/hall/landmarks/poster", size);
+    const refused = page.getByRole("region", { name: "Photographs that were refused" });
+    if (where === "desk") await refused.getByText("None: every photograph was taken").waitFor();
+    assert.equal((await upload(photograph.subarray(0, photograph.length / 2), { whole_image: "true" })).status(), 422);
+    const blank = Buffer.from(
+      await page.evaluate(() => {
+        const canvas = Object.assign(document.createElement("canvas"), { width: 320, height: 200 });
+        canvas.getContext("2d").fillRect(0, 0, 320, 200);
+        return canvas.toDataURL("image/png").split(",")[1];
+      }),
+      "base64",
+    );
+    assert.equal((await upload(blank)).status(), 422);
+    assert.equal((await upload(photograph, { whole_image: "true" })).status(), 200);
+    await page.reload();
+    await refused.getByText("It is photograph 1 once more. Choose another photograph.").first().waitFor();
+    await refused.getByText("No four edges were found in it.").first().waitFor();
+    await refused.getByText(/The file is damaged/).first().waitFor();
+    const pictures = refused.getByRole("img", { name: "What was refused" });
+    await pictures.first().scrollIntoViewIfNeeded();
+    await page.waitForFunction(() => [...document.querySelectorAll("img[alt='What was refused']")].slice(0, 2).every((image) => image.naturalWidth > 20));
+    await check(page, `refused-${where}`);
+  });
+}
+
+test("a landmark is deleted and brought back by the history", async () => {
+  const name = "poster";
+  const page = await go(`/maps/${MAP}/landmarks/${name}`);
+  await page.getByRole("button", { name: "Delete", exact: true }).click();
+  await page.getByRole("button", { name: "Delete the landmark" }).click();
+  await page.waitForURL(/history/);
+  assert.ok(!(await landmarksOf()).some((one) => one.name === name));
+  await page.getByRole("button", { name: /Undo change/ }).first().click();
+  await page.getByRole("button", { name: "Undo it" }).click();
+  await eventually("landmark again", async () => (await landmarksOf()).some((one) => one.name === name && one.status === "active"));
+  assert.deepEqual(page.faults, []);
+});
+
+test("a token is made for a person, used, and revoked", async () => {
+  const page = await go("/admin?part=tokens");
+  await page.getByRole("button", { name: "Users and tokens" }).click();
+  await page.getByRole("button", { name: "New token" }).click();
+  await page.getByLabel("Name, of a person or a program").fill("anna");
+  await page.getByLabel("Role").selectOption("teacher");
+  await page.getByRole("dialog").getByLabel(MAP, { exact: true }).check();
+  await page.getByRole("button", { name: "Make it" }).click();
+  const text = (await page.getByRole("status").locator("code").textContent()).trim();
+  const anna = await its.context.browser().newContext({ baseURL: server.origin });
+  const hers = await open(anna, server.origin, "/");
+  await hers.getByLabel("Token").fill(text);
+  await hers.getByRole("button", { name: "Sign in" }).click();
+  await hers.getByText("anna · teacher").waitFor();
+  await hers.getByRole("link", { name: "Server" }).click();
+  await hers.getByRole("button", { name: "Jobs" }).waitFor();
+  assert.equal(await hers.getByRole("button", { name: "Users and tokens" }).count(), 0, "a teacher sees no tokens");
+  await page.getByRole("button", { name: "Revoke anna" }).click();
+  await page.getByRole("button", { name: "Revoke it" }).click();
+  await page.getByRole("row", { name: /anna/ }).getByText("revoked").waitFor();
+  await hers.reload();
+  await hers.getByRole("heading", { name: "Sign in to Waymark" }).waitFor();
+  assert.deepEqual(page.faults, []);
+  await anna.close();
+});
+
+test("a map is turned, its layers fade, and the view is in the address", async () => {
+  const page = await go(`/maps/${MAP}`);
+  await page.getByRole("button", { name: "Turn left" }).click();
+  await page.waitForURL(/view=[^&]*%2C0\.262|view=[^&]*,0\.262/);
+  await page.getByText("Layers", { exact: true }).click();
+  await page.getByLabel("How opaque: Walls").fill("0.3");
+  await page.getByLabel("Walls", { exact: true }).uncheck();
+  await page.waitForURL(/off=/);
+  const address = page.url();
+  await page.goto(address);
+  await page.getByText("Layers", { exact: true }).click();
+  assert.ok(!(await page.getByLabel("Walls", { exact: true }).isChecked()), "a sent address has the same layers");
+  assert.ok(/0\.262/.test(page.url()), page.url());
+  assert.deepEqual(page.faults, []);
+});
+
+/** The longest name. */
+const LONG = `a${"-very-long-name".repeat(4)}`.slice(0, 64);
+
+test("empty pages say so, and have the button that helps", async () => {
+  await api("POST", "/maps", { name: LONG, site: "A site with a long name of its own", building: "House of many floors and doors" });
+  for (const [address, words, button] of [
+    [`/maps/${LONG}`, /There is no landmark on this map yet/, /Teach the first one/],
+    [`/maps/${LONG}/landmarks`, /no landmark/i, /Teach|Photograph|photograph/],
+    [`/maps/${LONG}/gather`, /gather/i, /Begin to gather/],
+    [`/answers?map=${LONG}`, /No stored answer is like that/, undefined],
+  ]) {
+    const page = await go(address, PHONE);
+    await page.getByText(words).first().waitFor();
+    if (button) await page.getByRole("button", { name: button }).or(page.getByRole("link", { name: button })).first().waitFor();
+    await check(page, `empty-${address.replaceAll(/[^a-z]+/g, "-").replace(LONG.replaceAll(/[^a-z]+/g, "-"), "map")}`);
+    await page.close();
+  }
+});
+
+test("long names fit on a phone", async () => {
+  const name = `b${"-long-landmark".repeat(5)}`.slice(0, 64);
+  await api("POST", `/maps/${LONG}/landmarks`, { name });
+  for (const [address, what] of [["", "map"], ["/landmarks", "landmarks"], [`/landmarks/${name}`, "landmark"], ["/history", "history"], ["/settings", "settings"], ["/teach", "teach"]]) {
+    const page = await go(`/maps/${LONG}${address}`, PHONE);
+    await page.getByRole("heading", { level: 1 }).waitFor();
+    await page.waitForFunction(() => !document.querySelector(".loading"));
+    await check(page, `long-${what}`);
+    await page.close();
+  }
+});
+
+test("pages of what is not there say so, and those of a server that is gone offer to try again", async () => {
+  for (const address of ["/maps/nosuch", "/maps/nosuch/landmarks", `/maps/${MAP}/landmarks/nosuch`, "/robots/nosuch", "/answers/99999999", "/maps/nosuch/history"]) {
+    const page = await go(address);
+    await page.getByText(/has failed|no map|no landmark|no robot|no stored answer|There is no/i).first().waitFor();
+    // A refusal of the server is what the page is about; the browser reports its status.
+    assert.deepEqual(page.faults.filter((fault) => !/404/.test(fault)), [], address);
+    await page.close();
+  }
+  const page = await go("/");
+  await page.getByRole("link", { name: MAP, exact: true }).waitFor();
+  await page.route("**/api/v1/answers**", (route) => route.abort());
+  await page.getByRole("link", { name: "Answers" }).click();
+  await page.getByRole("alert").first().waitFor();
+  await page.unroute("**/api/v1/answers**");
+  await page.getByRole("button", { name: /again/i }).first().click();
+  await page.getByText("No stored answer is like that").waitFor();
+});
+
+test("landmarks of a map are reached by the keyboard alone", async () => {
+  const page = await go(`/maps/${MAP}`);
+  const list = page.getByRole("region", { name: "Landmarks", exact: true });
+  const [first] = await landmarksOf();
+  await list.getByRole("button", { name: first.name }).waitFor();
+  await page.locator("body").press("Tab");
+  let steps = 0;
+  const focused = () => page.evaluate(() => document.activeElement?.textContent?.trim() ?? "");
+  while ((await focused()) !== first.name && steps++ < 80) await page.keyboard.press("Tab");
+  assert.equal(await focused(), first.name, `within ${steps} steps`);
+  await page.keyboard.press("Enter");
+  await page.getByRole("region", { name: "Chosen landmark" }).waitFor();
+  assert.deepEqual(page.faults, []);
+});
+
+test("a viewer sees no button that changes anything, on any page", async () => {
+  const [robot, landmark] = ["mower", "poster"];
+  const { text } = await api("POST", "/tokens", { name: "looker", role: "viewer" });
+  const guest = await its.context.browser().newContext({ baseURL: server.origin });
+  const page = await open(guest, server.origin, "/");
+  await page.getByLabel("Token").fill(text);
+  await page.getByRole("button", { name: "Sign in" }).click();
+  await page.getByRole("link", { name: MAP, exact: true }).waitFor();
+  const changes = /new|delete|remove|rename|copy|save|learn|begin|publish|undo|go back|admit|revoke|calibrate|record|merge|size|take out|move|upload|accept|throw|tell a robot|floor plan|add /i;
+  for (const address of ["/", `/maps/${MAP}`, `/maps/${MAP}/landmarks`, `/maps/${MAP}/landmarks/${landmark}`, `/maps/${MAP}/history`, `/maps/${MAP}/settings`, "/robots", `/robots/${robot}`, "/answers"]) {
+    await page.goto(address);
+    await page.getByRole("heading", { level: 1 }).first().waitFor();
+    await page.waitForFunction(() => !document.querySelector(".loading"));
+    const buttons = await page.getByRole("button").evaluateAll((all) => all.filter((one) => !one.disabled).map((one) => one.getAttribute("aria-label") ?? one.textContent.trim()));
+    assert.deepEqual(buttons.filter((name) => changes.test(name)), [], address);
+  }
+  await guest.close();
+});
