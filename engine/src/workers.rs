@@ -10,6 +10,7 @@ use super::{
     findings::{FindingSender, LandmarkFinding},
     frame_analysis::{StageTimes, analyse_checked},
     frame_context::FrameContext,
+    frame_tap::{AnalysedFrame, FrameTap},
     guided::{GuidedResult, recognise_guided},
     intake::{FrameJob, unknown_map},
     kept_frames::KeptFrames,
@@ -20,9 +21,9 @@ use super::{
     relocalise::{RelocalisationInput, RelocalisationUpdate, Relocalisers},
     slots::{FrameOutcome, SlotKey, Slots},
     snapshot::{MapSnapshot, Snapshots},
+    threads::{self, Class},
+    vitals::Vitals,
 };
-use crate::frame_tap::{AnalysedFrame, FrameTap};
-use crate::vitals::Vitals;
 use map::{pose2::Pose2Covariance, relocalise::PoseHypothesis};
 use protos::{CheckedFrame, Code, Name, Rejection, convert::geometry::pose2_covariance_wire, v1};
 use std::{cell::Cell, sync::Arc, thread::JoinHandle, time::Instant};
@@ -76,24 +77,23 @@ pub struct Workers {
 impl Workers {
     /// Starts `count` threads for frames, at least one, and one for laser scans.
     pub fn start(engine: &Engine, count: usize, publish: &Arc<impl Publish>) -> std::io::Result<Self> {
-        let mut threads = Vec::with_capacity(count + 1);
+        let mut running = Vec::with_capacity(count + 1);
         for i in 0..count.max(1) {
             let (engine, publish) = (engine.clone(), publish.clone());
             let name = format!("vision-{i}");
             let pulse = engine.vitals.begin(format!("the worker thread {name}"));
-            threads.push(std::thread::Builder::new().name(name).spawn(move || {
-                // Dropped with the thread, however that ends.
+            running.push(threads::spawn(Class::Answers, name, move || {
                 let _pulse = pulse;
                 while let Some((key, job)) = engine.slots.take() {
                     let outcome = engine.answer_frame(&key, &job, publish.as_ref());
+                    threads::note_frame(Instant::now());
                     engine.slots.finish(&key, outcome);
                 }
             })?);
         }
         let (laser, publish) = (engine.clone(), publish.clone());
-        let named = std::thread::Builder::new().name("laser".to_owned());
         let pulse = engine.vitals.begin("the laser thread");
-        threads.push(named.spawn(move || {
+        running.push(threads::spawn(Class::Answers, "laser", move || {
             let _pulse = pulse;
             while let Some((robot, job)) = laser.motion.scans().take() {
                 let what = format_args!("a scan of robot {robot}");
@@ -104,7 +104,7 @@ impl Workers {
                 });
             }
         })?);
-        Ok(Self { slots: engine.slots.clone(), motion: engine.motion.clone(), threads })
+        Ok(Self { slots: engine.slots.clone(), motion: engine.motion.clone(), threads: running })
     }
 
     /// Returns when every frame in work is answered. Waits: not for an async thread.

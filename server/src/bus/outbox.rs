@@ -8,6 +8,7 @@ use super::{BusError, Receivers};
 use engine::{
     panics::{Edge, Panics},
     slots::SlotKey,
+    threads::{self, Class},
     workers::Publish,
 };
 use protos::{Key, Keys, Name, prost::Message, v1};
@@ -54,9 +55,7 @@ impl Outbox {
     pub(super) fn start(session: zenoh::Session, keys: Keys, to: &Receivers) -> Result<Self, BusError> {
         let panics = to.vitals.panics().clone();
         let (queue, messages) = sync_channel(QUEUE);
-        let thread = std::thread::Builder::new()
-            .name("outbox".into())
-            .spawn(move || deliver(&session, &messages, &panics))
+        let thread = threads::spawn(Class::Answers, "outbox", move || deliver(&session, &messages, &panics))
             .map_err(|source| BusError::Thread { name: "outbox", source })?;
         Ok(Self {
             keys,
