@@ -1,11 +1,11 @@
 //! One slot per robot and camera: one frame in work, one waiting, the newest wins. In: frames in any order and at any
-//! rate. Out: work, round robin over the robots and then over the cameras of each, so that no robot starves another. Every frame ends in exactly one of
+//! rate. Out: work, in turns of the robots and then of the cameras of each, so that no robot starves another. Every frame ends in exactly one of
 //! processed, superseded, expired, rejected, and the counts say so at every moment. Knows no vision and no transport;
 //! time is passed in.
 
 use protos::{Code, Name, Rejection};
 use std::{
-    collections::{BTreeMap, VecDeque},
+    collections::{BTreeMap, BTreeSet, VecDeque},
     sync::{Condvar, Mutex, MutexGuard, PoisonError},
     time::{Duration, Instant},
 };
@@ -117,6 +117,8 @@ struct Slot<T> {
     queued: bool,
     order: SequenceTracker,
     touched: Instant,
+    /// Number of its last turn.
+    last_turn: u64,
 }
 
 impl<T> Slot<T> {
@@ -128,42 +130,48 @@ impl<T> Slot<T> {
             queued: false,
             order: SequenceTracker::default(),
             touched: now,
+            last_turn: 0,
         }
     }
 }
 
-/// Slots with a waiting frame and none in work: the robots in turn, each with its cameras in turn.
+/// Slots with a waiting frame and none in work. The robot whose last turn was longest ago is next, and of its cameras the one
+/// whose last turn was: a robot that has always something to do gains nothing on one whose next frame is on its way.
 #[derive(Debug, Default)]
 struct Turns {
-    robots: VecDeque<Name>,
-    cameras: BTreeMap<Name, VecDeque<Name>>,
+    turn: u64,
+    /// Last turn of every robot with a slot.
+    of_robots: BTreeMap<Name, u64>,
+    robots: BTreeSet<(u64, Name)>,
+    /// Of each of these robots, with the last turn of the camera.
+    cameras: BTreeMap<Name, BTreeSet<(u64, Name)>>,
 }
 
 impl Turns {
-    /// The camera comes last of its robot; a robot without others comes last of all.
-    fn push(&mut self, key: SlotKey) {
-        let cameras = self.cameras.entry(key.robot.clone()).or_default();
-        if cameras.is_empty() {
-            self.robots.push_back(key.robot);
-        }
-        cameras.push_back(key.camera);
+    fn push(&mut self, SlotKey { robot, camera }: SlotKey, last_turn: u64) {
+        let last = *self.of_robots.entry(robot.clone()).or_default();
+        self.robots.insert((last, robot.clone()));
+        self.cameras.entry(robot).or_default().insert((last_turn, camera));
     }
 
-    /// The next camera of the robot whose turn it is; that robot is last then.
-    fn pop(&mut self) -> Option<SlotKey> {
-        let robot = self.robots.pop_front()?;
+    /// The next slot, and the number of this turn.
+    fn pop(&mut self) -> Option<(SlotKey, u64)> {
+        let (_, robot) = self.robots.pop_first()?;
         let cameras = self.cameras.get_mut(&robot)?;
-        let camera = cameras.pop_front()?;
+        let (_, camera) = cameras.pop_first()?;
+        self.turn += 1;
+        self.of_robots.insert(robot.clone(), self.turn);
         if cameras.is_empty() {
             self.cameras.remove(&robot);
         } else {
-            self.robots.push_back(robot.clone());
+            self.robots.insert((self.turn, robot.clone()));
         }
-        Some(SlotKey { robot, camera })
+        Some((SlotKey { robot, camera }, self.turn))
     }
 
+    /// Nothing is ready any more.
     fn clear(&mut self) {
-        *self = Self::default();
+        (self.robots, self.cameras) = Default::default();
     }
 }
 
@@ -236,7 +244,7 @@ impl<T: Held> Slots<T> {
         }
         if !slot.in_work && !slot.queued {
             slot.queued = true;
-            state.ready.push(key);
+            state.ready.push(key, slot.last_turn);
             self.ready.notify_one();
         }
         Ok(())
@@ -284,7 +292,7 @@ impl<T: Held> Slots<T> {
         }
         if slot.waiting.is_some() && !slot.queued {
             slot.queued = true;
-            state.ready.push(key.clone());
+            state.ready.push(key.clone(), slot.last_turn);
             self.ready.notify_one();
         }
     }
@@ -329,9 +337,9 @@ impl<T: Held> State<T> {
     }
 
     fn next(&mut self) -> Option<(SlotKey, T)> {
-        while let Some(key) = self.ready.pop() {
+        while let Some((key, turn)) = self.ready.pop() {
             let Some(slot) = self.slots.get_mut(&key) else { continue };
-            slot.queued = false;
+            (slot.queued, slot.last_turn) = (false, turn);
             if let Some(job) = slot.waiting.take() {
                 (slot.in_work, slot.work_bytes) = (true, job.held_bytes());
                 self.counts.waiting -= 1;
@@ -351,6 +359,8 @@ impl<T: Held> State<T> {
             self.slots.retain(|_, s| {
                 s.in_work || s.waiting.is_some() || now.saturating_duration_since(s.touched) < IDLE_SLOT
             });
+            let robots: BTreeSet<&Name> = self.slots.keys().map(|key| &key.robot).collect();
+            self.ready.of_robots.retain(|robot, _| robots.contains(robot));
         }
         if of_robot(&self.slots) >= MAX_CAMERAS_PER_ROBOT {
             let idle = |s: &Slot<T>| {
