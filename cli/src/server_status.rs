@@ -60,6 +60,8 @@ async fn status(session: &Session) -> anyhow::Result<()> {
         "The server is degraded: not every map is in use."
     } else if !readiness.damaged_pictures.is_empty() {
         "The server is degraded: stored pictures are damaged."
+    } else if readiness.storage.as_ref().is_some_and(|disk| disk.refused.is_some()) {
+        "The server is degraded: nothing can be added, for lack of room on its disk."
     } else if readiness.status == "degraded" {
         "The server is degraded: the last scheduled backup failed."
     } else {
@@ -91,6 +93,8 @@ fn text(version: &Version, readiness: &Readiness, counts: &Counts) -> String {
         lines.push("  no backup yet".to_owned());
     }
     lines.extend(failed.iter().map(|why| format!("  the last backup failed: {why}")));
+    let refused = readiness.storage.iter().filter_map(|disk| disk.refused.as_ref());
+    lines.extend(refused.map(|why| format!("  nothing is added: {why}")));
     let unused = readiness.maps_not_in_use.iter();
     lines.extend(unused.map(|(map, why)| format!("  map {map} is not in use: {why}")));
     let damaged = readiness.damaged_pictures.iter();
@@ -103,6 +107,7 @@ fn text(version: &Version, readiness: &Readiness, counts: &Counts) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use client::api::StorageHealth;
 
     #[test]
     fn a_status_names_maps_that_are_not_in_use_and_faults() {
@@ -123,6 +128,10 @@ mod tests {
                 newest_ms: Some(0),
                 failed: Some("no space".into()),
             },
+            storage: Some(StorageHealth {
+                refused: Some("the disk is full".into()),
+                ..StorageHealth::default()
+            }),
             panics: [("a frame".to_owned(), 2), ("a write".to_owned(), 0)].into(),
         };
         let counts = Counts { maps: 1, landmarks: 2, robots: 0, connected: 0 };
@@ -136,6 +145,7 @@ mod tests {
             lines.contains("newest backup 20261123-140530 (UTC)\n  the last backup failed: no space"),
             "{lines}"
         );
+        assert!(lines.contains("\n  nothing is added: the disk is full\n"), "{lines}");
         assert!(lines.contains("damaged picture: view 3 of landmark door, map office; "), "{lines}");
         assert!(lines.ends_with("2 faults of the program caught in a frame: see its log"), "{lines}");
     }

@@ -38,7 +38,7 @@ pub struct RunningServer {
     /// Robots of ROS 2.
     pub ros2: Arc<Ros2>,
     pub(crate) sessions: Arc<Sessions>,
-    pub(crate) local_token: LocalToken,
+    pub(crate) local_token: Arc<LocalToken>,
     /// The first name of the certificate, or else the address; `None` without TLS.
     pub(crate) tls_name: Option<String>,
     pub(crate) stop: watch::Sender<bool>,
@@ -57,6 +57,7 @@ pub(crate) struct Tasks {
     pub(crate) recorders: [JoinHandle<()>; 3],
     pub(crate) gather: JoinHandle<()>,
     pub(crate) pictures: JoinHandle<()>,
+    pub(crate) disk: JoinHandle<()>,
     pub(crate) backups: JoinHandle<()>,
     pub(crate) writer: CatalogueTasks,
     pub(crate) watch: JoinHandle<()>,
@@ -107,7 +108,7 @@ impl RunningServer {
         self.vitals.stop();
         self.local_token.remove();
         self.stop.send_replace(true);
-        let Tasks { workers, bus, http, jobs, recorders, gather, pictures, backups, writer, watch } =
+        let Tasks { workers, bus, http, jobs, recorders, gather, pictures, disk, backups, writer, watch } =
             self.tasks;
         watch.abort();
         // Workers first: what they have in work is still answered over the open bus.
@@ -126,6 +127,7 @@ impl RunningServer {
             ("events", events),
             ("gathering", gather),
             ("the check of the pictures", pictures),
+            ("the look at the disk", disk),
             ("the timetable of backups", backups),
         ];
         for (what, task) in others {

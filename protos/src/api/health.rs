@@ -16,8 +16,8 @@ pub struct Health {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct Readiness {
-    /// `ready`, or `degraded`: everything runs, but something is named in `maps_not_in_use` or
-    /// `damaged_pictures`, or the last scheduled backup failed.
+    /// `ready`, or `degraded`: everything runs, but something is named in `maps_not_in_use`, `damaged_pictures` or
+    /// `storage.refused`, or the last scheduled backup failed.
     pub status: String,
     /// Maps whose stored version cannot be made ready, with the reason: an earlier version is used, or none since the
     /// server started. A later change of the map tries again.
@@ -29,9 +29,31 @@ pub struct Readiness {
     /// The newest backup, and why the last attempt failed.
     #[serde(default)]
     pub backup: BackupHealth,
+    /// The disk of the data directory; absent where an earlier build answers.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub storage: Option<StorageHealth>,
     /// Panics caught since the start, by where: what they met was refused or dropped, everything else went on. Each is in
     /// the log. Anything but 0 is a fault of the program.
     pub panics: BTreeMap<String, u64>,
+}
+
+/// The disk of the data directory at the last look, some seconds ago at most.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct StorageHealth {
+    /// Bytes that the server's user can fill; 0 where that is not known.
+    pub total_bytes: u64,
+    /// Of these, free.
+    pub free_bytes: u64,
+    /// Bytes of the database file that deletions have freed: new data take them first.
+    pub reusable_bytes: u64,
+    /// Used share, in percent, rounded down.
+    pub used_percent: u64,
+    /// The setting `limits.disk_percent`: from here on nothing is added.
+    pub limit_percent: u64,
+    /// Why nothing is added at present, and what to do. Robots are served all the same.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub refused: Option<String>,
 }
 
 /// What runs here.

@@ -1,10 +1,10 @@
 //! `/healthz` (the process lives), `/readyz` (it can do its work), `/version`.
 
 use super::{AppState, error::ApiError};
-use crate::store::WRITER;
+use crate::store::{WRITER, disk_guard::DiskSpace};
 use axum::{Json, extract::State, http::StatusCode};
 use engine::{panics::Edge, vitals::Failure};
-use protos::api::{Health, Problem, Readiness, Version};
+use protos::api::{Health, Problem, Readiness, StorageHealth, Version};
 use serde_json::json;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
@@ -32,11 +32,33 @@ async fn readyz(State(app): State<AppState>) -> Result<Json<Readiness>, ApiError
     let damaged_pictures = crate::store::pictures::damaged(app.store.reads()).await?;
     let backup = app.backups.health();
     let scheduled_failed = backup.every_hours > 0 && backup.failed.is_some();
-    let is_degraded = !maps_not_in_use.is_empty() || !damaged_pictures.is_empty() || scheduled_failed;
+    let storage = storage(app.store.disk().space());
+    let is_degraded = !maps_not_in_use.is_empty()
+        || !damaged_pictures.is_empty()
+        || scheduled_failed
+        || storage.refused.is_some();
     let status = if is_degraded { "degraded" } else { "ready" };
     let panics =
         Edge::ALL.into_iter().map(|edge| (edge.name().to_owned(), vitals.panics().at(edge))).collect();
-    Ok(Json(Readiness { status: status.to_owned(), maps_not_in_use, damaged_pictures, backup, panics }))
+    Ok(Json(Readiness {
+        status: status.to_owned(),
+        maps_not_in_use,
+        damaged_pictures,
+        backup,
+        storage: Some(storage),
+        panics,
+    }))
+}
+
+fn storage(space: DiskSpace) -> StorageHealth {
+    StorageHealth {
+        total_bytes: space.total_bytes,
+        free_bytes: space.free_bytes,
+        reusable_bytes: space.reusable_bytes,
+        used_percent: space.used_percent(),
+        limit_percent: space.limit_percent,
+        refused: space.refusal(),
+    }
 }
 
 fn not_ready(failure: &Failure) -> ApiError {

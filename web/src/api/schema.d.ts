@@ -4375,10 +4375,11 @@ export interface components {
                 [key: string]: number;
             };
             /**
-             * @description `ready`, or `degraded`: everything runs, but something is named in `maps_not_in_use` or
-             *     `damaged_pictures`, or the last scheduled backup failed.
+             * @description `ready`, or `degraded`: everything runs, but something is named in `maps_not_in_use`, `damaged_pictures` or
+             *     `storage.refused`, or the last scheduled backup failed.
              */
             status: string;
+            storage?: components["schemas"]["StorageHealth"] | null;
         };
         /** @description A recording as it stands. */
         RecordingStatusBody: {
@@ -4879,6 +4880,36 @@ export interface components {
         SizeAndPlace: {
             place?: components["schemas"]["Place"] | null;
             size?: components["schemas"]["Size"] | null;
+        };
+        /** @description The disk of the data directory at the last look, some seconds ago at most. */
+        StorageHealth: {
+            /**
+             * Format: int64
+             * @description Of these, free.
+             */
+            free_bytes: number;
+            /**
+             * Format: int64
+             * @description The setting `limits.disk_percent`: from here on nothing is added.
+             */
+            limit_percent: number;
+            /** @description Why nothing is added at present, and what to do. Robots are served all the same. */
+            refused?: string | null;
+            /**
+             * Format: int64
+             * @description Bytes of the database file that deletions have freed: new data take them first.
+             */
+            reusable_bytes: number;
+            /**
+             * Format: int64
+             * @description Bytes that the server's user can fill; 0 where that is not known.
+             */
+            total_bytes: number;
+            /**
+             * Format: int64
+             * @description Used share, in percent, rounded down.
+             */
+            used_percent: number;
         };
         /** @description A stored answer with everything that was said. */
         StoredAnswer: {
@@ -6018,7 +6049,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -6175,7 +6206,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -6390,7 +6421,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -6799,7 +6830,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -7107,7 +7138,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -7310,7 +7341,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -7478,7 +7509,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -7632,7 +7663,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -7777,7 +7808,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -8166,7 +8197,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -8309,7 +8340,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -8451,7 +8482,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -8771,7 +8802,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -8875,7 +8906,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -9114,7 +9145,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -9223,7 +9254,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -9567,7 +9598,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -9738,7 +9769,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -9897,7 +9928,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -9994,7 +10025,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -10166,7 +10197,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -10409,7 +10440,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -10670,7 +10701,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -10866,7 +10897,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -11044,7 +11075,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -11423,7 +11454,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -11590,7 +11621,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -12089,7 +12120,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -12185,7 +12216,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -12631,7 +12662,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -12841,7 +12872,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -13062,7 +13093,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -13156,7 +13187,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -13252,7 +13283,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -13509,7 +13540,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -13743,7 +13774,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -13913,7 +13944,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -14079,7 +14110,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -14428,7 +14459,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -14545,7 +14576,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -14864,7 +14895,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -15000,7 +15031,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -15260,7 +15291,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -15618,7 +15649,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -15700,7 +15731,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -16161,7 +16192,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -16477,7 +16508,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -16560,7 +16591,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -16777,7 +16808,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -16945,7 +16976,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -17027,7 +17058,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -17201,7 +17232,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -17500,7 +17531,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -17728,7 +17759,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -17810,7 +17841,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;

@@ -131,15 +131,28 @@ class Health:
 
 
 @dataclass(frozen=True, slots=True)
+class StorageHealth:
+    """The disk of the data directory. `refused` says why nothing can be added at present."""
+
+    total_bytes: int
+    free_bytes: int
+    reusable_bytes: int
+    used_percent: int
+    limit_percent: int
+    refused: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Readiness:
     """`ready`, or `degraded`: everything runs, but some maps use an earlier version, or none, stored pictures are
-    damaged, or the last scheduled backup failed."""
+    damaged, the last scheduled backup failed, or the disk has no room."""
 
     status: str
     maps_not_in_use: dict[str, str]
     panics: dict[str, int]
     damaged_pictures: tuple[str, ...] = ()
     backup: BackupHealth | None = None
+    storage: StorageHealth | None = None
 
 
 @dataclass(frozen=True, slots=True)
