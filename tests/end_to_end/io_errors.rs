@@ -9,12 +9,13 @@ use std::{
     process::{Command, Stdio},
 };
 use tempfile::TempDir;
-use tests::{Child, SOON, eventually, skipped};
+use tests::{Child, eventually, skipped};
 
 const MAP: &str = "hall";
-/// The call that fails, from 1 to this, in each run of the tests and in the long one (`WAYMARK_LONG=1`).
-const CALLS: u64 = 10;
-const LONG_CALLS: u64 = 60;
+/// System calls that fail, and which of them, from the first to this: in each run of the tests, and in the long one
+/// (`WAYMARK_LONG=1`). So many syncs come before the log is moved into the file, whose errors SQLite does not report: what was
+/// not moved stays in the log.
+const CALLS: [(&str, u64, u64); 2] = [("pwrite64", 10, 60), ("fsync,fdatasync", 10, 40)];
 
 /// Whether this machine lets one process trace another.
 fn may_trace() -> bool {
@@ -23,11 +24,11 @@ fn may_trace() -> bool {
     traced.is_ok_and(|status| status.success())
 }
 
-/// Lets the `call`-th write or sync of each thread of a process fail from now on. Returns once it holds for all threads.
-async fn fail(process: u32, call: u64) -> std::process::Child {
-    let inject = format!("inject=fsync,fdatasync,pwrite64:error=EIO:when={call}");
+/// Lets the `number`-th of these calls of each thread of a process fail from now on. Returns once it holds for all threads.
+async fn fail(process: u32, calls: &str, number: u64) -> std::process::Child {
+    let (trace, inject) = (format!("trace={calls}"), format!("inject={calls}:error=EIO:when={number}"));
     let mut strace = Command::new("strace");
-    strace.args(["-f", "-qq", "-e", "trace=fsync,fdatasync,pwrite64", "-e", &inject, "-o", "/dev/null"]);
+    strace.args(["-f", "-qq", "-e", &trace, "-e", &inject, "-o", "/dev/null"]);
     let strace = strace.args(["-p", &process.to_string()]).spawn().expect("strace starts");
     eventually("every thread is traced", || async {
         let threads = fs::read_dir(format!("/proc/{process}/task")).ok()?;
@@ -55,13 +56,18 @@ async fn an_error_of_the_disk_ends_the_process_and_loses_nothing_acknowledged() 
     if !may_trace() {
         return skipped("no process may be traced here (needs strace and ptrace)");
     }
-    let calls = if std::env::var_os("WAYMARK_LONG").is_some() { LONG_CALLS } else { CALLS };
+    let is_long = std::env::var_os("WAYMARK_LONG").is_some();
+    let last = |short: u64, long: u64| if is_long { long } else { short };
+    let all =
+        CALLS.iter().flat_map(|(calls, short, long)| (1..=last(*short, *long)).map(move |n| (*calls, n)));
+    let all: Vec<(&str, u64)> = all.collect();
     let data = TempDir::new().expect("a temporary directory");
     let server = Child::start(data.path());
     server.maps().create_map(&NewMap::new(MAP)).await.expect("map");
     server.kill();
     let mut acknowledged = 0;
-    for call in 1..=calls {
+    for (calls, number) in &all {
+        let call = format!("{calls} {number}");
         let mut command = Child::command(data.path(), &[]);
         let mut server = Child::start_from(command.stderr(Stdio::piped()));
         let maps = server.maps();
@@ -72,7 +78,7 @@ async fn an_error_of_the_disk_ends_the_process_and_loses_nothing_acknowledged() 
             let mut text = String::new();
             stderr.read_to_string(&mut text).map(|_| text)
         });
-        let mut strace = fail(server.id(), call).await;
+        let mut strace = fail(server.id(), calls, *number).await;
         acknowledged = taught(&maps, there).await;
         // It ends by itself, within the time that its other parts have to end.
         let status = eventually("the process ends", || {
@@ -91,9 +97,9 @@ async fn an_error_of_the_disk_ends_the_process_and_loses_nothing_acknowledged() 
     let server = Child::start(data.path());
     let there = server.maps().landmarks(MAP).await.expect("landmarks").len() as u64;
     assert!((acknowledged..=acknowledged + 1).contains(&there), "{there} of {acknowledged}");
-    let bound = 300.0 / calls as f64;
+    let count = all.len();
+    let bound = 300.0 / count as f64;
     eprintln!(
-        "{calls} errors of the disk: {acknowledged} acknowledged, none lost; at most {bound:.0} % lose something at 95 %"
+        "{count} errors of the disk: {acknowledged} acknowledged, none lost; at most {bound:.0} % lose something at 95 %"
     );
-    assert!(SOON.as_secs() > 20, "longer than the stop after a failure");
 }

@@ -19,7 +19,7 @@ const CHECKS: u64 = 60;
 /// Pages after which the log is moved into the file: often, so that cuts fall into it.
 const CHECKPOINT_PAGES: u32 = 40;
 /// Latest call that is cut.
-const LATEST: u64 = 1_500;
+const LATEST: u64 = 600;
 
 /// What one cut has shown.
 #[derive(Debug, Default, Clone, Copy)]
