@@ -56,6 +56,8 @@ async fn status(session: &Session) -> anyhow::Result<()> {
         "The server is degraded: not every map is in use."
     } else if readiness.counts.damaged_pictures > 0 {
         "The server is degraded: stored pictures are damaged."
+    } else if readiness.storage.as_ref().is_some_and(|disk| disk.refused.is_some()) {
+        "The server is degraded: nothing can be added, for lack of room on its disk."
     } else if readiness.status == "degraded" {
         "The server is degraded: the last scheduled backup failed."
     } else {
@@ -109,6 +111,8 @@ fn text(version: &Version, readiness: &Readiness, counts: &Counts) -> String {
     lines.extend((hidden > 0).then(|| format!("  {} of other tokens not in use", counted(hidden, "map"))));
     let hidden = counts.damaged_pictures.saturating_sub(readiness.damaged_pictures.len() as u64);
     lines.extend((hidden > 0).then(|| format!("  {} not named here", counted(hidden, "damaged picture"))));
+    let refused = readiness.storage.iter().filter_map(|disk| disk.refused.as_ref());
+    lines.extend(refused.map(|why| format!("  nothing is added: {why}")));
     let unused = readiness.maps_not_in_use.iter();
     lines.extend(unused.map(|(map, why)| format!("  map {map} is not in use: {why}")));
     let damaged = readiness.damaged_pictures.iter();
@@ -121,7 +125,7 @@ fn text(version: &Version, readiness: &Readiness, counts: &Counts) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use client::api::ReadinessCounts;
+    use client::api::{ReadinessCounts, StorageHealth};
 
     #[test]
     fn a_status_names_maps_that_are_not_in_use_and_faults() {
@@ -144,6 +148,10 @@ mod tests {
                 failed: Some("no space".into()),
             },
             parts_still_s: [("the outbox".to_owned(), 0)].into(),
+            storage: Some(StorageHealth {
+                refused: Some("the disk is full".into()),
+                ..StorageHealth::default()
+            }),
             panics: [("a frame".to_owned(), 2), ("a write".to_owned(), 0)].into(),
         };
         let counts = Counts { maps: 1, landmarks: 2, robots: 0, connected: 0 };
@@ -159,6 +167,7 @@ mod tests {
         );
         assert!(lines.contains("  2 maps of other tokens not in use\n"), "{lines}");
         assert!(!lines.contains("not named here"), "{lines}");
+        assert!(lines.contains("\n  nothing is added: the disk is full\n"), "{lines}");
         assert!(lines.contains("damaged picture: view 3 of landmark door, map office; "), "{lines}");
         assert!(lines.ends_with("2 faults of the program caught in a frame: see its log"), "{lines}");
     }

@@ -16,7 +16,10 @@ use session::{Session, Start};
 use std::{
     collections::BTreeMap,
     path::{Path, PathBuf},
-    sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError},
+    sync::{
+        Arc, Mutex, MutexGuard, OnceLock, PoisonError,
+        atomic::{AtomicBool, Ordering},
+    },
 };
 use tokio::sync::oneshot;
 
@@ -98,12 +101,19 @@ pub struct MappingSessions {
     dir: OnceLock<PathBuf>,
     /// Counts the panics of mappings.
     panics: OnceLock<Arc<Panics>>,
+    /// Whether the disk has no room for journals.
+    no_room: Arc<AtomicBool>,
 }
 
 impl MappingSessions {
     /// Counts the panics of mappings in `panics` from now on.
     pub fn count_in(&self, panics: Arc<Panics>) {
         self.panics.get_or_init(|| panics);
+    }
+
+    /// Says whether the disk has room for journals. Without, a journal ends with its next scan; the mapping goes on.
+    pub fn set_room(&self, has_room: bool) {
+        self.no_room.store(!has_room, Ordering::Relaxed);
     }
 
     /// Writes journals to a folder from now on, and resumes the mappings there whose robot is still on the map (`is_on`); the
@@ -118,7 +128,7 @@ impl MappingSessions {
                 journal::remove(dir, map.as_str());
             } else if all.len() >= MAX_MAPPINGS {
                 tracing::warn!(%map, "mapping not resumed before the next start: {MAX_MAPPINGS} are open");
-            } else if let Some(session) = Session::begin(Start::Resumed(journal), self.panics()) {
+            } else if let Some(session) = Session::begin(Start::Resumed(journal), self.around()) {
                 tracing::info!(%map, %robot, "mapping_resumed");
                 all.insert(map.to_string(), session);
             }
@@ -140,7 +150,7 @@ impl MappingSessions {
         }
         let head = JournalHeader::new(map, robot, &origin);
         let journal = self.dir.get().map(|dir| Journal::create(dir, &head));
-        let session = Session::begin(Start::New(head, journal), self.panics()).ok_or(MappingError::Thread)?;
+        let session = Session::begin(Start::New(head, journal), self.around()).ok_or(MappingError::Thread)?;
         let progress = session.progress();
         all.insert(map.to_string(), session);
         if all.len() > MAX_SESSIONS {
@@ -206,6 +216,10 @@ impl MappingSessions {
         if let Some(dir) = self.dir.get() {
             journal::remove(Path::new(dir), map);
         }
+    }
+
+    fn around(&self) -> (Arc<Panics>, Arc<AtomicBool>) {
+        (self.panics(), self.no_room.clone())
     }
 
     fn panics(&self) -> Arc<Panics> {

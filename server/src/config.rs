@@ -165,9 +165,21 @@ pub struct Config {
     pub limits: Limits,
     /// Parameters of the algorithms.
     pub params: Arc<Params>,
+    /// Name of the layer between SQLite and the files, where a test has its own.
+    #[cfg(test)]
+    pub(crate) vfs: Option<&'static str>,
 }
 
 impl Config {
+    /// Name of the layer between SQLite and the files; `None` takes SQLite's own.
+    #[cfg_attr(not(test), expect(clippy::unused_self, reason = "only tests have another"))]
+    pub(crate) fn sqlite_vfs(&self) -> Option<&'static str> {
+        #[cfg(test)]
+        return self.vfs;
+        #[cfg(not(test))]
+        None
+    }
+
     /// The listeners that other machines can reach, by setting, with their addresses: they are not encrypted.
     pub fn plain_text_beyond_loopback(&self) -> Vec<(&'static str, String)> {
         let is_plain = |(is_tls, address): &(bool, SocketAddr)| !is_tls && !is_loopback(address.ip());
@@ -218,6 +230,10 @@ impl TryFrom<RawConfig> for Config {
                 return Err(invalid(field, "must be at least 1".into()));
             }
         }
+        if !(1..=100).contains(&raw.limits.disk_percent) {
+            let reason = format!("{} is not 1 to 100", raw.limits.disk_percent);
+            return Err(invalid("limits.disk_percent", reason));
+        }
         for (field, value) in [
             ("limits.frame_pixels", raw.limits.frame_pixels),
             ("limits.upload_pixels", raw.limits.upload_pixels),
@@ -253,6 +269,8 @@ impl TryFrom<RawConfig> for Config {
             ros2: ros2::checked(raw.ros2)?,
             limits: raw.limits,
             params: Arc::new(raw.algorithm),
+            #[cfg(test)]
+            vfs: None,
         })
     }
 }

@@ -21,6 +21,10 @@ pub(crate) async fn store_answers(
     let mut batch = Vec::with_capacity(BATCH);
     while records.recv_many(&mut batch, BATCH).await > 0 {
         let rows = std::mem::take(&mut batch);
+        if store.disk().check().is_err() {
+            tracing::debug!(count = rows.len(), "answers_not_stored: the disk is nearly full");
+            continue;
+        }
         let stored =
             store.write(move |tx| Box::pin(async move { stored_answers::add(tx, &rows, max).await }));
         if let Err(error) = stored.await {

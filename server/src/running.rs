@@ -41,7 +41,7 @@ pub struct RunningServer {
     /// Robots of ROS 2.
     pub ros2: Arc<Ros2>,
     pub(crate) sessions: Arc<Sessions>,
-    pub(crate) local_token: LocalToken,
+    pub(crate) local_token: Arc<LocalToken>,
     /// The first name of the certificate, or else the address; `None` without TLS.
     pub(crate) tls_name: Option<String>,
     pub(crate) stop: watch::Sender<bool>,
@@ -60,6 +60,7 @@ pub(crate) struct Tasks {
     pub(crate) recorders: [JoinHandle<()>; 3],
     pub(crate) gather: JoinHandle<()>,
     pub(crate) pictures: JoinHandle<()>,
+    pub(crate) disk: JoinHandle<()>,
     pub(crate) backups: JoinHandle<()>,
     pub(crate) writer: CatalogueTasks,
 }
@@ -109,7 +110,7 @@ impl RunningServer {
         self.vitals.stop();
         self.local_token.remove();
         self.stop.send_replace(true);
-        let Tasks { workers, bus, mut serving, jobs, recorders, gather, pictures, backups, writer } =
+        let Tasks { workers, bus, mut serving, jobs, recorders, gather, pictures, disk, backups, writer } =
             self.tasks;
         serving.unwatch().await;
         // Workers first: what they have in work is still answered over the open bus.
@@ -127,6 +128,7 @@ impl RunningServer {
             ("events", events),
             ("gathering", gather),
             ("the check of the pictures", pictures),
+            ("the look at the disk", disk),
             ("the timetable of backups", backups),
         ];
         for (what, task) in serving.tasks().chain(others) {

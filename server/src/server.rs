@@ -18,7 +18,12 @@ use crate::{
     ros2::Ros2,
     running::{RunningServer, Tasks},
     serving::{Listeners, Serving},
-    store::{OpenError, StoreError, actor::Actor, landmarks, now_ms, pictures},
+    store::{
+        OpenError, StoreError,
+        actor::Actor,
+        disk_guard::{self, DiskGuard},
+        landmarks, now_ms, pictures,
+    },
 };
 use engine::{
     answer_records::{AnswerRecord, answer_records},
@@ -106,6 +111,7 @@ impl Server {
         let (engine, recorded) = engine(&config, snapshots.clone(), vitals.clone(), (findings, tap));
         resume_mappings(&engine, &config, &snapshots);
         let recorders = recorders(&config, &store, (found, recorded, &engine.live), &stopping);
+        let disk = watch_disk(&store, &local_token, &engine, &stopping);
         let pictures = tokio::spawn(pictures::check_all((*store).clone(), stopping.clone()));
         let (live, slots) = (engine.live.clone(), engine.slots.clone());
         let to = receivers(&config, &engine, certificates.as_ref().map(|_| store.certificates().clone()));
@@ -139,6 +145,7 @@ impl Server {
             recorders,
             gather: teaching.gather_task,
             pictures,
+            disk,
             backups: backups_task,
             writer,
         };
@@ -175,11 +182,29 @@ fn resume_mappings(engine: &Engine, config: &Config, snapshots: &Snapshots) {
 }
 
 /// The token for programs of this user on this machine.
-fn write_local_token(config: &Config, store: &Catalogue, port: u16) -> Result<LocalToken, StartError> {
-    let written = LocalToken::write(&config.data, port);
+fn write_local_token(config: &Config, store: &Catalogue, port: u16) -> Result<Arc<LocalToken>, StartError> {
+    let written = LocalToken::write(&config.data, port).map(Arc::new);
     let written = written.map_err(|e| StartError::LocalToken(e.to_string()))?;
     store.tokens().set_local(written.secret());
     Ok(written)
+}
+
+/// Looks at the disk: while it is nearly full, journals of mappings get no more scans; when there is room again, what had none
+/// at the start is made.
+fn watch_disk(
+    store: &Catalogue,
+    token: &Arc<LocalToken>,
+    engine: &Engine,
+    stopping: &watch::Receiver<bool>,
+) -> JoinHandle<()> {
+    let (disk, token, motion) = (store.disk().clone(), token.clone(), engine.motion.clone());
+    let part = (store.vitals().begin(disk_guard::PART), stopping.clone());
+    let looked = disk.clone();
+    let after = move || {
+        motion.mappings().set_room(looked.check().is_ok());
+        token.write_again();
+    };
+    tokio::spawn(disk.watch(store.reads().clone(), part, after))
 }
 
 /// What robots are enrolled with, if their endpoint is encrypted.
@@ -219,7 +244,12 @@ impl Teaching {
         let started = Jobs::start(store.clone(), config.clone(), stopping.clone());
         let (jobs, jobs_task) = started.await.map_err(failed)?;
         if config.params.recognise.verdict.points {
-            jobs.renew().await.map_err(failed)?;
+            match jobs.renew().await {
+                Err(error) if error.is_of_the_disk() => {
+                    tracing::warn!(%error, follows = "the next start tries again", "models_not_renewed");
+                }
+                renewed => drop(renewed.map_err(failed)?),
+            }
         }
         let started = Gatherer::start(store.clone(), config, tap, offered);
         let (gatherer, gather_task) = started.await.map_err(failed)?;
@@ -244,9 +274,9 @@ fn recorders(
     [tokio::spawn(findings), tokio::spawn(answers), tokio::spawn(events)]
 }
 
-/// Whom a backup tells of its panics and of its end.
-fn told(store: &Catalogue) -> (Arc<Panics>, Arc<EventLog>) {
-    (store.vitals().panics().clone(), store.events().clone())
+/// Whom a backup tells of its panics and of its end, and whether there is room for it.
+fn told(store: &Catalogue) -> (Arc<Panics>, Arc<EventLog>, Arc<DiskGuard>) {
+    (store.vitals().panics().clone(), store.events().clone(), store.disk().clone())
 }
 
 /// Everything between frames and answers, for one set of settings; and the answers that are to be stored.

@@ -4,7 +4,7 @@ use client::MapClient;
 use std::{
     io::{BufRead, BufReader},
     path::{Path, PathBuf},
-    process::{Command, Stdio},
+    process::{ChildStderr, Command, ExitStatus, Stdio},
     sync::OnceLock,
 };
 
@@ -66,9 +66,25 @@ impl Child {
         MapClient::new(&self.url).expect("a client")
     }
 
-    /// Its number at the system.
+    /// Number of the process.
     pub fn id(&self) -> u32 {
         self.process.id()
+    }
+
+    /// Its standard error, where the command was given a pipe for it.
+    pub fn stderr(&mut self) -> ChildStderr {
+        self.process.stderr.take().expect("a pipe")
+    }
+
+    /// How it has ended by itself; `None` while it runs.
+    pub fn ended(&mut self) -> Option<ExitStatus> {
+        self.process.try_wait().expect("its status")
+    }
+
+    /// SIGTERM: it ends in good order.
+    pub fn stop(mut self) {
+        let told = Command::new("kill").arg(self.process.id().to_string()).status().expect("kill");
+        assert!(told.success() && self.process.wait().expect("wait").success(), "it stops");
     }
 
     /// SIGKILL: no destructor, no last write.

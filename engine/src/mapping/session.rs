@@ -19,6 +19,7 @@ use std::{
     io,
     sync::{
         Arc, Mutex, MutexGuard, PoisonError,
+        atomic::{AtomicBool, Ordering},
         mpsc::{Receiver, SyncSender, sync_channel},
     },
 };
@@ -58,7 +59,7 @@ pub(super) struct Session {
 
 impl Session {
     /// Starts its thread.
-    pub(super) fn begin(mut start: Start, panics: Arc<Panics>) -> Option<Self> {
+    pub(super) fn begin(mut start: Start, (panics, no_room): (Arc<Panics>, Arc<AtomicBool>)) -> Option<Self> {
         let head = match &start {
             Start::New(head, _) => head.clone(),
             Start::Resumed(journal) => journal.head.clone(),
@@ -88,7 +89,7 @@ impl Session {
         let shared = progress.clone();
         let work = move || {
             // A panic leaves nothing shared half changed: the map so far belongs to this thread.
-            let mapper = Mapper::new(shared.clone(), origin);
+            let mapper = Mapper::new(shared.clone(), origin, no_room);
             let run = || mapper.run(start, first, &received);
             if panics.catch(Edge::Mapping, "a mapping", "this mapping has failed", run).is_none() {
                 fail(&shared, "the server failed on these scans; see its log");
@@ -156,11 +157,13 @@ struct Mapper {
     origin: Pose2,
     last: Option<Pose2>,
     journal: Option<Journal>,
+    no_room: Arc<AtomicBool>,
 }
 
 impl Mapper {
-    fn new(progress: Shared, origin: Pose2) -> Self {
-        Self { slam: Slam::new(SlamParams::default()), progress, origin, last: None, journal: None }
+    fn new(progress: Shared, origin: Pose2, no_room: Arc<AtomicBool>) -> Self {
+        let slam = Slam::new(SlamParams::default());
+        Self { slam, progress, origin, last: None, journal: None, no_room }
     }
 
     /// Maps the journal, then scans until the mapping finishes or is cancelled.
@@ -199,7 +202,14 @@ impl Mapper {
         while let Ok(command) = commands.recv() {
             match command {
                 Command::Scan(job) => {
-                    let written = self.journal.as_mut().map(|journal| journal.scan(&job));
+                    let no_room = self.no_room.load(Ordering::Relaxed);
+                    let write = |journal: &mut Journal| {
+                        if no_room {
+                            return Err(io::Error::other("the disk of the data directory is nearly full"));
+                        }
+                        journal.scan(&job)
+                    };
+                    let written = self.journal.as_mut().map(write);
                     if let Some(Err(error)) = written {
                         self.write_to(Some(Err(error)));
                     }

@@ -16,7 +16,8 @@ pub struct Health {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct Readiness {
-    /// `ready`, or `degraded`: everything runs, but one of `counts` is not 0, or the last scheduled backup failed.
+    /// `ready`, or `degraded`: everything runs, but one of `counts` is not 0, the disk has no room, or the last scheduled
+    /// backup failed.
     pub status: String,
     /// How many there are of what is wrong, for whoever asks.
     #[serde(default)]
@@ -35,6 +36,9 @@ pub struct Readiness {
     /// Empty for whoever does not see all maps.
     #[serde(default)]
     pub parts_still_s: BTreeMap<String, u64>,
+    /// The disk of the data directory; absent for whoever does not see all maps, and where an earlier build answers.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub storage: Option<StorageHealth>,
     /// Panics caught since the start, by where: what they met was refused or dropped, everything else went on. Each is in
     /// the log. Anything but 0 is a fault of the program.
     pub panics: BTreeMap<String, u64>,
@@ -48,6 +52,25 @@ pub struct ReadinessCounts {
     pub maps_not_in_use: u64,
     /// Views, tracks and underlays whose stored picture is damaged.
     pub damaged_pictures: u64,
+}
+
+/// The disk of the data directory at the last look, some seconds ago at most.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct StorageHealth {
+    /// Bytes that the server's user can fill; 0 where that is not known.
+    pub total_bytes: u64,
+    /// Of these, free.
+    pub free_bytes: u64,
+    /// Bytes of the database file that deletions have freed: new data take them first.
+    pub reusable_bytes: u64,
+    /// Used share, in percent, rounded down.
+    pub used_percent: u64,
+    /// The setting `limits.disk_percent`: from here on nothing is added.
+    pub limit_percent: u64,
+    /// Why nothing is added at present, and what to do. Robots are served all the same.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub refused: Option<String>,
 }
 
 /// What runs here.

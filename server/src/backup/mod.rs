@@ -14,7 +14,7 @@ pub use restore::{DirectoryError, RestoreError, StoppedServer, Verified, verify}
 use crate::{
     config::{BackupSettings, Config, MAX_KEPT},
     events::EventLog,
-    store::{StoreError, copies, kind::Kind, now_ms, pictures, restored},
+    store::{StoreError, copies, disk_guard::DiskGuard, kind::Kind, now_ms, open, pictures, restored},
 };
 use archive::{ArchiveError, Manifest};
 use engine::panics::{Edge, Panics};
@@ -70,6 +70,7 @@ pub(crate) struct Backups {
     settings: BackupSettings,
     panics: Arc<Panics>,
     events: Arc<EventLog>,
+    disk: Arc<DiskGuard>,
     state: Mutex<State>,
 }
 
@@ -77,7 +78,7 @@ impl Backups {
     /// Begins to keep the timetable. Removes what an earlier server has left half written.
     pub(crate) fn start(
         config: &Config,
-        (panics, events): (Arc<Panics>, Arc<EventLog>),
+        (panics, events, disk): (Arc<Panics>, Arc<EventLog>, Arc<DiskGuard>),
         stopping: watch::Receiver<bool>,
     ) -> (Arc<Self>, JoinHandle<()>) {
         let folder = config.data.join("backups");
@@ -89,6 +90,7 @@ impl Backups {
             settings: config.backup,
             panics,
             events,
+            disk,
             state: Mutex::new(State { newest, ..State::default() }),
         });
         let task = tokio::spawn(backups.clone().keep_timetable(stopping));
@@ -162,6 +164,8 @@ impl Backups {
     }
 
     async fn written(&self, part: &Path, created_ms: i64) -> Result<(), BackupError> {
+        // About as large as the file that it is copied from.
+        self.disk.check_for(fs::metadata(self.data.join(open::FILE))?.len())?;
         fs::create_dir_all(&self.folder)?;
         copies::copy(&self.data, part).await?;
         let (contents, faults) = copies::examine(part).await?;

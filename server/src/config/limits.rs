@@ -1,4 +1,4 @@
-//! Every bound of the server.
+//! Every bound of the server, with its default.
 
 use engine::decode::ImageLimits;
 use serde::{Deserialize, Serialize};
@@ -90,6 +90,13 @@ pub struct Limits {
     pub audit_entries: usize,
     /// Seconds for which a part of the server may not go on before the server ends with an error.
     pub stalled_s: u64,
+    /// Used share of the disk of the data directory, in percent, from which on nothing is added: views, lessons, maps,
+    /// backups. Recognition and deletions go on. 100: only a full disk refuses.
+    pub disk_percent: u32,
+    /// A disk with more bytes free than this is not nearly full, whatever its used share.
+    pub disk_spare_bytes: usize,
+    /// Nothing is added while fewer bytes than this are free.
+    pub disk_free_bytes: usize,
 }
 
 impl Default for Limits {
@@ -135,6 +142,9 @@ impl Default for Limits {
             history_bytes: 4 << 30,
             audit_entries: 100_000,
             stalled_s: 15,
+            disk_percent: 90,
+            disk_spare_bytes: 5 << 30,
+            disk_free_bytes: 8 << 20,
         }
     }
 }

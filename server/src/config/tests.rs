@@ -170,6 +170,8 @@ fn bad_settings_are_named() {
         (limits(|l| l.views = 0), "limits.views"),
         (limits(|l| l.robot_bytes_per_s = 0), "limits.robot_bytes_per_s"),
         (limits(|l| l.waiting_frame_bytes = l.frame_bytes - 1), "limits.waiting_frame_bytes"),
+        (limits(|l| l.disk_percent = 0), "limits.disk_percent"),
+        (limits(|l| l.disk_percent = 101), "limits.disk_percent"),
         (limits(|l| l.upload_pixels = vision::frame::MAX_AREA_PX + 1), "limits.upload_pixels"),
     ] {
         match Config::try_from(raw) {

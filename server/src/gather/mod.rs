@@ -243,6 +243,10 @@ impl Gatherer {
 
     async fn store_view(&self, gathering: &ActiveGathering, track: Box<StoredTrack>, view: NewView) {
         let id = gathering.id;
+        if self.store.disk().check().is_err() {
+            lock(&gathering.counts).not_stored += 1;
+            return;
+        }
         let write = self.store.write(move |tx| {
             Box::pin(
                 async move { gatherings::add_view(tx, id, &track, &view, GatheringLimits::SERVER).await },

@@ -1,7 +1,8 @@
 //! `Idempotency-Key`: a creation that is repeated with its key is answered as the first time, and made once.
 
 use super::{
-    API, AppState, error::ApiError, extract::too_large, reference_runs::PATH_BYTES, upload::FORM_OVERHEAD,
+    API, AppState, error::ApiError, extract::too_large, reference_runs::PATH_BYTES, room,
+    upload::FORM_OVERHEAD,
 };
 use crate::{
     config::Limits,
@@ -61,12 +62,12 @@ pub(super) async fn keyed(app: &AppState, request: Request, next: Next) -> Respo
     let creation = CREATIONS.iter().find(|(at, _)| path == Some(*at));
     match creation {
         // A bundle goes to a file before its digest is known.
-        Some((LOAD, _)) => next.run(request).await,
+        Some((LOAD, _)) => room::run(app, request, next).await,
         Some((_, max)) if request.method() == Method::POST && request.headers().contains_key(KEY) => {
             let max = max(&app.config.limits);
             once(app, request, max, next).await.unwrap_or_else(IntoResponse::into_response)
         }
-        _ => next.run(request).await,
+        _ => room::run(app, request, next).await,
     }
 }
 
@@ -80,8 +81,11 @@ async fn once(app: &AppState, request: Request, max: usize, next: Next) -> Resul
     let digest = tokio::task::spawn_blocking(move || digest(&path, &kind, &bytes)).await;
     let digest = digest.map_err(|e| ApiError::internal(&e))?;
     let again = head.clone();
-    under_key(app, &again, digest, async { Ok(next.run(Request::from_parts(head, Body::from(body))).await) })
-        .await
+    under_key(app, &again, digest, async {
+        // A repeat of what was made is answered without room, too.
+        Ok(room::run(app, Request::from_parts(head, Body::from(body)), next).await)
+    })
+    .await
 }
 
 /// The answer to a creation, of `work` or of an earlier request. Without a key that is always `work`.

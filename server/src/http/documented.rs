@@ -19,7 +19,7 @@ const ALWAYS: [(&str, &str); 5] = [
 const WITH_BODY: [(&str, &str); 3] =
     [("413", "too_large"), ("422", "invalid_value"), ("503", "too_many_uploads")];
 /// Of a change of what is stored.
-const CHANGING: [(&str, &str); 1] = [("507", "storage_full")];
+const CHANGING: [(&str, &str); 1] = [("507", "storage_full, storage_nearly_full, storage_read_only")];
 
 /// Adds the errors to every operation.
 pub(super) fn with_errors(mut document: OpenApi) -> OpenApi {

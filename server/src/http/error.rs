@@ -159,6 +159,13 @@ impl From<StoreError> for ApiError {
                 Self::new(StatusCode::CONFLICT, code, detail).field("parent.map")
             }
             StoreError::Full => Self::new(StatusCode::INSUFFICIENT_STORAGE, "storage_full", detail),
+            StoreError::ReadOnly => Self::new(StatusCode::INSUFFICIENT_STORAGE, "storage_read_only", detail),
+            StoreError::NearlyFull(space) => {
+                Self::new(StatusCode::INSUFFICIENT_STORAGE, "storage_nearly_full", detail)
+                    .with("used_percent", json!(space.used_percent()))
+                    .with("limit_percent", json!(space.limit_percent))
+                    .with("free_bytes", json!(space.free_bytes))
+            }
             StoreError::Closed => Self::new(StatusCode::SERVICE_UNAVAILABLE, "storage_failed", detail),
             StoreError::NotPublished { .. } => {
                 Self::new(StatusCode::INTERNAL_SERVER_ERROR, "not_published", detail)

@@ -3,7 +3,7 @@
 use super::{AppState, authorise, error::ApiError};
 use crate::{
     identity::Principal,
-    store::{WRITER, pictures},
+    store::{WRITER, disk_guard::DiskSpace, pictures},
 };
 use axum::{
     Json,
@@ -11,7 +11,7 @@ use axum::{
     http::{StatusCode, request::Parts},
 };
 use engine::{heartbeats::Heartbeat, panics::Edge, vitals::Failure};
-use protos::api::{BackupHealth, Health, Problem, Readiness, ReadinessCounts, Version};
+use protos::api::{BackupHealth, Health, Problem, Readiness, ReadinessCounts, StorageHealth, Version};
 use serde_json::json;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
@@ -55,14 +55,37 @@ async fn readyz(State(app): State<AppState>, parts: Parts) -> Result<Json<Readin
     if !sees_all {
         backup = BackupHealth { newest: None, failed: None, ..backup };
     }
-    let is_degraded = counts != ReadinessCounts::default() || scheduled_failed;
+    let storage = storage(app.store.disk().space());
+    let has_no_room = storage.refused.is_some();
+    let is_degraded = counts != ReadinessCounts::default() || scheduled_failed || has_no_room;
     let status = if is_degraded { "degraded" } else { "ready" }.to_owned();
     let panics =
         Edge::ALL.into_iter().map(|edge| (edge.name().to_owned(), vitals.panics().at(edge))).collect();
     let hearts = vitals.hearts().all();
     let seen = hearts.iter().filter(|_| sees_all);
     let parts_still_s = seen.map(|heart| (heart.part().to_owned(), heart.still().as_secs())).collect();
-    Ok(Json(Readiness { status, counts, maps_not_in_use, damaged_pictures, backup, parts_still_s, panics }))
+    let storage = sees_all.then_some(storage);
+    Ok(Json(Readiness {
+        status,
+        counts,
+        maps_not_in_use,
+        damaged_pictures,
+        backup,
+        parts_still_s,
+        storage,
+        panics,
+    }))
+}
+
+fn storage(space: DiskSpace) -> StorageHealth {
+    StorageHealth {
+        total_bytes: space.total_bytes,
+        free_bytes: space.free_bytes,
+        reusable_bytes: space.reusable_bytes,
+        used_percent: space.used_percent(),
+        limit_percent: space.limit_percent,
+        refused: space.refusal(),
+    }
 }
 
 fn stalled(heart: &Heartbeat, limit_s: u64, sees_all: bool) -> ApiError {

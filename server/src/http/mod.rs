@@ -49,6 +49,7 @@ mod revision;
 mod robot_activity;
 mod robot_certificates;
 mod robots;
+mod room;
 mod ros2;
 mod router;
 mod security;

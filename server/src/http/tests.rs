@@ -64,7 +64,7 @@ impl Service {
         let (jobs, _) = Jobs::start(store.clone(), config.clone(), stopping.clone()).await.unwrap();
         let (tap, frames) = crate::gather::gathering_tap();
         let (gatherer, _) = Gatherer::start(store.clone(), &config, &tap, frames).await.unwrap();
-        let told = (store.vitals().panics().clone(), store.events().clone());
+        let told = (store.vitals().panics().clone(), store.events().clone(), store.disk().clone());
         let (backups, _) = crate::backup::Backups::start(&config, told, stopping.clone());
         let hall = Arc::new(MapSnapshot::empty("hall", 1));
         let engine =

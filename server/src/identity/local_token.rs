@@ -8,6 +8,7 @@ use super::{
 use std::{
     fs, io,
     path::{Path, PathBuf},
+    sync::atomic::{AtomicBool, Ordering},
 };
 
 /// Name of the file in the data directory; clients read no other.
@@ -36,10 +37,12 @@ pub(crate) struct LocalToken {
     path: PathBuf,
     secret: Secret<32>,
     port: u16,
+    is_written: AtomicBool,
 }
 
 impl LocalToken {
-    /// Writes a fresh token for the server on this port.
+    /// Writes a fresh token for the server on this port. A full disk or a read-only one does not keep the server from starting:
+    /// then the file comes later ([`LocalToken::write_again`]).
     pub(crate) fn write(data: &Path, port: u16) -> Result<Self, LocalTokenError> {
         let secret = Secret::random()?;
         let text = TokenText::local(port, &secret);
@@ -48,8 +51,37 @@ impl LocalToken {
             |source| LocalTokenError::File { path, source }
         };
         let path = data.canonicalize().map_err(at(data))?.join(FILE);
-        private_file::write(&path, &format!("{text}\n")).map_err(at(&path))?;
-        Ok(Self { path, secret, port })
+        let text = format!("{text}\n");
+        let written = match private_file::write(&path, &text) {
+            Err(error) if error.kind() == io::ErrorKind::StorageFull => {
+                // That of an earlier start opens nothing any more, and its place is as large. Fails where there is none.
+                drop(fs::remove_file(&path));
+                private_file::write(&path, &text)
+            }
+            written => written,
+        };
+        let is_written = match written {
+            Ok(()) => true,
+            Err(error) if has_no_room(&error) => {
+                let follows = "commands on this machine have no token until there is room";
+                tracing::warn!(%error, path = %path.display(), follows, "local_token_not_written");
+                false
+            }
+            Err(source) => return Err(at(&path)(source)),
+        };
+        Ok(Self { path, secret, port, is_written: is_written.into() })
+    }
+
+    /// Writes the file if the start could not.
+    pub(crate) fn write_again(&self) {
+        if self.is_written.load(Ordering::Relaxed) {
+            return;
+        }
+        let text = format!("{}\n", TokenText::local(self.port, &self.secret));
+        match private_file::write(&self.path, &text) {
+            Ok(()) => self.is_written.store(true, Ordering::Relaxed),
+            Err(error) => tracing::debug!(%error, "local_token_not_written"),
+        }
     }
 
     /// Where it is, absolute.
@@ -71,6 +103,14 @@ impl LocalToken {
             tracing::warn!(%error, path = %self.path.display(), follows, "local_token_not_removed");
         }
     }
+}
+
+/// Whether a file may be written later.
+fn has_no_room(error: &io::Error) -> bool {
+    matches!(
+        error.kind(),
+        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded | io::ErrorKind::ReadOnlyFilesystem
+    )
 }
 
 #[cfg(test)]

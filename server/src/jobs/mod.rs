@@ -305,8 +305,11 @@ impl Jobs {
         }
     }
 
-    /// The first open job whose pause is over.
+    /// The first open job whose pause is over. While the disk is nearly full, all wait.
     async fn next(&self) -> Result<Next, StoreError> {
+        if self.store.disk().check().is_err() {
+            return Ok(Next::NoneFor(RETRY));
+        }
         let up = self.started.elapsed();
         let mut wait = Duration::MAX;
         for row in jobs::open(self.store.reads()).await? {

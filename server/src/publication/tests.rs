@@ -138,7 +138,7 @@ async fn a_job_ends_once() {
 }
 
 /// A model of one view of random grey levels, stored.
-async fn store_model(store: &Catalogue, landmark: i64, params: &vision::params::Params) {
+pub(crate) async fn store_model(store: &Catalogue, landmark: i64, params: &vision::params::Params) {
     use vision::{geometry::Corners, icon::Icon, learn, model::LandmarkId};
     let side = params.icon.size;
     let pixels = (0..side * side).map(|i| ((i * i * 31 + i * 7) % 251) as f32).collect();

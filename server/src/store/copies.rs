@@ -97,7 +97,7 @@ pub(crate) async fn open_file(file: &Path) -> Result<SqliteConnection, StoreErro
     read_options(file).immutable(true).connect().await.map_err(StoreError::during("open the copy"))
 }
 
-async fn schema(conn: &mut SqliteConnection) -> Result<i64, StoreError> {
+pub(super) async fn schema(conn: &mut SqliteConnection) -> Result<i64, StoreError> {
     sqlx::query_scalar(SCHEMA).fetch_one(conn).await.map_err(StoreError::during("read the schema"))
 }
 

@@ -1,6 +1,6 @@
 //! What can go wrong with the store, sorted by what the caller can do about it.
 
-use super::kind::Kind;
+use super::{disk_guard::DiskSpace, kind::Kind};
 use vision::pose::LandmarkSize;
 
 /// Why a read or a write did not happen. Nothing was changed, except with [`StoreError::NotPublished`].
@@ -76,8 +76,17 @@ pub(crate) enum StoreError {
     #[error(transparent)]
     Frames(#[from] map::map_links::MapLinkError),
     /// The disk is full; reading goes on.
-    #[error("the disk is full")]
+    #[error("the disk of the data directory is full: free some space, then this goes on by itself")]
     Full,
+    /// The disk has no room for what adds data; everything else goes on.
+    #[error("{0}")]
+    NearlyFull(Box<DiskSpace>),
+    /// The data directory is mounted read-only; reading goes on.
+    #[error(
+        "the data directory is on a read-only file system: robots are served and nothing is stored; mount it writable, \
+             then start the server again"
+    )]
+    ReadOnly,
     /// The write panicked: it was rolled back.
     #[error("the server failed on this write; nothing was changed")]
     Panicked,
@@ -141,14 +150,32 @@ fn size_text(size: &LandmarkSize) -> String {
 }
 
 /// SQLite result codes (primary, the low byte).
+const SQLITE_READONLY: i32 = 8;
 const SQLITE_IOERR: i32 = 10;
 const SQLITE_CORRUPT: i32 = 11;
 const SQLITE_FULL: i32 = 13;
 const SQLITE_NOTADB: i32 = 26;
 
+/// SQLite extended result codes of shared memory that cannot be made: it has nothing to do with what is stored.
+const SQLITE_IOERR_SHMOPEN: i32 = 4618;
+const SQLITE_IOERR_SHMSIZE: i32 = 4874;
+const SQLITE_IOERR_SHMMAP: i32 = 5386;
+const SQLITE_CANTOPEN: i32 = 14;
+
+fn extended_code(error: &sqlx::Error) -> Option<i32> {
+    error.as_database_error()?.code()?.parse::<i32>().ok()
+}
+
 fn primary_code(error: &sqlx::Error) -> Option<i32> {
-    let code = error.as_database_error()?.code()?.parse::<i32>().ok()?;
-    Some(code & 0xff)
+    extended_code(error).map(|code| code & 0xff)
+}
+
+/// Whether a file beside the database cannot be made or enlarged.
+pub(super) fn is_without_room(error: &sqlx::Error) -> bool {
+    matches!(
+        extended_code(error),
+        Some(SQLITE_FULL | SQLITE_IOERR_SHMOPEN | SQLITE_IOERR_SHMSIZE | SQLITE_IOERR_SHMMAP)
+    ) || primary_code(error) == Some(SQLITE_CANTOPEN)
 }
 
 /// Whether the content of the file is wrong at the place that was read. Reading it again gives the same.
@@ -159,8 +186,9 @@ pub(super) fn is_damage(error: &sqlx::Error) -> bool {
 impl StoreError {
     /// Names the operation. For `map_err`.
     pub(crate) fn during(operation: &'static str) -> impl FnOnce(sqlx::Error) -> Self {
-        move |source| match primary_code(&source) {
-            Some(SQLITE_FULL) => Self::Full,
+        move |source| match (primary_code(&source), extended_code(&source)) {
+            (Some(SQLITE_FULL), _) | (_, Some(SQLITE_IOERR_SHMSIZE)) => Self::Full,
+            (Some(SQLITE_READONLY), _) => Self::ReadOnly,
             _ => Self::Database { operation, source },
         }
     }
@@ -188,6 +216,15 @@ impl StoreError {
                     || matches!(source, sqlx::Error::Io(_) | sqlx::Error::WorkerCrashed)
             }
             Self::At { source, .. } => source.is_fatal(),
+            _ => false,
+        }
+    }
+
+    /// Whether the disk has no room, or takes nothing: the same may be written later.
+    pub(crate) fn is_of_the_disk(&self) -> bool {
+        match self {
+            Self::Full | Self::NearlyFull(_) | Self::ReadOnly => true,
+            Self::At { source, .. } => source.is_of_the_disk(),
             _ => false,
         }
     }

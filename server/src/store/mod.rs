@@ -4,6 +4,7 @@
 //! is a constant of its file and is prepared by a test against the migrated schema. One listener learns of every commit
 //! ([`on_commit`]); the store knows it by its trait alone.
 
+pub(crate) mod disk_guard;
 mod error;
 pub(crate) mod kind;
 pub(crate) mod migrations;
@@ -50,6 +51,7 @@ pub(crate) use open::OpenError;
 pub(crate) use writer::{PART as WRITER, Tx};
 
 use crate::config::Config;
+use disk_guard::DiskGuard;
 use engine::{heartbeats::Heartbeat, vitals::Vitals};
 use futures::future::BoxFuture;
 use protos::api::AuditHead;
@@ -73,6 +75,7 @@ pub(crate) struct Store {
     vitals: Arc<Vitals>,
     jobs: Arc<Notify>,
     commits: Arc<AtomicU64>,
+    disk: Arc<DiskGuard>,
     /// Held while a write is prepared and made.
     turn: Arc<Mutex<()>>,
     keys: kept_answers::KeysAtWork,
@@ -132,7 +135,8 @@ impl Store {
         on_commit: Arc<dyn OnCommit>,
         vitals: Arc<Vitals>,
     ) -> Result<(Self, WriterTask), OpenError> {
-        let opened = open::open(&config.data).await?;
+        let opened = open::open(&config.data, config.sqlite_vfs()).await?;
+        let disk = Arc::new(DiskGuard::new(&config.data, &config.limits));
         let jobs = Arc::new(Notify::new());
         let mut conn = opened.writer;
         on_commit.opened(&mut conn).await.map_err(OpenError::Load)?;
@@ -158,6 +162,7 @@ impl Store {
             vitals,
             jobs,
             commits,
+            disk,
             turn,
             keys,
             kept_answers,
@@ -230,6 +235,11 @@ impl Store {
         self.commits.load(Ordering::Acquire)
     }
 
+    /// Whether there is room for more.
+    pub(crate) fn disk(&self) -> &Arc<DiskGuard> {
+        &self.disk
+    }
+
     /// Which parts of the server run; the writer is one of them.
     pub(crate) fn vitals(&self) -> &Arc<Vitals> {
         &self.vitals
@@ -263,6 +273,10 @@ fn text_revision(text: &str) -> String {
     })
 }
 
+#[cfg(test)]
+mod damage;
+#[cfg(test)]
+mod power_cuts;
 #[cfg(test)]
 mod tests;
 #[cfg(test)]

@@ -11,7 +11,9 @@ use std::{
     time::Duration,
 };
 
-use super::{StoreError, history, migrations, pictures, restored};
+use super::{
+    StoreError, copies, disk_guard, error::is_without_room, history, migrations, pictures, restored,
+};
 
 /// First version without the write-ahead-log corruption of 3.7.0 to 3.51.2 (sqlite.org/wal.html#walresetbug).
 pub(crate) const SQLITE_MIN: (u32, u32, u32) = (3, 51, 3);
@@ -73,6 +75,14 @@ pub(crate) enum OpenError {
     /// Anything else at opening.
     #[error("the database does not open")]
     Open(#[source] sqlx::Error),
+    /// A read-only file system on which the database cannot be read as it is.
+    #[error("data directory {path} is on a read-only file system, and {reason}")]
+    ReadOnly {
+        /// The path.
+        path: PathBuf,
+        /// What is missing.
+        reason: &'static str,
+    },
     /// The first reading of the maps.
     #[error("the maps cannot be read")]
     Load(#[source] StoreError),
@@ -85,12 +95,38 @@ pub(super) struct Opened {
     pub(super) lock: File,
 }
 
-pub(super) async fn open(data: &Path) -> Result<Opened, OpenError> {
+/// Layer of SQLite that keeps the index of the write-ahead log in memory and not in a file. It needs the file for itself, as
+/// the lock of the data directory gives it.
+const WITHOUT_SHARED_MEMORY: &str = "unix-excl";
+
+/// Opens the database in `data` for reading and writing. A full disk does not keep it from opening: where there is no room for
+/// the file of the log's index, the index is in memory. On a read-only file system it opens for reading alone.
+pub(super) async fn open(data: &Path, vfs: Option<&'static str>) -> Result<Opened, OpenError> {
+    if disk_guard::is_read_only(data) {
+        return open_read_only(data).await;
+    }
     let lock = lock(data)?;
     restored::put_in_place(data, FILE)
         .map_err(|source| OpenError::Directory { path: data.to_owned(), source })?;
-    let options =
-        options(&data.join(FILE)).journal_mode(SqliteJournalMode::Wal).synchronous(SqliteSynchronous::Full);
+    let (writer, reads) = match connect(data, vfs).await {
+        Err(OpenError::Open(error)) if vfs.is_none() && is_without_room(&error) => {
+            let follows = "the index of its log is in memory; what adds data is refused until there is room";
+            tracing::warn!(%error, follows, "database_opened_without_room");
+            connect(data, Some(WITHOUT_SHARED_MEMORY)).await?
+        }
+        opened => opened?,
+    };
+    Ok(Opened { writer, reads, lock })
+}
+
+/// The connections, checked, on the present schema.
+async fn connect(
+    data: &Path,
+    vfs: Option<&'static str>,
+) -> Result<(SqliteConnection, SqlitePool), OpenError> {
+    let options = options(&data.join(FILE));
+    let options = options.journal_mode(SqliteJournalMode::Wal).synchronous(SqliteSynchronous::Full);
+    let options = if let Some(vfs) = vfs { options.vfs(vfs) } else { options };
     let mut writer = options.clone().create_if_missing(true).connect().await.map_err(OpenError::Open)?;
     check_version(&mut writer).await?;
     check_pragmas(&mut writer).await?;
@@ -107,6 +143,33 @@ pub(super) async fn open(data: &Path) -> Result<Opened, OpenError> {
         .await
         .map_err(OpenError::Open)?;
     check_pragmas(&mut *reads.acquire().await.map_err(OpenError::Open)?).await?;
+    Ok((writer, reads))
+}
+
+/// Opens the database on a read-only file system: every write is refused by SQLite. After a clean stop the file alone is
+/// complete and nobody changes it. After a kill the log is read, which needs the file of its index.
+async fn open_read_only(data: &Path) -> Result<Opened, OpenError> {
+    let unreadable = |reason| OpenError::ReadOnly { path: data.to_owned(), reason };
+    let at = |source| OpenError::Directory { path: data.to_owned(), source };
+    let lock = File::open(data.join(LOCK)).or_else(|_none| File::open(data)).map_err(at)?;
+    let lock = held(lock, data)?;
+    let beside = |suffix: &str| std::fs::metadata(data.join(format!("{FILE}{suffix}")));
+    let has_log = beside("-wal").is_ok_and(|log| log.len() > 0);
+    if has_log && beside("-shm").is_err() {
+        let reason =
+            "the log beside the database cannot be read there: mount it writable once, or copy the directory";
+        return Err(unreadable(reason));
+    }
+    let options = read_options(&data.join(FILE)).immutable(!has_log);
+    let mut writer = options.clone().connect().await.map_err(OpenError::Open)?;
+    check_version(&mut writer).await?;
+    check_integrity(&mut writer).await?;
+    if copies::schema(&mut writer).await.map_err(OpenError::Load)? != copies::known_schema() {
+        return Err(unreadable("another version of the server has written it: mount it writable"));
+    }
+    let reads = SqlitePoolOptions::new().max_connections(READERS).acquire_timeout(BUSY_TIMEOUT);
+    let reads = reads.test_before_acquire(false).connect_with(options).await.map_err(OpenError::Open)?;
+    tracing::error!(path = %data.display(), follows = "robots are served; nothing is stored", "data_directory_read_only");
     Ok(Opened { writer, reads, lock })
 }
 
@@ -132,10 +195,14 @@ pub(crate) fn lock(data: &Path) -> Result<File, OpenError> {
     let at = |source| OpenError::Directory { path: data.to_owned(), source };
     std::fs::create_dir_all(data).map_err(at)?;
     let file = File::options().create(true).truncate(false).write(true).open(data.join(LOCK)).map_err(at)?;
+    held(file, data)
+}
+
+fn held(file: File, data: &Path) -> Result<File, OpenError> {
     match file.try_lock() {
         Ok(()) => Ok(file),
         Err(TryLockError::WouldBlock) => Err(OpenError::Locked(data.to_owned())),
-        Err(TryLockError::Error(source)) => Err(at(source)),
+        Err(TryLockError::Error(source)) => Err(OpenError::Directory { path: data.to_owned(), source }),
     }
 }
 
@@ -199,16 +266,16 @@ mod tests {
     #[tokio::test]
     async fn a_second_server_is_refused() {
         let dir = tempfile::tempdir().unwrap();
-        let first = open(dir.path()).await.unwrap();
-        assert!(matches!(open(dir.path()).await, Err(OpenError::Locked(_))));
+        let first = open(dir.path(), None).await.unwrap();
+        assert!(matches!(open(dir.path(), None).await, Err(OpenError::Locked(_))));
         drop(first);
-        assert!(open(dir.path()).await.is_ok());
+        assert!(open(dir.path(), None).await.is_ok());
     }
 
     #[tokio::test]
     async fn a_setting_that_did_not_take_is_found() {
         let dir = tempfile::tempdir().unwrap();
-        let mut opened = open(dir.path()).await.unwrap();
+        let mut opened = open(dir.path(), None).await.unwrap();
         sqlx::raw_sql("PRAGMA synchronous = NORMAL").execute(&mut opened.writer).await.unwrap();
         assert!(matches!(
             check_pragmas(&mut opened.writer).await,
@@ -219,7 +286,7 @@ mod tests {
     #[tokio::test]
     async fn a_damaged_file_is_refused() {
         let dir = tempfile::tempdir().unwrap();
-        let opened = open(dir.path()).await.unwrap();
+        let opened = open(dir.path(), None).await.unwrap();
         opened.reads.close().await;
         sqlx::Connection::close(opened.writer).await.unwrap();
         drop(opened.lock);
@@ -230,13 +297,13 @@ mod tests {
             *byte = 0xa5;
         }
         std::fs::write(&path, bytes).unwrap();
-        assert!(open(dir.path()).await.is_err());
+        assert!(open(dir.path(), None).await.is_err());
     }
 
     #[tokio::test]
     async fn readers_cannot_write() {
         let dir = tempfile::tempdir().unwrap();
-        let opened = open(dir.path()).await.unwrap();
+        let opened = open(dir.path(), None).await.unwrap();
         let write = sqlx::query("INSERT INTO maps (name, distance, created_ms) VALUES ('a', 'both', 0)")
             .execute(&opened.reads)
             .await;

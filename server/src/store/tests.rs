@@ -6,7 +6,7 @@ use sqlx::{Executor, SqlSafeStr};
 #[tokio::test]
 async fn every_statement_prepares_on_the_migrated_schema() {
     let dir = tempfile::tempdir().unwrap();
-    let mut opened = open::open(dir.path()).await.unwrap();
+    let mut opened = open::open(dir.path(), None).await.unwrap();
     let all = [
         maps::ALL,
         robot_certificates::ALL,

@@ -86,7 +86,9 @@ pub(super) struct WriteOutcome {
     acknowledge: Acknowledge,
 }
 
-pub(super) type Run = Box<dyn for<'t> FnOnce(&'t mut Tx) -> BoxFuture<'t, WriteOutcome> + Send>;
+/// Gets the outcome of the transaction's beginning; without one nothing runs.
+pub(super) type Run =
+    Box<dyn for<'t> FnOnce(&'t mut Tx, Result<(), StoreError>) -> BoxFuture<'t, WriteOutcome> + Send>;
 
 /// What is on its way to the writer.
 pub(super) enum Command {
@@ -123,10 +125,11 @@ where
 {
     let Beside { keeping, actor, audit_entries } = beside;
     let (reply, answer) = oneshot::channel();
-    let run: Run = Box::new(move |tx| {
+    let run: Run = Box::new(move |tx, begun| {
         Box::pin(async move {
             // Unwind safety: the closure's changes are in the transaction, which is rolled back.
             let all = async {
+                begun?;
                 tx.author = actor.as_deref().map(Author::from).unwrap_or_default();
                 let before = audit::total_changes(tx).await?;
                 let made = write(tx).await?;
@@ -218,7 +221,8 @@ impl Writer {
             let Some(command) = command else { break };
             if let Err(error) = self.one(command).await {
                 tracing::error!(error = &error as &dyn std::error::Error, "store_failed: no more writes");
-                self.vitals.fail(PART, error.to_string());
+                let cause = std::error::Error::source(&error).map(|cause| format!(": {cause}"));
+                self.vitals.fail(PART, format!("{error}{}", cause.unwrap_or_default()));
                 return;
             }
         }
@@ -250,8 +254,8 @@ impl Writer {
         }
         self.tx.changes.clear();
         self.tx.after.clear();
-        self.execute("BEGIN IMMEDIATE", "begin").await?;
-        let outcome = run(&mut self.tx).await;
+        let begun = self.execute("BEGIN IMMEDIATE", "begin").await;
+        let outcome = run(&mut self.tx, begun).await;
         if let Some(cause) = &outcome.panic {
             let follows = "it is rolled back; other writes go on";
             self.vitals.panics().caught(Edge::Write, cause.as_ref(), "a write", follows);

@@ -4396,10 +4396,11 @@ export interface components {
                 [key: string]: number;
             };
             /**
-             * @description `ready`, or `degraded`: everything runs, but something is named in `maps_not_in_use` or
-             *     `damaged_pictures`, or the last scheduled backup failed.
+             * @description `ready`, or `degraded`: everything runs, but something is named in `maps_not_in_use`, `damaged_pictures` or
+             *     `storage.refused`, or the last scheduled backup failed.
              */
             status: string;
+            storage?: components["schemas"]["StorageHealth"] | null;
         };
         /** @description A recording as it stands. */
         RecordingStatusBody: {
@@ -4900,6 +4901,36 @@ export interface components {
         SizeAndPlace: {
             place?: components["schemas"]["Place"] | null;
             size?: components["schemas"]["Size"] | null;
+        };
+        /** @description The disk of the data directory at the last look, some seconds ago at most. */
+        StorageHealth: {
+            /**
+             * Format: int64
+             * @description Of these, free.
+             */
+            free_bytes: number;
+            /**
+             * Format: int64
+             * @description The setting `limits.disk_percent`: from here on nothing is added.
+             */
+            limit_percent: number;
+            /** @description Why nothing is added at present, and what to do. Robots are served all the same. */
+            refused?: string | null;
+            /**
+             * Format: int64
+             * @description Bytes of the database file that deletions have freed: new data take them first.
+             */
+            reusable_bytes: number;
+            /**
+             * Format: int64
+             * @description Bytes that the server's user can fill; 0 where that is not known.
+             */
+            total_bytes: number;
+            /**
+             * Format: int64
+             * @description Used share, in percent, rounded down.
+             */
+            used_percent: number;
         };
         /** @description A stored answer with everything that was said. */
         StoredAnswer: {
@@ -6039,7 +6070,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -6196,7 +6227,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -6411,7 +6442,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -6820,7 +6851,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -7128,7 +7159,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -7331,7 +7362,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -7499,7 +7530,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -7653,7 +7684,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -7798,7 +7829,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -8187,7 +8218,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -8330,7 +8361,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -8472,7 +8503,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -8792,7 +8823,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -8896,7 +8927,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -9135,7 +9166,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -9244,7 +9275,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -9588,7 +9619,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -9759,7 +9790,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -9918,7 +9949,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -10015,7 +10046,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -10187,7 +10218,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -10430,7 +10461,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -10691,7 +10722,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -10887,7 +10918,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -11065,7 +11096,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -11444,7 +11475,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -11611,7 +11642,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -12110,7 +12141,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -12206,7 +12237,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -12652,7 +12683,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -12862,7 +12893,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -13083,7 +13114,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -13177,7 +13208,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -13273,7 +13304,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -13530,7 +13561,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -13764,7 +13795,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -13934,7 +13965,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -14100,7 +14131,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -14449,7 +14480,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -14566,7 +14597,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -14885,7 +14916,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -15021,7 +15052,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -15281,7 +15312,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -15704,7 +15735,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -15786,7 +15817,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -16247,7 +16278,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -16563,7 +16594,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -16646,7 +16677,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -16863,7 +16894,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -17031,7 +17062,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -17113,7 +17144,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -17287,7 +17318,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -17586,7 +17617,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -17814,7 +17845,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;
@@ -17896,7 +17927,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description storage_full */
+            /** @description storage_full, storage_nearly_full, storage_read_only */
             507: {
                 headers: {
                     [name: string]: unknown;

@@ -139,10 +139,22 @@ class ReadinessCounts:
 
 
 @dataclass(frozen=True, slots=True)
+class StorageHealth:
+    """The disk of the data directory. `refused` says why nothing can be added at present."""
+
+    total_bytes: int
+    free_bytes: int
+    reusable_bytes: int
+    used_percent: int
+    limit_percent: int
+    refused: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Readiness:
     """`ready`, or `degraded`: everything runs, but some maps use an earlier version, or none, stored pictures are
-    damaged, or the last scheduled backup failed. `counts` has all of them; only those of the token's maps are named,
-    and none without a token."""
+    damaged, the last scheduled backup failed, or the disk has no room. `counts` has all of them; only those of the
+    token's maps are named, and none without a token."""
 
     status: str
     maps_not_in_use: dict[str, str]
@@ -151,6 +163,7 @@ class Readiness:
     backup: BackupHealth | None = None
     parts_still_s: dict[str, int] | None = None
     counts: ReadinessCounts = ReadinessCounts(0, 0)
+    storage: StorageHealth | None = None
 
 
 @dataclass(frozen=True, slots=True)
