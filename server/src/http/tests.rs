@@ -6,6 +6,7 @@ mod earlier_build;
 mod events;
 mod lists;
 mod localise;
+mod numbers;
 mod openapi;
 mod page_sessions;
 mod revision;
