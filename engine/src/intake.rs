@@ -47,6 +47,13 @@ impl Held for FrameJob {
     }
 }
 
+impl FrameJob {
+    /// Whether it is too late to begin the work.
+    pub fn is_late(&self, now: Instant) -> bool {
+        now > self.deadline
+    }
+}
+
 /// Takes frames in.
 #[derive(Debug)]
 pub struct Intake {
@@ -73,14 +80,29 @@ impl Intake {
 
     /// The same for either kind. Quads have the slot of their camera's frames, and one numbering with them.
     pub fn take(&self, kind: FrameKind, key: SlotKey, message: Bytes) -> Result<(), Box<v1::Answer>> {
+        self.take_at(kind, key, message, Instant::now())
+    }
+
+    /// The same, with the time of receipt.
+    pub fn take_at(
+        &self,
+        kind: FrameKind,
+        key: SlotKey,
+        message: Bytes,
+        received: Instant,
+    ) -> Result<(), Box<v1::Answer>> {
         match kind {
-            FrameKind::Image => self.take_message::<v1::Frame>(key, message),
-            FrameKind::Quads => self.take_message::<v1::Quads>(key, message),
+            FrameKind::Image => self.take_message::<v1::Frame>(key, message, received),
+            FrameKind::Quads => self.take_message::<v1::Quads>(key, message, received),
         }
     }
 
-    fn take_message<M: FrameMessage>(&self, key: SlotKey, message: Bytes) -> Result<(), Box<v1::Answer>> {
-        let received = Instant::now();
+    fn take_message<M: FrameMessage>(
+        &self,
+        key: SlotKey,
+        message: Bytes,
+        received: Instant,
+    ) -> Result<(), Box<v1::Answer>> {
         let mut echo = v1::Answer { status: v1::Status::Rejected.into(), ..v1::Answer::default() };
         let job = match self.check::<M>(&key, message, received, &mut echo) {
             Ok(job) => job,

@@ -113,7 +113,7 @@ impl Engine {
         publish: &dyn Publish,
         answered: &Cell<Option<FrameOutcome>>,
     ) -> FrameOutcome {
-        let done = if Instant::now() > job.deadline {
+        let done = if job.is_late(Instant::now()) {
             let detail = format!("waited {} ms", job.received.elapsed().as_millis());
             Err(Rejection::new(Code::Expired, "deadline_ms", detail))
         } else {

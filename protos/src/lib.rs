@@ -5,6 +5,7 @@
 //! Knows no transport: zenoh lives in `client` and in the server's `bus`. README.md lists keys, units, limits and codes.
 
 pub mod api;
+pub mod credentials;
 pub mod keys;
 pub mod rejection;
 pub mod convert;

@@ -220,7 +220,7 @@ impl TimeBase {
             return false;
         }
         let agrees = |row: &RefusedRow| {
-            row.stream == *stream && (lead_ns.saturating_sub(row.lead_ns)).abs() <= nanos(CLOCK_SET_SPREAD)
+            row.stream == *stream && lead_ns.abs_diff(row.lead_ns) <= nanos(CLOCK_SET_SPREAD).unsigned_abs()
         };
         let row = match self.row.take() {
             Some(row) if agrees(&row) => RefusedRow { count: row.count.saturating_add(1), ..row },
@@ -280,6 +280,16 @@ mod tests {
         assert_eq!(Robot::driving().check(&front, 1100 - behind, 1100), Ok(Stamp::Good));
         assert_eq!(Robot::driving().check(&front, 1099 - behind, 1100), Err(Code::ClockBehind));
         assert_eq!(Robot::driving().check(&front, i64::MAX / 1_000_000, 1100), Err(Code::ClockAhead));
+    }
+
+    /// Two leads may be further apart than 64 bits hold.
+    #[test]
+    fn stamps_at_both_ends_of_time_are_refused() {
+        let mut robot = Robot::driving();
+        for (i, captured_ns) in [i64::MAX, i64::MIN, i64::MAX, i64::MIN].into_iter().enumerate() {
+            let received = robot.start + Duration::from_millis(1100 + 300 * i as u64);
+            assert!(robot.clock.check(&Stream::Odometry, captured_ns, received).is_err(), "{captured_ns}");
+        }
     }
 
     #[test]

@@ -5,6 +5,7 @@ mod derivatives;
 mod covariance;
 mod camera_pose;
 mod refusal_causes;
+mod wrong_intrinsics;
 
 use crate::{
     extrinsics::{CameraExtrinsics, pan_tilt},

@@ -56,12 +56,28 @@ impl TryFrom<v1::GazeRequest> for CheckedGaze {
             looked: (!g.looked_at.is_empty()).then_some((g.looked_at, g.recognised)),
         };
         let viewer = made.viewer(&PanTiltCamera::default());
-        made.head.check().and_then(|()| viewer.check()).map_err(|e| geometry::refused(&e))?;
+        made.head.check().and_then(|()| viewer.check()).map_err(|error| {
+            let refused = geometry::refused(&error);
+            Rejection { field: made.field(&refused.field), ..refused }
+        })?;
         Ok(made)
     }
 }
 
 impl CheckedGaze {
+    /// The field of the message that a number of the unit or of its ranges is from.
+    fn field(&self, of: &str) -> String {
+        let axes = ["camera_x_m", "camera_y_m", "camera_z_m"].into_iter().zip(self.head.camera_m);
+        let camera = || axes.clone().find(|(_, value)| !(-10.0..=10.0).contains(value));
+        match of {
+            "head.camera_m" => camera().map_or("camera_z_m", |(name, _)| name).to_owned(),
+            _ => of
+                .trim_start_matches("head.")
+                .replace("pan_rad[", "pan_range_rad[")
+                .replace("tilt_rad[", "tilt_range_rad["),
+        }
+    }
+
     /// The robot's camera: absent ranges are those of `usual`.
     pub fn viewer(&self, usual: &PanTiltCamera) -> PanTiltCamera {
         PanTiltCamera {
@@ -113,8 +129,9 @@ mod tests {
         let refused = |g: v1::GazeRequest| CheckedGaze::try_from(g).unwrap_err().field;
         let g = v1::GazeRequest::default;
         assert_eq!(refused(v1::GazeRequest { pan_range_rad: vec![1.0], ..g() }), "pan_range_rad");
-        assert_eq!(refused(v1::GazeRequest { pan_range_rad: vec![1.0, 0.5], ..g() }), "pan_rad[1]");
-        assert_eq!(refused(v1::GazeRequest { rate_radps: f64::NAN, ..g() }), "head.rate_radps");
+        assert_eq!(refused(v1::GazeRequest { pan_range_rad: vec![1.0, 0.5], ..g() }), "pan_range_rad[1]");
+        assert_eq!(refused(v1::GazeRequest { rate_radps: f64::NAN, ..g() }), "rate_radps");
+        assert_eq!(refused(v1::GazeRequest { camera_y_m: 11.0, ..g() }), "camera_y_m");
         let pose = v1::Pose2Covariance { pose: None, covariance: vec![] };
         assert_eq!(refused(v1::GazeRequest { map_from_robot: Some(pose), ..g() }), "map_from_robot.pose");
     }

@@ -1,5 +1,7 @@
 //! A bundle is the map: exported, imported and exported again it is the same, and no byte of it changes unseen.
 
+mod any_bytes;
+
 use super::{BundleError, Fault, Request, archive::Writer, load, save};
 use crate::{
     config::Limits,

@@ -21,7 +21,7 @@ use axum::{
     http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, header, request::Parts},
     response::{IntoResponse, Response},
 };
-use protos::api::Role;
+use protos::{api::Role, credentials};
 use serde_json::json;
 use std::{path::Path, time::Instant};
 
@@ -118,8 +118,7 @@ pub(super) fn asker(app: &AppState, parts: &Parts) -> Option<Principal> {
 
 /// The token of a header.
 pub(super) fn bearer(value: &HeaderValue) -> Option<&str> {
-    let (scheme, token) = value.to_str().ok()?.split_once(' ')?;
-    scheme.eq_ignore_ascii_case("bearer").then(|| token.trim())
+    credentials::bearer(value.to_str().ok()?)
 }
 
 /// A change by cookie must come from a script of the page: a browser sends the cookie with whatever asks.

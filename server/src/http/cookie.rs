@@ -1,6 +1,7 @@
 //! The cookie of a session of the page. In: the headers of a request. Out: its value, and the header that sets it.
 
 use axum::http::{HeaderMap, HeaderValue, header};
+use protos::credentials;
 
 /// Begins the name of the cookie; the port follows: a browser keeps cookies of all servers of a host in one place.
 const COOKIE: &str = "waymark_session_";
@@ -30,11 +31,8 @@ pub(super) fn set_cookie(
 /// The value of the session's cookie.
 pub(super) fn session_cookie(headers: &HeaderMap) -> Option<&str> {
     let name = cookie_name(headers);
-    let lines = headers.get_all(header::COOKIE).iter().filter_map(|value| value.to_str().ok());
-    lines.flat_map(|line| line.split(';')).find_map(|pair| {
-        let (key, value) = pair.trim().split_once('=')?;
-        (key == name).then_some(value)
-    })
+    let mut lines = headers.get_all(header::COOKIE).iter().filter_map(|value| value.to_str().ok());
+    lines.find_map(|line| credentials::cookie(line, &name))
 }
 
 #[cfg(test)]

@@ -16,6 +16,7 @@ use axum::{
     middleware::Next,
     response::{IntoResponse, Response},
 };
+use protos::credentials::{MAX_KEY_BYTES, idempotency_key};
 use sha2::{Digest, Sha256};
 use utoipa::openapi::{
     ObjectBuilder, OpenApi, RefOr, Type,
@@ -28,8 +29,6 @@ const KEY: HeaderName = HeaderName::from_static("idempotency-key");
 const REPLAYED: HeaderName = HeaderName::from_static("idempotency-replayed");
 /// Makes a map of a bundle. Its handler reads the body to a file, and looks at its key itself.
 const LOAD: &str = "/bundles";
-/// Longest key.
-const MAX_KEY: usize = 128;
 
 /// The largest body of a request, in bytes.
 type LargestBody = fn(&Limits) -> usize;
@@ -117,12 +116,11 @@ pub(super) async fn under_key(
 /// The key, checked.
 fn key(headers: &HeaderMap) -> Result<String, ApiError> {
     let mut given = headers.get_all(KEY).iter();
-    let key = given.next().map(HeaderValue::as_bytes).unwrap_or_default();
-    let fits = (1..=MAX_KEY).contains(&key.len()) && key.iter().all(u8::is_ascii_graphic);
-    match String::from_utf8(key.to_vec()) {
-        Ok(key) if fits && given.next().is_none() => Ok(key),
+    let key = given.next().and_then(|value| idempotency_key(value.as_bytes()));
+    match key {
+        Some(key) if given.next().is_none() => Ok(key.to_owned()),
         _ => {
-            let detail = format!("one key of 1 to {MAX_KEY} visible ASCII characters");
+            let detail = format!("one key of 1 to {MAX_KEY_BYTES} visible ASCII characters");
             Err(ApiError::invalid("invalid_value", KEY.as_str(), detail))
         }
     }
@@ -154,8 +152,10 @@ pub(super) fn with_keys(mut document: OpenApi) -> OpenApi {
     for (path, _) in CREATIONS {
         let item = document.paths.paths.get_mut(&format!("{API}{path}"));
         let Some(operation) = item.and_then(|item| item.post.as_mut()) else { continue };
-        let text =
-            ObjectBuilder::new().schema_type(Type::String).min_length(Some(1)).max_length(Some(MAX_KEY));
+        let text = ObjectBuilder::new()
+            .schema_type(Type::String)
+            .min_length(Some(1))
+            .max_length(Some(MAX_KEY_BYTES));
         let described = "A fresh text of visible ASCII characters for each creation, the same one to repeat it: the repeat \
                          changes nothing and gets the first answer, for a day.";
         let parameter = ParameterBuilder::new()
@@ -178,8 +178,8 @@ mod tests {
 
     #[test]
     fn keys_are_visible_ascii_of_bounded_length() {
-        let longest: &'static str = Box::leak("k".repeat(MAX_KEY).into_boxed_str());
-        let longer: &'static str = Box::leak("k".repeat(MAX_KEY + 1).into_boxed_str());
+        let longest: &'static str = Box::leak("k".repeat(MAX_KEY_BYTES).into_boxed_str());
+        let longer: &'static str = Box::leak("k".repeat(MAX_KEY_BYTES + 1).into_boxed_str());
         for fine in ["a", "!~", longest] {
             assert_eq!(key(&headers(&[fine])).unwrap(), fine);
         }

@@ -7,6 +7,7 @@ mod events;
 mod lists;
 mod metrics;
 mod localise;
+mod numbers;
 mod openapi;
 mod page_sessions;
 mod readiness;

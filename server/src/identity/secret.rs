@@ -1,18 +1,12 @@
 //! Random secrets and the texts of tokens. Neither is ever shown by `Debug`; only digests are stored and compared.
 
 use base64::{Engine as _, prelude::BASE64_URL_SAFE_NO_PAD};
+use protos::credentials::{self, LOCAL_PREFIX, TOKEN_PREFIX, TokenOf};
 use sha2::{Digest, Sha256};
 use std::fmt;
 use subtle::ConstantTimeEq;
 
 use super::TokenId;
-
-/// Begins every token, so that people and scanners of leaked secrets know one.
-const PREFIX: &str = "wmk_";
-/// Begins the number of a local token; the port follows.
-const LOCAL: &str = "local-";
-/// Longest text of a token that is looked at, in bytes.
-const MAX_TOKEN_BYTES: usize = 128;
 
 /// The system gives no random bytes.
 #[derive(Debug, thiserror::Error)]
@@ -70,27 +64,23 @@ pub(crate) struct TokenText {
 impl TokenText {
     /// `wmk_{number}_{secret}`; of a local token `wmk_local-{port}_{secret}`. `None` for everything else.
     pub(crate) fn parse(text: &str) -> Option<Self> {
-        let rest = (text.len() <= MAX_TOKEN_BYTES).then(|| text.strip_prefix(PREFIX)).flatten()?;
-        // The alphabet of secrets has the underscore, too.
-        let (id, secret) = rest.split_once('_')?;
-        let id = match id.strip_prefix(LOCAL) {
-            Some(port) => port.parse::<u16>().ok().map(|_port| TokenId::Local)?,
-            None => {
-                id.parse().ok().filter(|_| id.bytes().all(|b| b.is_ascii_digit())).map(TokenId::Stored)?
-            }
+        let (of, secret) = credentials::token(text)?;
+        let id = match of {
+            TokenOf::Local(_port) => TokenId::Local,
+            TokenOf::Stored(number) => TokenId::Stored(number),
         };
         Some(Self { id, secret: Secret::of(secret)? })
     }
 
     /// The text of a stored token.
     pub(crate) fn stored(id: i64, secret: &Secret<32>) -> String {
-        format!("{PREFIX}{id}_{}", secret.expose())
+        format!("{TOKEN_PREFIX}{id}_{}", secret.expose())
     }
 
     /// The text of the local token of a server that listens on this port. A client compares the port with the one that
     /// it asks: a program on another port cannot make it send a token that is meant for this server.
     pub(crate) fn local(port: u16, secret: &Secret<32>) -> String {
-        format!("{PREFIX}{LOCAL}{port}_{}", secret.expose())
+        format!("{TOKEN_PREFIX}{LOCAL_PREFIX}{port}_{}", secret.expose())
     }
 }
 

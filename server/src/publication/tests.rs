@@ -1,6 +1,8 @@
 //! The store and its publication as a whole, on fresh databases.
 
 mod incremental;
+mod readers;
+mod simulation;
 
 use super::{build::tests as planting, *};
 use crate::store::kind::Kind;

@@ -1,0 +1,20 @@
+//! Any text as a key expression: it is parsed to the key that gives the same text, or refused. The fleet is the text's
+//! first line where that is a name.
+
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use protos::{Keys, Name};
+
+fuzz_target!(|data: &[u8]| {
+    let Ok(text) = std::str::from_utf8(data) else { return };
+    let (fleet, text) = text.split_once('\n').unwrap_or(("default", text));
+    let fleet = Name::new(fleet).unwrap_or_else(|_| Name::new("default").expect("a name"));
+    let keys = Keys::new(&fleet);
+    for text in [text.to_owned(), format!("waymark/1/{fleet}/{text}")] {
+        match keys.parse(&text) {
+            Ok(key) => assert_eq!(keys.build(&key), text),
+            Err(error) => assert!(!error.to_string().is_empty()),
+        }
+    }
+});

@@ -1,0 +1,290 @@
+//! The store under clients that repeat, hang up and edit the same things, with a server that is stopped in between: the real
+//! store and publication, steps that follow from a seed, and a model that says after each step what must be stored.
+//!
+//! `WAYMARK_SEED=n` runs one seed, `WAYMARK_SEEDS=n` so many. When a caller hangs up between two polls, or a writer is ended,
+//! the moment depends on SQLite's thread: a seed repeats the steps, not these moments. Frames are simulated in
+//! `engine/tests/simulation`.
+
+use super::{super::*, config};
+use crate::store::{
+    StoreError,
+    kept_answers::{Answer, Creation, answered},
+    landmarks::{self, LandmarkRow},
+    maps,
+    revisions::{self, Precondition, Subject},
+    walls,
+};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    panic::AssertUnwindSafe,
+    path::Path,
+};
+use tempfile::TempDir;
+use vision::{random::Random, recognise::DistanceKind};
+
+/// Seeds of a run.
+const SEEDS: u64 = 40;
+/// Steps of a seed.
+const STEPS: usize = 60;
+/// Names of landmarks, and keys of their creations.
+const NAMES: usize = 30;
+const EDITORS: usize = 2;
+
+struct World {
+    random: Random,
+    data: TempDir,
+    store: Catalogue,
+    tasks: Option<CatalogueTasks>,
+    /// Landmarks whose creation was acknowledged.
+    created: BTreeSet<String>,
+    /// Creations whose outcome the client does not know.
+    unknown: BTreeSet<String>,
+    /// The number that the walls say, after the last acknowledged edit, and those of edits without an answer.
+    walls: i64,
+    maybe: BTreeSet<i64>,
+    next: i64,
+    /// What each editor has read last: revision, and number of the walls.
+    read: [(String, i64); EDITORS],
+    version: u64,
+}
+
+fn number_of(walls: &[map::segments::LaserSegment]) -> i64 {
+    walls.first().map_or(0, |wall| wall.b.x.round() as i64)
+}
+
+async fn open(data: &Path) -> (Catalogue, CatalogueTasks) {
+    Catalogue::open(&config(data)).await.unwrap()
+}
+
+impl World {
+    async fn new(seed: u64) -> Self {
+        // In memory where there is such a place: what a disk does is another test.
+        let memory = Path::new("/dev/shm");
+        let data = if memory.is_dir() { TempDir::new_in(memory) } else { TempDir::new() }.unwrap();
+        let (store, tasks) = open(data.path()).await;
+        store.write(|tx| Box::pin(maps::create(tx, "a", DistanceKind::Both, 2))).await.unwrap();
+        Self {
+            random: Random::new(seed),
+            data,
+            store,
+            tasks: Some(tasks),
+            created: BTreeSet::new(),
+            unknown: BTreeSet::new(),
+            walls: 0,
+            maybe: BTreeSet::new(),
+            next: 0,
+            read: Default::default(),
+            version: 1,
+        }
+    }
+
+    fn below(&mut self, n: usize) -> usize {
+        (self.random.unit() * n as f64) as usize % n
+    }
+
+    async fn step(&mut self) {
+        match self.below(12) {
+            0..5 => self.create().await,
+            5 | 6 => self.look().await,
+            7..10 => self.edit().await,
+            10 => self.hang_up().await,
+            _ => {
+                // Half of the stops hit a write.
+                if self.below(2) == 0 {
+                    self.hang_up().await;
+                }
+                self.restart().await;
+            }
+        }
+        self.check().await;
+    }
+
+    /// A client creates a landmark under its key, perhaps once more.
+    async fn create(&mut self) {
+        let number = self.below(NAMES);
+        let name = format!("l{number}");
+        let was_there = self.created.contains(&name);
+        match created(&self.store, &name).await {
+            Ok(is_repeat) => {
+                assert!(is_repeat || !was_there, "{name} was made a second time under its key");
+                assert!(
+                    !is_repeat || was_there || self.unknown.contains(&name),
+                    "{name}: an answer to what was never asked"
+                );
+                self.unknown.remove(&name);
+                self.created.insert(name);
+            }
+            // Still at work: the request whose client hung up.
+            Err(StoreError::KeyAtWork) => assert!(self.unknown.contains(&name), "{name}: its key is at work"),
+            Err(error) => panic!("{name}: {error}"),
+        }
+    }
+
+    /// An editor reads the walls with their revision.
+    async fn look(&mut self) {
+        let editor = self.below(EDITORS);
+        let revision = self.store.revision("a", &Subject::Walls).await.unwrap();
+        let walls = number_of(&self.store.snapshots().get("a").unwrap().walls);
+        self.read[editor] = (revision, walls);
+    }
+
+    /// An editor replaces what it has read.
+    async fn edit(&mut self) {
+        let editor = self.below(EDITORS);
+        let (revision, had_read) = self.read[editor].clone();
+        if revision.is_empty() {
+            return;
+        }
+        let (is, k) = (Precondition::OneOf(vec![revision]), self.next + 1);
+        self.next = k;
+        match edited(&self.store, is, k).await {
+            Ok(revision) => {
+                let known = had_read == self.walls || self.maybe.contains(&had_read);
+                assert!(known, "an edit of {had_read} has overwritten {}", self.walls);
+                (self.walls, self.read[editor]) = (k, (revision, k));
+                self.maybe.clear();
+            }
+            Err(StoreError::ChangedMeanwhile { .. }) => {}
+            Err(error) => panic!("{error}"),
+        }
+    }
+
+    /// A client asks and goes before the answer.
+    async fn hang_up(&mut self) {
+        let polls = self.below(6);
+        let store = self.store.clone();
+        if self.below(2) == 0 {
+            let number = self.below(NAMES);
+            let name = format!("l{number}");
+            if !self.created.contains(&name) {
+                self.unknown.insert(name.clone());
+            }
+            abandon(created(&store, &name), polls).await;
+        } else {
+            let revision = self.store.revision("a", &Subject::Walls).await.unwrap();
+            let k = self.next + 1;
+            self.next = k;
+            self.maybe.insert(k);
+            abandon(edited(&store, Precondition::OneOf(vec![revision]), k), polls).await;
+        }
+    }
+
+    /// The server stops, in good order or not, and starts again on what is on the disk.
+    async fn restart(&mut self) {
+        let tasks = self.tasks.take().expect("a server");
+        if self.below(2) == 0 {
+            tasks.close().await;
+        } else {
+            tasks.abort_writer();
+            drop(tasks);
+        }
+        // The lock of the data directory goes with the writer's task.
+        let mut tries = 0;
+        let (store, tasks) = loop {
+            match Catalogue::open(&config(self.data.path())).await {
+                Ok(opened) => break opened,
+                Err(error) => {
+                    tries += 1;
+                    assert!(tries < 2000, "the server does not start again: {error}");
+                    tokio::time::sleep(std::time::Duration::from_millis(5)).await;
+                }
+            }
+        };
+        (self.store, self.tasks) = (store, Some(tasks));
+    }
+
+    /// What was acknowledged is in the snapshot in use and on the disk; nothing is there that was not asked for.
+    async fn check(&mut self) {
+        let map = self.store.snapshots().get("a").unwrap();
+        assert!(map.version >= self.version, "version {} after {}", map.version, self.version);
+        self.version = map.version;
+        let shown: BTreeMap<&str, u32> = map.landmarks.values().fold(BTreeMap::new(), |mut names, l| {
+            *names.entry(l.name.as_str()).or_default() += 1;
+            names
+        });
+        for name in &self.created {
+            assert_eq!(shown.get(name.as_str()), Some(&1), "{name} was acknowledged");
+        }
+        for (name, count) in shown {
+            assert!(self.created.contains(name) || self.unknown.contains(name), "{name} was not asked for");
+            assert_eq!(count, 1, "{name} is there twice");
+        }
+        let walls = number_of(&map.walls);
+        assert!(
+            walls == self.walls || self.maybe.contains(&walls),
+            "the walls say {walls}; {} was acknowledged, without an answer are {:?}",
+            self.walls,
+            self.maybe
+        );
+    }
+}
+
+/// Creates a landmark under the key of its name; whether that was done before.
+async fn created(store: &Catalogue, name: &str) -> Result<bool, StoreError> {
+    let digest = std::array::from_fn(|i| name.as_bytes().get(i).copied().unwrap_or_default());
+    let key = match store.creation(name, digest).await? {
+        Creation::Repeat(answer) => {
+            assert_eq!(answer.body, format!("\"{name}\""), "the answer of another creation");
+            return Ok(true);
+        }
+        Creation::First(key) => key,
+    };
+    let (answer, new) = (|made: &LandmarkRow| Answer::json(201, &made.name), name.to_owned());
+    let write = store.write(move |tx| {
+        Box::pin(async move {
+            landmarks::create(tx, "a", &new, landmarks::LandmarkGeometry::default(), NAMES + 1).await
+        })
+    });
+    key.scope(answered(answer, write)).await.map(|_| false)
+}
+
+/// Makes the walls say `k`, if they are what the editor has read.
+async fn edited(store: &Catalogue, is: Precondition, k: i64) -> Result<String, StoreError> {
+    let write = store.write(move |tx| {
+        Box::pin(async move {
+            revisions::check(tx, "a", &Subject::Walls, &is).await?;
+            walls::replace(tx, "a", &[[0.0, 0.0, k as f64, 0.0]]).await?;
+            revisions::after(tx, "a", &Subject::Walls).await
+        })
+    });
+    write.await
+}
+
+/// Polls so often, with time for the writer in between, and goes.
+async fn abandon<T>(asked: impl Future<Output = T>, polls: usize) {
+    let mut asked = Box::pin(asked);
+    for _ in 0..polls {
+        if futures::poll!(asked.as_mut()).is_ready() {
+            return;
+        }
+        tokio::time::sleep(std::time::Duration::from_micros(300)).await;
+    }
+}
+
+async fn run(seed: u64) {
+    let mut world = World::new(seed).await;
+    for _ in 0..STEPS {
+        world.step().await;
+    }
+    world.restart().await;
+    world.check().await;
+}
+
+fn number(name: &str) -> Option<u64> {
+    std::env::var(name).ok().and_then(|text| text.parse().ok())
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_key_has_one_effect_and_no_update_is_lost_whatever_clients_and_stops_do() {
+    let seeds = match number("WAYMARK_SEED") {
+        Some(seed) => seed..seed + 1,
+        None => 0..number("WAYMARK_SEEDS").unwrap_or(SEEDS),
+    };
+    for seed in seeds {
+        let ended = futures::FutureExt::catch_unwind(AssertUnwindSafe(run(seed))).await;
+        assert!(
+            ended.is_ok(),
+            "seed {seed} failed: WAYMARK_SEED={seed} cargo test -p server --lib a_key_has_one_effect"
+        );
+    }
+}
