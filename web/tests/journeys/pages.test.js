@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { readFile } from "node:fs/promises";
 import { after, afterEach, before, test } from "node:test";
-import { PHONE, asker, browser, check, demo, open } from "./harness.js";
+import { PHONE, SOON, asker, browser, check, demo, open } from "./harness.js";
 
 let server, its, api;
 before(async () => {
@@ -91,7 +91,7 @@ for (const [size, where] of [[undefined, "desk"], [PHONE, "phone"]]) {
     const [first] = (await api("GET", `/maps/${MAP}/landmarks`)).items;
     await page.getByLabel("Name").fill(first.name);
     await page.getByRole("link", { name: first.name, exact: true }).click();
-    await page.getByRole("heading", { name: "Photographs" }).waitFor();
+    await page.getByRole("heading", { name: "Photographs", exact: true }).waitFor();
     await page.getByRole("img", { name: /Hausdorff/ }).waitFor();
     await page.getByRole("img", { name: /Photograph \d+/ }).first().waitFor();
     await check(page, `landmark-${where}`);
@@ -145,7 +145,7 @@ test("a map shows where odometry alone and a simulator say that robots are", asy
   await page.getByText("Layers", { exact: true }).click();
   await page.getByLabel("Odometry (dashed), truth of a simulator", { exact: true }).check();
   await page.waitForURL(/off=none/);
-  const until = Date.now() + 20_000;
+  const until = Date.now() + SOON;
   while ((await blue()) < before + 20 && Date.now() < until) await page.waitForTimeout(300);
   assert.ok((await blue()) >= before + 20, `pixels of the true track: ${before} before, ${await blue()} after`);
   await page.reload();
