@@ -56,7 +56,11 @@ async fn status(session: &Session) -> anyhow::Result<()> {
     let shown = json!({ "version": version, "readiness": readiness, "maps": counts.maps, "landmarks": counts.landmarks,
         "robots": counts.robots, "robots_connected": counts.connected });
     session.show(&shown, &text(&version, &readiness, &counts))?;
-    let sentence = if !readiness.maps_not_in_use.is_empty() {
+    let sentence = if readiness.router.is_some() {
+        "The server is degraded: it has no part in its router."
+    } else if !readiness.maps_not_served.is_empty() {
+        "The server is degraded: another server has one of its maps."
+    } else if !readiness.maps_not_in_use.is_empty() {
         "The server is degraded: not every map is in use."
     } else if !readiness.damaged_pictures.is_empty() {
         "The server is degraded: stored pictures are damaged."
@@ -85,6 +89,9 @@ fn text(version: &Version, readiness: &Readiness, counts: &Counts) -> String {
         format!("  {} with {}", counted(counts.maps, "map"), counted(counts.landmarks, "landmark")),
         format!("  {}, {} connected", counted(counts.robots, "robot"), counts.connected),
     ];
+    lines.extend(readiness.router.iter().map(|why| format!("  router: {why}")));
+    let not_served = readiness.maps_not_served.iter();
+    lines.extend(not_served.map(|(map, why)| format!("  map {map} is not served to robots: {why}")));
     let BackupHealth { newest, failed, every_hours, .. } = &readiness.backup;
     lines.extend(newest.iter().map(|name| format!("  newest backup {name} (UTC)")));
     if newest.is_none() && *every_hours > 0 {
@@ -112,10 +119,13 @@ mod tests {
             version: version("0.1.0"),
             api: version("v1"),
             protocol: version("1"),
+            server: version("hall"),
         };
         let readiness = Readiness {
             status: "degraded".into(),
             maps_not_in_use: [("office".to_owned(), "damaged".to_owned())].into(),
+            router: Some("no connection".into()),
+            maps_not_served: [("annex".to_owned(), "also on b".to_owned())].into(),
             damaged_pictures: vec!["view 3 of landmark door, map office".into()],
             backup: BackupHealth {
                 every_hours: 24,
@@ -132,6 +142,10 @@ mod tests {
             "{lines}"
         );
         assert!(lines.contains("map office is not in use: damaged"), "{lines}");
+        assert!(
+            lines.contains("router: no connection\n  map annex is not served to robots: also on b"),
+            "{lines}"
+        );
         assert!(
             lines.contains("newest backup 20261123-140530 (UTC)\n  the last backup failed: no space"),
             "{lines}"

@@ -14,6 +14,7 @@ use engine::{
     vitals::{Failure, Vitals},
     workers::Workers,
 };
+use protos::Name;
 use std::{
     net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr},
     path::Path,
@@ -29,6 +30,8 @@ pub struct RunningServer {
     pub http_addr: SocketAddr,
     /// Where robots connect, with the real port.
     pub zenoh_endpoint: String,
+    /// The server's name among those of a router.
+    pub server: Name,
     /// Maps and robots as the workers see them.
     pub snapshots: Arc<Snapshots>,
     /// What robots are doing now.

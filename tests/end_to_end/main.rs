@@ -37,6 +37,7 @@ mod restart;
 mod robot_activity;
 mod ros2_robots;
 mod several_maps;
+mod several_servers;
 mod stored_answers;
 mod style;
 mod teach_and_recognise;

@@ -12,6 +12,7 @@ mod open_data;
 pub mod pictures;
 pub mod robots;
 pub mod ros;
+pub mod router;
 pub mod scenes;
 
 pub use child::Child;

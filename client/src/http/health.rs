@@ -2,12 +2,13 @@
 
 use super::{map_client::MapClient, operation::operations};
 use crate::ClientError;
-use protos::api::{Health, Readiness, Version};
+use protos::api::{Health, Readiness, Servers, Version};
 
 operations! {
     HEALTH: GET "/healthz" => health,
     READINESS: GET "/readyz" => readiness,
     VERSION: GET "/version" => version,
+    SERVERS: GET "/servers" => servers,
 }
 
 impl MapClient {
@@ -19,6 +20,11 @@ impl MapClient {
     /// Whether every part of the server runs and the database answers; an error with status 503 otherwise.
     pub async fn readiness(&self) -> Result<Readiness, ClientError> {
         self.send(self.ask(&READINESS, &[])?).await
+    }
+
+    /// The servers that share a router, with their maps, and what more than one of them has.
+    pub async fn servers(&self) -> Result<Servers, ClientError> {
+        self.send(self.ask(&SERVERS, &[])?).await
     }
 
     /// Version of the server.

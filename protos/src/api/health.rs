@@ -16,8 +16,8 @@ pub struct Health {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct Readiness {
-    /// `ready`, or `degraded`: everything runs, but something is named in `maps_not_in_use` or
-    /// `damaged_pictures`, or the last scheduled backup failed.
+    /// `ready`, or `degraded`: everything runs, but something is named in `maps_not_in_use`, `damaged_pictures`, `router`
+    /// or `maps_not_served`, or the last scheduled backup failed.
     pub status: String,
     /// Maps whose stored version cannot be made ready, with the reason: an earlier version is used, or none since the
     /// server started. A later change of the map tries again.
@@ -26,6 +26,12 @@ pub struct Readiness {
     /// photograph, uploaded again, mends it.
     #[serde(default)]
     pub damaged_pictures: Vec<String>,
+    /// Why the server has no part in the router that it is to join: no connection, or a name that another server has.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub router: Option<String>,
+    /// Maps that another server has, too, with the reason: robots are refused on them here.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub maps_not_served: BTreeMap<String, String>,
     /// The newest backup, and why the last attempt failed.
     #[serde(default)]
     pub backup: BackupHealth,
@@ -46,4 +52,7 @@ pub struct Version {
     pub api: String,
     /// Of the protocol over zenoh.
     pub protocol: String,
+    /// Name of this server among those of a router.
+    #[serde(default)]
+    pub server: String,
 }

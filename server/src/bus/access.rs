@@ -85,7 +85,7 @@ impl Policy {
         for (robot, grant) in &self.robots {
             let own = of_robot(keys, robot, grant);
             let mut ids: Vec<Value> = own.iter().map(|rule| rule["id"].clone()).collect();
-            ids.extend(["inputs", "questions", "maps"].map(Value::from));
+            ids.extend(["inputs", "questions", "maps", "watch servers", "servers"].map(Value::from));
             rules.extend(own);
             // Names of robots are not subjects of their own: one may be called as the server's.
             let subject = format!("robot {robot}");
@@ -116,15 +116,19 @@ fn rule(id: &str, keys: &[impl AsRef<str>], messages: &[&str], flows: &[&str]) -
     json!({ "id": id, "permission": "allow", "flows": flows, "messages": messages, "key_exprs": keys })
 }
 
-/// What each robot may: learn that the server listens, and ask for changes of maps, of which only its own arrive.
-fn shared(keys: &Keys) -> [Value; 3] {
+/// What each robot may: learn that the server listens, ask for changes of maps, of which only its own arrive, and know which
+/// servers live.
+fn shared(keys: &Keys) -> [Value; 5] {
     let inputs = [keys.all_frames(), keys.all_quads(), keys.all_odometry(), keys.all_scans()];
     let questions = [keys.all_gaze(), keys.all_hellos(), keys.all_localisations(), keys.all_map_versions()];
     let maps = [keys.all_map_changes(), keys.all_map_versions()];
+    let servers = [keys.all_server_tokens()];
     [
         rule("inputs", &inputs, &["declare_subscriber"], &["egress"]),
         rule("questions", &questions, &["declare_queryable"], &["egress"]),
         rule("maps", &maps, &["declare_subscriber", "query"], &["ingress"]),
+        rule("watch servers", &servers, &["declare_liveliness_subscriber", "liveliness_query"], &["ingress"]),
+        rule("servers", &servers, &["liveliness_token"], &["egress"]),
     ]
 }
 

@@ -32,11 +32,14 @@ async fn readyz(State(app): State<AppState>) -> Result<Json<Readiness>, ApiError
     let damaged_pictures = crate::store::pictures::damaged(app.store.reads()).await?;
     let backup = app.backups.health();
     let scheduled_failed = backup.every_hours > 0 && backup.failed.is_some();
-    let is_degraded = !maps_not_in_use.is_empty() || !damaged_pictures.is_empty() || scheduled_failed;
+    let (router, maps_not_served) = app.fleet.as_ref().map(|fleet| fleet.faults()).unwrap_or_default();
+    let has_faults = !maps_not_in_use.is_empty() || !damaged_pictures.is_empty();
+    let is_degraded = has_faults || scheduled_failed || router.is_some() || !maps_not_served.is_empty();
     let status = if is_degraded { "degraded" } else { "ready" };
     let panics =
         Edge::ALL.into_iter().map(|edge| (edge.name().to_owned(), vitals.panics().at(edge))).collect();
-    Ok(Json(Readiness { status: status.to_owned(), maps_not_in_use, damaged_pictures, backup, panics }))
+    let status = status.to_owned();
+    Ok(Json(Readiness { status, maps_not_in_use, damaged_pictures, router, maps_not_served, backup, panics }))
 }
 
 fn not_ready(failure: &Failure) -> ApiError {
@@ -47,11 +50,12 @@ fn not_ready(failure: &Failure) -> ApiError {
 
 /// What runs here.
 #[utoipa::path(get, path = "/version", tag = "health", responses((status = 200, body = Version)))]
-async fn version() -> Json<Version> {
+async fn version(State(app): State<AppState>) -> Json<Version> {
     Json(Version {
         name: "waymark".to_owned(),
         version: env!("CARGO_PKG_VERSION").to_owned(),
         api: "v1".to_owned(),
         protocol: protos::keys::PROTOCOL.to_owned(),
+        server: app.server.to_string(),
     })
 }
