@@ -137,6 +137,7 @@ from waymark.api.robots import (
     UploadedView,
     UploadedViews,
 )
+from waymark.api.servers import ServedMap, ServerBody, Servers
 from waymark.api.stored_answers import (
     AnswerStatus,
     LandmarkIcon,
@@ -286,7 +287,10 @@ __all__ = [
     "Role",
     "RollbackOutcome",
     "Ros2Status",
+    "ServedMap",
+    "ServerBody",
     "ServerEvent",
+    "Servers",
     "Size",
     "SizeAndPlace",
     "StoredAnswer",
