@@ -61,6 +61,8 @@ struct State {
     last: BTreeMap<Option<Name>, Name>,
     /// The server whose answers on a map are taken.
     followed: BTreeMap<String, Name>,
+    /// The server of which it was told last that it is gone, until one is back.
+    told: Option<Name>,
 }
 
 impl State {
@@ -162,19 +164,20 @@ impl Servers {
     fn change(&self, change: impl FnOnce(&mut State)) {
         let mut state = self.state();
         change(&mut state);
-        let now = state.gone();
-        let before = self.0.gone.send_replace(now.clone());
-        if before == now {
-            return;
-        }
-        let map = state.map.clone();
-        let event = match now {
-            Some(server) => ServerEvent::Gone { server, map },
-            // Another map was entered, or somebody serves this one.
-            None => match state.present(map.as_ref()) {
-                Some(server) => ServerEvent::Back { server: server.clone(), map },
-                None => return,
-            },
+        let (gone, map) = (state.gone(), state.map.clone());
+        self.0.gone.send_replace(gone.clone());
+        let event = match (gone, state.present(map.as_ref())) {
+            (Some(server), _) if state.told.as_ref() != Some(&server) => {
+                state.told = Some(server.clone());
+                ServerEvent::Gone { server, map }
+            }
+            // A server that lives is back when it has what the robot needs.
+            (None, Some(server)) if state.told.is_some() => {
+                let server = server.clone();
+                state.told = None;
+                ServerEvent::Back { server, map }
+            }
+            _ => return,
         };
         // No receiver is not an error.
         drop(self.0.events.send(event));

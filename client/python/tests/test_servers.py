@@ -1,4 +1,4 @@
-"""Claim: of several servers on a router a robot follows one for each map, and is told when its own goes and comes back."""
+"""Claim: of several servers on a router a robot follows one for each map, and is told when its own goes and is back."""
 
 from __future__ import annotations
 

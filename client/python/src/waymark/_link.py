@@ -259,9 +259,8 @@ class Link:
     def publish_odometry(self, odom_from_robot: Pose2, captured_ns: int | None) -> int:
         """Sends odometry, read now or at `captured_ns`."""
         seq = self.next_seq()
-        message = pb.Odometry(
-            epoch=self.epoch, seq=seq, captured_ns=captured_ns or time.time_ns(), map=self.servers.map
-        )
+        captured_ns = captured_ns or time.time_ns()
+        message = pb.Odometry(epoch=self.epoch, seq=seq, captured_ns=captured_ns, map=self.servers.map)
         fill(message.odom_from_robot, odom_from_robot)
         self._put(f"{self._own}/odometry", message.SerializeToString(), zenoh.Priority.DATA)
         return seq

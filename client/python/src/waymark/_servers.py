@@ -1,5 +1,5 @@
-"""The servers that a robot meets, where several share a router. In: their liveliness tokens, and what they send. Out: which
-server a map follows, and events when the robot's server goes and comes back.
+"""The servers that a robot meets, where several share a router. In: their liveliness tokens, and what they send. Out:
+which server a map follows, and events when the robot's server goes and comes back.
 
 A server that is its own router announces nothing; then nothing here changes what a client does.
 """
@@ -32,6 +32,8 @@ class Servers:
         self._last: dict[str, str] = {}
         self._followed: dict[str, str] = {}
         self._gone: str | None = None
+        # The server of which it was told last that it is gone, until one is back.
+        self._told: str | None = None
 
     @property
     def map(self) -> str:
@@ -69,12 +71,13 @@ class Servers:
     def _changed(self) -> None:
         present, last = self._present(), self._last.get(self._map)
         gone = last if present is None and last is not None and not self._lives(last) else None
-        before, self._gone = self._gone, gone
-        if gone == before:
-            return
-        if gone is not None:
+        self._gone = gone
+        if gone is not None and gone != self._told:
+            self._told = gone
             self._tell(ServerEvent("gone", gone, self._map))
-        elif present is not None:
+        # A server that lives is back when it has what the robot needs.
+        elif present is not None and self._told is not None:
+            self._told = None
             self._tell(ServerEvent("back", present, self._map))
 
     def raise_if_gone(self) -> None:
