@@ -133,9 +133,7 @@ async fn every_frame_is_answered_once_while_servers_come_and_go() {
     let mut answers = rover.answers();
     rover.enter_map(Some("annex")).expect("a name");
     let entered = Instant::now();
-    let by_b = async {
-        while answers.recv().await.is_ok_and(|a| a.answer.server != "b") {}
-    };
+    let by_b = async { while answers.recv().await.is_ok_and(|a| a.answer.server != "b") {} };
     tokio::time::timeout(SOON, by_b).await.expect("it goes on");
     println!("a robot that enters the map of another server is answered after {:?}", entered.elapsed());
     heard.more("rover", "b", "").await;
@@ -222,7 +220,10 @@ async fn a_restart_of_the_router_is_survived() {
         let restarted = Instant::now();
         heard = Heard::into(&router, heard.answers.clone()).await;
         tokio::join!(heard.more("r1", "a", ""), heard.more("r2", "b", ""));
-        println!("round {round}: both robots are answered {:?} after the router is back", restarted.elapsed());
+        println!(
+            "round {round}: both robots are answered {:?} after the router is back",
+            restarted.elapsed()
+        );
     }
     assert_eq!(a.maps().landmarks("hall").await.expect("landmarks").len(), 5);
     senders.each_ref().map(JoinHandle::abort);

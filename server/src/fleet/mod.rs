@@ -195,11 +195,10 @@ impl Fleet {
             servers.push(body(server, maps, robots));
         }
         servers.sort_by(|a, b| a.name.cmp(&b.name));
-        let contested_maps = contested(
-            servers
-                .iter()
-                .flat_map(|server| server.maps.iter().map(|map| (map.name.clone(), server.name.clone()))),
-        );
+        let contested_maps =
+            contested(servers.iter().flat_map(|server| {
+                server.maps.iter().map(move |map| (map.name.clone(), server.name.clone()))
+            }));
         let robot_of = |server: &Name, token: &ServerToken| match token {
             ServerToken::Robot(robot) => Some((robot.to_string(), server.to_string())),
             _ => None,
