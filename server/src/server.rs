@@ -109,7 +109,9 @@ impl Server {
         let recorders = recorders(&config, &store, (found, recorded, &engine.live), &stopping);
         let pictures = tokio::spawn(pictures::check_all((*store).clone(), stopping.clone()));
         let (live, slots) = (engine.live.clone(), engine.slots.clone());
-        let registry = certificates.as_ref().map(|_| store.certificates().clone());
+        // Whoever owns the router decides who is a robot.
+        let of_robots = certificates.as_ref().filter(|_| config.router.is_none());
+        let registry = of_robots.map(|_| store.certificates().clone());
         let to = receivers(&config, &engine, registry)?;
         let (server, fleet) = (to.server.clone(), to.fleet.clone());
         let bus = Bus::open(&config, to.clone(), certificates.clone()).await?;
@@ -130,7 +132,7 @@ impl Server {
             publisher: Some(publisher.clone()),
             sessions: sessions.clone(),
             backups,
-            enrolment: enrolment(certificates.as_ref(), bus.endpoint()),
+            enrolment: enrolment(of_robots, bus.endpoint()),
             local_token_file: Some(local_token.path().to_owned()),
             server: server.clone(),
             fleet,
