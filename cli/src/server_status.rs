@@ -7,7 +7,7 @@ use super::{
 };
 use client::{
     ClientError,
-    api::{BackupHealth, Readiness, Version},
+    api::{BackupHealth, Readiness, Servers, Version},
 };
 use serde_json::json;
 
@@ -24,13 +24,17 @@ pub(crate) struct Args {
 enum Verb {
     /// Whether the server is ready, its version, maps and robots. Exit status 0 only if everything is in order.
     Status,
+    /// The servers that share a router with this one, with their maps, and what more than one of them has.
+    List,
 }
 
 /// Runs the command.
 pub(crate) async fn run(args: &Args) -> anyhow::Result<()> {
-    let Verb::Status = args.verb;
     let session = args.server.session()?;
-    let done = status(&session).await;
+    let done = match args.verb {
+        Verb::Status => status(&session).await,
+        Verb::List => list(&session).await,
+    };
     session.explained(done).await
 }
 
@@ -72,6 +76,31 @@ async fn status(session: &Session) -> anyhow::Result<()> {
     Err(Failure::new(Class::Failed, "degraded", sentence).into())
 }
 
+async fn list(session: &Session) -> anyhow::Result<()> {
+    let servers = session.maps().servers().await?;
+    session.show(&json!(servers), &servers_text(&servers))
+}
+
+fn servers_text(servers: &Servers) -> String {
+    let mut lines = Vec::new();
+    for server in &servers.servers {
+        let here = if server.name == servers.server { " (asked)" } else { "" };
+        lines.push(format!("{}{here}: {}", server.name, counted(server.robots, "robot")));
+        lines.extend(server.maps.iter().map(|map| {
+            let note = if map.is_served { "" } else { ", not served to robots" };
+            format!("  map {}{note}", map.name)
+        }));
+    }
+    if !servers.is_connected {
+        lines.push(format!("no connection to the router at {}", servers.router.join(", ")));
+    }
+    let contested =
+        |(name, of): (&String, &Vec<String>), what| format!("{what} {name} is on {}", of.join(", "));
+    lines.extend(servers.contested_maps.iter().map(|each| contested(each, "contested: map")));
+    lines.extend(servers.contested_robots.iter().map(|each| contested(each, "on several servers: robot")));
+    lines.join("\n")
+}
+
 /// What is on a server.
 struct Counts {
     maps: u64,
@@ -110,6 +139,28 @@ fn text(version: &Version, readiness: &Readiness, counts: &Counts) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use client::api::{ServedMap, ServerBody};
+
+    #[test]
+    fn a_list_of_servers_names_what_several_have() {
+        let server = |name: &str, is_served| ServerBody {
+            name: name.into(),
+            maps: vec![ServedMap { name: "hall".into(), is_served }],
+            robots: 1,
+        };
+        let both = vec!["a".to_owned(), "b".to_owned()];
+        let servers = Servers {
+            server: "b".into(),
+            is_connected: true,
+            servers: vec![server("a", true), server("b", false)],
+            contested_maps: [("hall".to_owned(), both.clone())].into(),
+            contested_robots: [("r1".to_owned(), both)].into(),
+            ..Servers::default()
+        };
+        let expected = "a: 1 robot\n  map hall\nb (asked): 1 robot\n  map hall, not served to robots\n\
+                        contested: map hall is on a, b\non several servers: robot r1 is on a, b";
+        assert_eq!(servers_text(&servers), expected);
+    }
 
     #[test]
     fn a_status_names_maps_that_are_not_in_use_and_faults() {

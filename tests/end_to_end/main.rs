@@ -38,6 +38,7 @@ mod robot_activity;
 mod ros2_robots;
 mod several_maps;
 mod several_servers;
+mod several_servers_tls;
 mod stored_answers;
 mod style;
 mod teach_and_recognise;
