@@ -148,6 +148,7 @@ const OPTIONS: [(&str, &[&str], &[&str]); 58] = [
     ("robot add", SERVER, &["<ROBOT>", "--map"]),
     ("robot list", SERVER, &[]),
     ("robot show", SERVER, &["<ROBOT>"]),
+    ("robot access-control", SERVER, &["--server-certificate", "--robot", "--also-map", "--fleet"]),
     ("robot remove", SERVER, &["<ROBOT>", "--yes"]),
     (
         "camera calibrate",

@@ -76,10 +76,10 @@ impl Policy {
         Self { robots }
     }
 
-    /// As zenoh's settings want it. `server`: the name in the certificate of the server's other router.
-    pub(super) fn access_control(&self, keys: &Keys, server: &str) -> Value {
+    /// As zenoh's settings want it. `servers`: the names in the certificates of servers, or of the server's other router.
+    pub(super) fn access_control(&self, keys: &Keys, servers: &[String]) -> Value {
         let mut rules = vec![rule(SERVER, &ALL_KEYS, &ALL_MESSAGES, &["ingress", "egress"])];
-        let mut subjects = vec![json!({ "id": SERVER, "cert_common_names": [server] })];
+        let mut subjects = vec![json!({ "id": SERVER, "cert_common_names": servers })];
         let mut policies = vec![json!({ "rules": [SERVER], "subjects": [SERVER] })];
         rules.extend(shared(keys));
         for (robot, grant) in &self.robots {
@@ -100,6 +100,23 @@ impl Policy {
             "policies": policies,
         })
     }
+}
+
+/// The same for a router of the operator that servers join: each robot is known by the common names of its certificates, and
+/// hears changes of `maps`.
+pub fn access_control_for_router(
+    fleet: &Name,
+    robots: &BTreeMap<Name, BTreeSet<String>>,
+    maps: &BTreeSet<String>,
+    servers: &[String],
+) -> Value {
+    let grant = |common_names: &BTreeSet<String>| Grant {
+        common_names: common_names.clone(),
+        maps: maps.clone(),
+        ros2_prefix: None,
+    };
+    let robots = robots.iter().map(|(robot, names)| (robot.clone(), grant(names))).collect();
+    Policy { robots }.access_control(&Keys::new(fleet), servers)
 }
 
 /// The map itself, and every map that lies in the same coordinates.
@@ -159,4 +176,28 @@ fn of_robot(keys: &Keys, robot: &Name, grant: &Grant) -> Vec<Value> {
         rules.push(rule(&id("speaks ROS"), &inside, &ALL_MESSAGES, &["ingress", "egress"]));
     }
     rules
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_router_of_the_operator_gives_each_robot_its_own_keys() {
+        let name = |text: &str| Name::new(text).unwrap();
+        let robots = BTreeMap::from([(name("r1"), BTreeSet::from(["r1".to_owned()]))]);
+        let maps = BTreeSet::from(["hall".to_owned()]);
+        let servers = ["a".to_owned(), "b".to_owned()];
+        let block = access_control_for_router(&name("site"), &robots, &maps, &servers);
+        assert_eq!(block["default_permission"], "deny");
+        assert_eq!(block["subjects"][0]["cert_common_names"], json!(["a", "b"]));
+        assert_eq!(block["subjects"][1]["cert_common_names"], json!(["r1"]));
+        let rules = block["rules"].as_array().unwrap();
+        let of = |id: &str| rules.iter().find(|rule| rule["id"] == id).unwrap();
+        assert_eq!(of("servers")["messages"], json!(["liveliness_token"]));
+        assert_eq!(of("r1 reads maps")["key_exprs"], json!(["waymark/1/site/map/hall/changed"]));
+        // zenoh understands it.
+        let config = json!({ "mode": "router", "access_control": block });
+        zenoh::Config::from_json5(&config.to_string()).unwrap();
+    }
 }

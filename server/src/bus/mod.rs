@@ -18,6 +18,7 @@ mod versions;
 #[cfg(test)]
 mod tests;
 
+pub use access::access_control_for_router;
 pub(crate) use inbox::{announce_presence, take_frame};
 pub use outbox::Outbox;
 
