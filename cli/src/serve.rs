@@ -36,6 +36,10 @@ For other machines, encrypted, with a certificate for each robot (`waymark robot
 
   waymark serve --tls --tls-name 192.168.1.4 --http 0.0.0.0:8080 --zenoh tls/0.0.0.0:7447
 
+Several servers, each with its own maps, share one zenoh router (docs/guides/several-servers.md):
+
+  waymark serve --router tcp/127.0.0.1:7447 --server-name hall --http 127.0.0.1:8081
+
 Runs until Ctrl-C or SIGTERM. If a part of it ends by itself, /readyz answers 503 with its name and the program ends with
 an error: start it again, and it goes on from what is on the disk.
 
@@ -73,6 +77,12 @@ pub(super) struct Serve {
     /// A DNS name or address by which clients reach this server, for its certificate; may be given several times.
     #[arg(long, value_name = "NAME", requires = "tls")]
     tls_name: Vec<String>,
+    /// A zenoh router to join instead of being one, such as tls/router.example.org:7447; may be given several times.
+    #[arg(long, value_name = "ENDPOINT", conflicts_with = "zenoh")]
+    router: Vec<String>,
+    /// The server's name among those of a router [default: made once, and kept in the data directory].
+    #[arg(long, value_name = "NAME")]
+    server_name: Option<String>,
     /// Allows addresses beyond loopback in plain text. There nothing is encrypted, and robots are not asked who they are:
     /// only for a network that is trusted as a whole. Encrypted endpoints need no such permission.
     #[arg(long)]
@@ -100,6 +110,12 @@ impl Serve {
         }
         if let Some(workers) = self.workers {
             raw.workers = workers;
+        }
+        if !self.router.is_empty() {
+            raw.router.connect = self.router;
+        }
+        if let Some(name) = self.server_name {
+            raw.server_name = name;
         }
         raw.insecure |= self.insecure;
         raw.tls.enabled |= self.tls;
@@ -157,10 +173,11 @@ fn ready(server: &RunningServer) {
     let link = server.page_link().filter(|_| std::io::stdout().is_terminal());
     let open = link.unwrap_or_else(|| "waymark open prints a link that opens the page".to_owned());
     let text = format!(
-        "pages   {}/\nrobots  {}\ntoken   {}\nopen    {open}\n",
+        "pages   {}/\nrobots  {}\ntoken   {}\nopen    {open}\nserver  {}\n",
         server.url(),
         server.zenoh_endpoint,
-        server.local_token_file().display()
+        server.local_token_file().display(),
+        server.server
     );
     // At once: who reads only the first lines may close the pipe after them.
     std::io::stdout().write_all(text.as_bytes()).ok();

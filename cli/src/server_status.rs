@@ -7,7 +7,7 @@ use super::{
 };
 use client::{
     ClientError,
-    api::{BackupHealth, Readiness, Version},
+    api::{BackupHealth, Readiness, Servers, Version},
 };
 use serde_json::json;
 
@@ -26,6 +26,8 @@ enum Verb {
     Status,
     /// Whether the server does its work now: what a container or a load balancer asks. Needs no token.
     Health,
+    /// The servers that share a router with this one, with their maps, and what more than one of them has.
+    List,
 }
 
 /// Runs the command.
@@ -34,6 +36,7 @@ pub(crate) async fn run(args: &Args) -> anyhow::Result<()> {
     let done = match args.verb {
         Verb::Status => status(&session).await,
         Verb::Health => health(&session).await,
+        Verb::List => list(&session).await,
     };
     session.explained(done).await
 }
@@ -52,7 +55,11 @@ async fn status(session: &Session) -> anyhow::Result<()> {
     let shown = json!({ "version": version, "readiness": readiness, "maps": counts.maps, "landmarks": counts.landmarks,
         "robots": counts.robots, "robots_connected": counts.connected });
     session.show(&shown, &text(&version, &readiness, &counts))?;
-    let sentence = if readiness.counts.maps_not_in_use > 0 {
+    let sentence = if readiness.router.is_some() {
+        "The server is degraded: it has no part in its router."
+    } else if !readiness.maps_not_served.is_empty() {
+        "The server is degraded: another server has one of its maps."
+    } else if readiness.counts.maps_not_in_use > 0 {
         "The server is degraded: not every map is in use."
     } else if readiness.counts.damaged_pictures > 0 {
         "The server is degraded: stored pictures are damaged."
@@ -83,6 +90,31 @@ async fn health(session: &Session) -> anyhow::Result<()> {
     session.show(&json!({ "status": readiness.status }), &readiness.status)
 }
 
+async fn list(session: &Session) -> anyhow::Result<()> {
+    let servers = session.maps().servers().await?;
+    session.show(&json!(servers), &servers_text(&servers))
+}
+
+fn servers_text(servers: &Servers) -> String {
+    let mut lines = Vec::new();
+    for server in &servers.servers {
+        let here = if server.name == servers.server { " (asked)" } else { "" };
+        lines.push(format!("{}{here}: {}", server.name, counted(server.robots, "robot")));
+        lines.extend(server.maps.iter().map(|map| {
+            let note = if map.is_served { "" } else { ", not served to robots" };
+            format!("  map {}{note}", map.name)
+        }));
+    }
+    if !servers.is_connected {
+        lines.push(format!("no connection to the router at {}", servers.router.join(", ")));
+    }
+    let contested =
+        |(name, of): (&String, &Vec<String>), what| format!("{what} {name} is on {}", of.join(", "));
+    lines.extend(servers.contested_maps.iter().map(|each| contested(each, "contested: map")));
+    lines.extend(servers.contested_robots.iter().map(|each| contested(each, "on several servers: robot")));
+    lines.join("\n")
+}
+
 /// What is on a server.
 struct Counts {
     maps: u64,
@@ -100,6 +132,9 @@ fn text(version: &Version, readiness: &Readiness, counts: &Counts) -> String {
         format!("  {} with {}", counted(counts.maps, "map"), counted(counts.landmarks, "landmark")),
         format!("  {}, {} connected", counted(counts.robots, "robot"), counts.connected),
     ];
+    lines.extend(readiness.router.iter().map(|why| format!("  router: {why}")));
+    let not_served = readiness.maps_not_served.iter();
+    lines.extend(not_served.map(|(map, why)| format!("  map {map} is not served to robots: {why}")));
     let BackupHealth { newest, failed, every_hours, .. } = &readiness.backup;
     lines.extend(newest.iter().map(|name| format!("  newest backup {name} (UTC)")));
     if newest.is_none() && *every_hours > 0 {
@@ -125,7 +160,28 @@ fn text(version: &Version, readiness: &Readiness, counts: &Counts) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use client::api::{ReadinessCounts, StorageHealth};
+    use client::api::{ReadinessCounts, ServedMap, ServerBody, StorageHealth};
+
+    #[test]
+    fn a_list_of_servers_names_what_several_have() {
+        let server = |name: &str, is_served| ServerBody {
+            name: name.into(),
+            maps: vec![ServedMap { name: "hall".into(), is_served }],
+            robots: 1,
+        };
+        let both = vec!["a".to_owned(), "b".to_owned()];
+        let servers = Servers {
+            server: "b".into(),
+            is_connected: true,
+            servers: vec![server("a", true), server("b", false)],
+            contested_maps: [("hall".to_owned(), both.clone())].into(),
+            contested_robots: [("r1".to_owned(), both)].into(),
+            ..Servers::default()
+        };
+        let expected = "a: 1 robot\n  map hall\nb (asked): 1 robot\n  map hall, not served to robots\n\
+                        contested: map hall is on a, b\non several servers: robot r1 is on a, b";
+        assert_eq!(servers_text(&servers), expected);
+    }
 
     #[test]
     fn a_status_names_maps_that_are_not_in_use_and_faults() {
@@ -135,11 +191,14 @@ mod tests {
             version: version("0.1.0"),
             api: version("v1"),
             protocol: version("1"),
+            server: version("hall"),
         };
         let readiness = Readiness {
             status: "degraded".into(),
             counts: ReadinessCounts { maps_not_in_use: 3, damaged_pictures: 1 },
             maps_not_in_use: [("office".to_owned(), "damaged".to_owned())].into(),
+            router: Some("no connection".into()),
+            maps_not_served: [("annex".to_owned(), "also on b".to_owned())].into(),
             damaged_pictures: vec!["view 3 of landmark door, map office".into()],
             backup: BackupHealth {
                 every_hours: 24,
@@ -161,6 +220,10 @@ mod tests {
             "{lines}"
         );
         assert!(lines.contains("map office is not in use: damaged"), "{lines}");
+        assert!(
+            lines.contains("router: no connection\n  map annex is not served to robots: also on b"),
+            "{lines}"
+        );
         assert!(
             lines.contains("newest backup 20261123-140530 (UTC)\n  the last backup failed: no space"),
             "{lines}"

@@ -173,9 +173,10 @@ impl Capture {
         self.frame
     }
 
-    /// The message with epoch and sequence number.
-    pub(crate) fn numbered(self, epoch: u64, seq: u64) -> Vec<u8> {
-        let frame = v1::Frame { epoch, seq, ..self.frame };
+    /// The message with epoch and sequence number; on `map` unless it names one.
+    pub(crate) fn numbered(self, epoch: u64, seq: u64, map: String) -> Vec<u8> {
+        let map = if self.frame.map.is_empty() { map } else { self.frame.map };
+        let frame = v1::Frame { epoch, seq, map, ..self.frame };
         let Some(quads) = self.quads else { return frame.encode_to_vec() };
         let message = v1::Quads {
             epoch,
@@ -296,7 +297,11 @@ mod tests {
         let inside = quad([[20.0, 10.0], [30.0, 10.0], [30.0, 20.0], [20.0, 20.0]], QuadKind::Full);
         let at_border = quad([[-3.0, 40.0], [7.0, 40.0], [7.0, 50.0], [-3.0, 50.0]], QuadKind::Full);
         let open = quad([[1.0, 1.0], [9.0, 1.0], [9.0, 9.0], [1.0, 9.0]], QuadKind::ThreeSided);
-        let message = Capture::quads(&image, &[open, inside, at_border]).with_deadline_ms(9).numbered(1, 2);
+        let message = Capture::quads(&image, &[open, inside, at_border]).with_deadline_ms(9).numbered(
+            1,
+            2,
+            String::new(),
+        );
         let message = v1::Quads::decode(message.as_slice()).unwrap();
         assert_eq!((message.epoch, message.seq, message.width_px, message.deadline_ms), (1, 2, 64, 9));
         let patches: Vec<_> = message.quads.iter().map(|found| found.patch.as_ref().unwrap()).collect();

@@ -96,6 +96,17 @@ pub enum ClientError {
         /// The server.
         endpoint: String,
     },
+    /// The server of the robot's map is gone: nobody answers until it is back.
+    #[error(
+        "server {server} is gone{}: is it running, and has it a connection to the router? \
+         `RobotClient::server_events` tells when it is back", if map.is_empty() { String::new() } else { format!(", which serves map {map}") }
+    )]
+    ServerGone {
+        /// The server.
+        server: String,
+        /// The map that messages name; empty for the robot's own.
+        map: String,
+    },
     /// A newer frame of the same camera replaced this one.
     #[error(
         "frame {seq} was superseded by a newer one of the same camera: send the next when the last is answered"

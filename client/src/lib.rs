@@ -12,6 +12,7 @@ pub mod listener;
 pub mod questions;
 pub mod robot;
 pub mod robot_file;
+pub mod servers;
 mod transport;
 
 pub use capture::Capture;
@@ -26,3 +27,4 @@ pub use protos::{
 pub use questions::{LocaliseQuery, MapVersions};
 pub use robot::{Delivery, RobotClient, RobotOptions};
 pub use robot_file::{ROBOT_FILE_VARIABLE, RobotFile, RobotTls};
+pub use servers::ServerEvent;

@@ -137,6 +137,7 @@ fn is_wanted(key: &Key, robots: &[Name]) -> bool {
         | Key::Alive(..)
         | Key::Gaze(_)
         | Key::Hello(_)
+        | Key::Server(..)
         | Key::MapVersion(_) => false,
     }
 }

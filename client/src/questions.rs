@@ -69,7 +69,8 @@ impl RobotClient {
             return Err(ClientError::Image("a localisation needs the whole image".to_owned()));
         }
         let deadline_ms = u32::try_from(wait.as_millis()).unwrap_or(u32::MAX).max(1);
-        let request = v1::LocaliseRequest { deadline_ms, ..query.request };
+        let map = if query.request.map.is_empty() { self.servers.map() } else { query.request.map };
+        let request = v1::LocaliseRequest { deadline_ms, map, ..query.request };
         let key = self.keys.build(&Key::Localise(self.robot.clone()));
         let asked = self.session.get(key).payload(request.encode_to_vec()).timeout(wait);
         let replies = asked.await.map_err(fault("ask for a localisation"))?;
@@ -90,6 +91,8 @@ impl RobotClient {
         wait: Duration,
     ) -> Result<v1::GazeAdvice, ClientError> {
         let key = self.keys.build(&Key::Gaze(self.robot.clone()));
+        let map = if request.map.is_empty() { self.servers.map() } else { request.map.clone() };
+        let request = v1::GazeRequest { map, ..request.clone() };
         let asked = self.session.get(key).payload(request.encode_to_vec()).timeout(wait);
         let replies = asked.await.map_err(fault("ask for gaze advice"))?;
         let reply = replies.recv_async().await.map_err(|e| fault("receive gaze advice")(e))?;

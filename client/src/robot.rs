@@ -1,7 +1,11 @@
 //! The robot's side. Out: frames, odometry, scans, a liveliness token. In: answers and fused poses. Frames are best
 //! effort and numbered; the server keeps the newest of each camera, so a robot that sends fast never queues.
 
-use crate::{Capture, ClientError, RobotTls, transport};
+use crate::{
+    Capture, ClientError, RobotTls,
+    servers::{ServerEvent, Servers},
+    transport,
+};
 use map::pose2::Pose2;
 use protos::{Key, Keys, Name, convert::geometry::pose2_wire, prost::Message, v1};
 use std::{
@@ -139,8 +143,9 @@ pub struct RobotClient {
     next_seq: AtomicU64,
     answers: broadcast::Sender<CameraAnswer>,
     poses: broadcast::Sender<v1::RobotPose>,
+    pub(crate) servers: Servers,
     // Held: dropping them ends subscription and token.
-    _subscribers: [Subscriber<()>; 2],
+    _subscribers: Vec<Subscriber<()>>,
     _alive: LivelinessToken,
 }
 
@@ -156,29 +161,35 @@ impl RobotClient {
         };
         let (answers, _) = broadcast::channel(INBOX);
         let (poses, _) = broadcast::channel(INBOX);
+        let servers = Servers::new();
         let to_answers = {
-            let (keys, answers) = (keys.clone(), answers.clone());
+            let (keys, answers, servers) = (keys.clone(), answers.clone(), servers.clone());
             move |sample: Sample| {
                 let Ok(Key::Answer(_, camera)) = keys.parse(sample.key_expr().as_str()) else { return };
                 let Ok(answer) = v1::Answer::decode(&*sample.payload().to_bytes()) else { return };
+                if !servers.takes_answer(&answer) {
+                    return;
+                }
                 // No receiver is not an error.
                 drop(answers.send(CameraAnswer { camera, answer }));
             }
         };
         let epoch = options.epoch.unwrap_or_else(new_epoch);
         let to_poses = {
-            let poses = poses.clone();
+            let (poses, servers) = (poses.clone(), servers.clone());
             move |sample: Sample| {
                 // A pose of another epoch belongs to another program under this robot's name.
                 if let Ok(pose) = v1::RobotPose::decode(&*sample.payload().to_bytes())
                     && pose.epoch == epoch
+                    && servers.takes_pose(&pose)
                 {
                     drop(poses.send(pose));
                 }
             }
         };
         let subscribe = fault("subscribe");
-        let subscribers = [
+        let mut subscribers = servers.watch(&session, &keys, &robot).await?;
+        subscribers.extend([
             session
                 .declare_subscriber(keys.answers_of(&robot))
                 .callback(to_answers)
@@ -189,7 +200,7 @@ impl RobotClient {
                 .callback(to_poses)
                 .await
                 .map_err(subscribe)?,
-        ];
+        ]);
         let alive = session.liveliness().declare_token(keys.build(&Key::Alive(robot.clone(), Some(epoch))));
         let alive = alive.await.map_err(fault("declare the liveliness token"))?;
         Ok(Self {
@@ -202,6 +213,7 @@ impl RobotClient {
             next_seq: AtomicU64::new(1),
             answers,
             poses,
+            servers,
             _subscribers: subscribers,
             _alive: alive,
         })
@@ -212,22 +224,40 @@ impl RobotClient {
         self.epoch
     }
 
+    /// From now on frames, odometry, scans and questions name this map, unless they name one themselves; `None`: none, and the
+    /// server where the robot is registered takes them. For a robot that drives into a building whose map another server on
+    /// the same router has: it is registered there, too, and goes on.
+    pub fn enter_map(&self, map: Option<&str>) -> Result<(), ClientError> {
+        self.servers.enter(map.map(|map| name("map", map)).transpose()?);
+        Ok(())
+    }
+
+    /// When the server of the robot's map goes and comes back, where several servers share a router. The map is that of
+    /// [`Self::enter_map`], or the robot's own.
+    pub fn server_events(&self) -> broadcast::Receiver<ServerEvent> {
+        self.servers.events()
+    }
+
     /// Sends a frame, or the quads of one, and returns its number, at once.
     pub async fn publish_frame(&self, camera: &str, capture: Capture) -> Result<u64, ClientError> {
         let seq = self.next_seq.fetch_add(1, Ordering::Relaxed);
         let (robot, camera) = (self.robot.clone(), name("camera", camera)?);
         let key = if capture.is_quads() { Key::Quads(robot, camera) } else { Key::Frame(robot, camera) };
-        self.put(&key, capture.numbered(self.epoch, seq), Priority::DataLow).await?;
+        self.put(&key, capture.numbered(self.epoch, seq, self.servers.map()), Priority::DataLow).await?;
         Ok(seq)
     }
 
     /// Sends a frame, or the quads of one, and waits for its answer. One at a time per camera, or the older is superseded.
+    /// [`ClientError::ServerGone`] as soon as it is known that the server of the robot's map is not there.
     pub async fn recognise(
         &self,
         camera: &str,
         capture: Capture,
         wait: Duration,
     ) -> Result<v1::Answer, ClientError> {
+        if let Some(gone) = self.servers.gone_error() {
+            return Err(gone);
+        }
         let mut answers = self.answers();
         let started = Instant::now();
         let seq = self.publish_frame(camera, capture).await?;
@@ -250,7 +280,12 @@ impl RobotClient {
                 }
             }
         };
-        tokio::time::timeout(wait, arrived).await.unwrap_or_else(|_| Err(none()))
+        tokio::select! {
+            // An answer that is there counts.
+            biased;
+            arrived = tokio::time::timeout(wait, arrived) => arrived.unwrap_or_else(|_| Err(none())),
+            gone = self.servers.gone() => Err(gone),
+        }
     }
 
     /// Every answer from now on, of all cameras. A reader more than [`INBOX`] behind misses the oldest.
@@ -281,6 +316,7 @@ impl RobotClient {
             seq,
             captured_ns,
             odom_from_robot: Some(pose2_wire(odom_from_robot)),
+            map: self.servers.map(),
         };
         self.put(&Key::Odometry(self.robot.clone()), message.encode_to_vec(), Priority::Data).await?;
         Ok(seq)
@@ -289,7 +325,8 @@ impl RobotClient {
     /// Sends a laser scan; its epoch and number are set here.
     pub async fn publish_scan(&self, scan: v1::Scan) -> Result<u64, ClientError> {
         let seq = self.next_seq.fetch_add(1, Ordering::Relaxed);
-        let message = v1::Scan { epoch: self.epoch, seq, ..scan };
+        let map = if scan.map.is_empty() { self.servers.map() } else { scan.map };
+        let message = v1::Scan { epoch: self.epoch, seq, map, ..scan };
         self.put(&Key::Scan(self.robot.clone()), message.encode_to_vec(), Priority::Data).await?;
         Ok(seq)
     }

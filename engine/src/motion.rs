@@ -350,6 +350,7 @@ impl MotionTracker {
             laser_corrections: fused.laser_corrections,
             age_ms,
             trust: trust.into(),
+            ..v1::RobotPose::default()
         })
     }
 

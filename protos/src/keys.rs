@@ -111,6 +111,21 @@ pub enum Key {
     MapChanged(Name),
     /// `map/{map}/version`: a query of anyone, `MapChanged` out with the present version.
     MapVersion(Name),
+    /// `server/{server}/...`: liveliness token of a server.
+    Server(Name, ServerToken),
+}
+
+/// What a server announces of itself by a liveliness token below `server/{server}/`.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum ServerToken {
+    /// `alive/{start}`: it lives; a random number of its start, in decimal digits.
+    Alive(u64),
+    /// `holds/{map}`: it has the map, and serves it unless another server does.
+    Holds(Name),
+    /// `serves/{map}`: it answers robots on the map.
+    Serves(Name),
+    /// `robot/{robot}`: the robot is registered with it.
+    Robot(Name),
 }
 
 /// Why a key expression is not one of the protocol.
@@ -125,7 +140,7 @@ pub enum KeyError {
     /// A chunk is not a name.
     #[error("{chunk}: {error}")]
     Name {
-        /// Which chunk: `robot`, `camera` or `map`.
+        /// Which chunk: `robot`, `camera`, `map` or `server`.
         chunk: &'static str,
         /// What is wrong with it.
         error: NameError,
@@ -161,6 +176,12 @@ impl Keys {
             Key::Localise(robot) => format!("{p}robot/{robot}/rpc/localise"),
             Key::MapChanged(map) => format!("{p}map/{map}/changed"),
             Key::MapVersion(map) => format!("{p}map/{map}/version"),
+            Key::Server(server, token) => match token {
+                ServerToken::Alive(start) => format!("{p}server/{server}/alive/{start}"),
+                ServerToken::Holds(map) => format!("{p}server/{server}/holds/{map}"),
+                ServerToken::Serves(map) => format!("{p}server/{server}/serves/{map}"),
+                ServerToken::Robot(robot) => format!("{p}server/{server}/robot/{robot}"),
+            },
         }
     }
 
@@ -229,6 +250,26 @@ impl Keys {
         format!("{}map/*/changed", self.prefix)
     }
 
+    /// Key expression of everything that servers announce.
+    pub fn all_server_tokens(&self) -> String {
+        format!("{}server/*/*/*", self.prefix)
+    }
+
+    /// Key expression of the servers that live.
+    pub fn all_servers(&self) -> String {
+        format!("{}server/*/alive/*", self.prefix)
+    }
+
+    /// Key expression of the maps that servers serve.
+    pub fn all_served_maps(&self) -> String {
+        format!("{}server/*/serves/*", self.prefix)
+    }
+
+    /// Key expression of the servers where a robot is registered.
+    pub fn servers_of(&self, robot: &Name) -> String {
+        format!("{}server/*/robot/{robot}", self.prefix)
+    }
+
     /// Key expression of the frames of one robot.
     pub fn frames_of(&self, robot: &Name) -> String {
         format!("{}robot/{robot}/frame/*", self.prefix)
@@ -280,6 +321,17 @@ impl Keys {
             }
             [Some("map"), Some(m), Some("changed"), None, _] => Ok(Key::MapChanged(named("map", m)?)),
             [Some("map"), Some(m), Some("version"), None, _] => Ok(Key::MapVersion(named("map", m)?)),
+            [Some("server"), Some(s), Some(kind), Some(of), None] => {
+                let server = named("server", s)?;
+                let token = match kind {
+                    "alive" => ServerToken::Alive(epoch(of)?),
+                    "holds" => ServerToken::Holds(named("map", of)?),
+                    "serves" => ServerToken::Serves(named("map", of)?),
+                    "robot" => ServerToken::Robot(robot(of)?),
+                    _ => return Err(KeyError::Shape),
+                };
+                Ok(Key::Server(server, token))
+            }
             _ => Err(KeyError::Shape),
         }
     }
@@ -368,13 +420,17 @@ mod tests {
                 Key::Gaze(a.clone()),
                 Key::Hello(a.clone()),
                 Key::Localise(a.clone()),
+                Key::Server(a.clone(), ServerToken::Alive(epoch)),
+                Key::Server(a.clone(), ServerToken::Holds(b.clone())),
+                Key::Server(a.clone(), ServerToken::Serves(b.clone())),
+                Key::Server(a.clone(), ServerToken::Robot(b.clone())),
             ] {
                 prop_assert_eq!(keys.parse(&keys.build(&key)), Ok(key));
             }
         }
 
         #[test]
-        fn what_parses_was_built(text in "waymark/1/site-1/(robot|map)/[a-zA-Z*/]{0,20}(/frame/|/scan|/changed|/version|/)[a-z*]{0,3}") {
+        fn what_parses_was_built(text in "waymark/1/site-1/(robot|map|server)/[a-zA-Z*/]{0,20}(/frame/|/scan|/changed|/version|/serves/|/)[a-z*]{0,3}") {
             if let Ok(key) = keys().parse(&text) {
                 prop_assert_eq!(keys().build(&key), text);
             }

@@ -11,6 +11,7 @@ pub mod rejection;
 pub mod convert;
 pub mod json;
 pub mod named;
+pub mod named_map;
 
 // Written by prost-build from waymark/v1/waymark.proto; `tests/generated.rs` keeps the two in step.
 #[rustfmt::skip]
@@ -26,6 +27,6 @@ pub mod v1 {
 pub const FILE_DESCRIPTOR_SET: &[u8] = include_bytes!("descriptors.binpb");
 
 pub use convert::CheckedFrame;
-pub use keys::{Key, Keys, Name, NameError};
+pub use keys::{Key, Keys, Name, NameError, ServerToken};
 pub use prost;
 pub use rejection::{Code, Rejection};

@@ -28,6 +28,12 @@ pub enum Code {
     UnknownRobot,
     /// There is no such map.
     UnknownMap,
+    /// Several servers have the robot registered, and its message names no map.
+    RobotContested,
+    /// Several servers claim the map: it is served by none of those that say so.
+    MapContested,
+    /// The server of the robot, or of the map, is not there any more.
+    ServerGone,
     /// Not newer than the last message of this robot and camera.
     NotNewer,
     /// Another start of the robot's software (epoch) is live.
@@ -50,7 +56,7 @@ pub enum Code {
 
 impl Code {
     /// All codes.
-    pub const ALL: [Code; 20] = [
+    pub const ALL: [Code; 23] = [
         Code::BadMessage,
         Code::BadName,
         Code::Missing,
@@ -62,6 +68,9 @@ impl Code {
         Code::BadImage,
         Code::UnknownRobot,
         Code::UnknownMap,
+        Code::RobotContested,
+        Code::MapContested,
+        Code::ServerGone,
         Code::NotNewer,
         Code::EpochConflict,
         Code::ClockAhead,
@@ -87,6 +96,9 @@ impl Code {
             Code::BadImage => "bad_image",
             Code::UnknownRobot => "unknown_robot",
             Code::UnknownMap => "unknown_map",
+            Code::RobotContested => "robot_contested",
+            Code::MapContested => "map_contested",
+            Code::ServerGone => "server_gone",
             Code::NotNewer => "not_newer",
             Code::EpochConflict => "epoch_conflict",
             Code::ClockAhead => "clock_ahead",

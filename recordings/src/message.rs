@@ -39,7 +39,8 @@ impl Body {
             | Key::Gaze(_)
             | Key::Hello(_)
             | Key::Localise(_)
-            | Key::MapVersion(_) => return Ok(None),
+            | Key::MapVersion(_)
+            | Key::Server(..) => return Ok(None),
         }))
     }
 

@@ -6,19 +6,23 @@
 
 mod addresses;
 mod backup;
+mod error;
 mod limits;
 mod memory;
 mod ros2;
+mod router;
 mod tls;
 
 pub use backup::BackupSettings;
 pub(crate) use backup::MAX_KEPT;
+pub use error::ConfigError;
 pub use limits::Limits;
 pub use memory::MemoryShare;
 pub use ros2::{
     MAX_DOMAIN, MAX_KEY_PREFIX_BYTES, MAX_ROS2_ROBOTS, MAX_TRANSFORM_TOLERANCE_S, Middleware, PoseSource,
     RawRos2, RawRos2Camera, RawRos2Robot, Ros2Outputs, Ros2Robot,
 };
+pub use router::{JoinedRouter, MAX_ROUTER_ENDPOINTS, RawRouter, RouterCredentials};
 pub use tls::{MAX_TLS_NAMES, OwnCertificate, RawTls, Tls};
 
 use addresses::{is_loopback, socket_address, zenoh_address, zenoh_endpoint};
@@ -41,33 +45,6 @@ const NOT_SETTINGS: [&str; 7] = ["config", "server", "map", "log", "log_format",
 /// Most vision threads that can be asked for.
 pub const MAX_WORKERS: usize = 256;
 
-/// Why the settings cannot be used. The text names the setting.
-#[derive(Debug, thiserror::Error)]
-pub enum ConfigError {
-    /// The file, a variable or their types are wrong.
-    #[error("the settings cannot be read: {0}")]
-    Read(#[source] Box<figment::Error>),
-    /// A setting has a value that cannot be.
-    #[error("setting `{field}`: {reason}")]
-    Invalid {
-        /// Name of the setting.
-        field: Cow<'static, str>,
-        /// What is wrong with it.
-        reason: String,
-    },
-    /// A listener would be reachable from other machines without encryption.
-    #[error(
-        "setting `{field}` = {value} is reachable from other machines in plain text; use encryption (docs/guides/deploy.md) \
-         or a loopback address, or give --insecure if the network itself is trusted"
-    )]
-    NotLoopback {
-        /// Name of the setting.
-        field: &'static str,
-        /// Its value.
-        value: String,
-    },
-}
-
 /// Settings of file, environment and command line, unchecked.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -83,6 +60,8 @@ pub struct RawConfig {
     pub metrics: String,
     /// Name in every key: `waymark/1/{fleet}/...`.
     pub fleet: String,
+    /// Name of the server among those of a router. Empty: one is made once and stays in the data directory.
+    pub server_name: String,
     /// Vision threads; 0 takes one per core.
     pub workers: usize,
     /// Searches every frame for all landmarks of its map. Otherwise, while a robot's pose is supported and the landmarks that
@@ -93,6 +72,8 @@ pub struct RawConfig {
     pub insecure: bool,
     /// Encryption, of HTTP and of robots' connections.
     pub tls: RawTls,
+    /// A router that the server joins instead of being one.
+    pub router: RawRouter,
     /// Backups.
     pub backup: BackupSettings,
     /// Robots of ROS 2.
@@ -111,10 +92,12 @@ impl Default for RawConfig {
             zenoh: String::new(),
             metrics: String::new(),
             fleet: "default".into(),
+            server_name: String::new(),
             workers: 0,
             search_every_frame: true,
             insecure: false,
             tls: RawTls::default(),
+            router: RawRouter::default(),
             backup: BackupSettings::default(),
             ros2: RawRos2::default(),
             limits: Limits::default(),
@@ -149,8 +132,12 @@ pub struct Config {
     pub zenoh_endpoint: String,
     /// Where metrics are served without a token; `None`: nowhere.
     pub metrics_addr: Option<SocketAddr>,
+    /// The router that is joined; then the server opens no listener for robots.
+    pub router: Option<JoinedRouter>,
     /// Name in every key.
     pub fleet: Name,
+    /// The server's name; `None`: that of the data directory.
+    pub server_name: Option<Name>,
     /// Vision threads, at least 1.
     pub workers: usize,
     /// Whether every frame is searched for all landmarks of its map.
@@ -183,12 +170,16 @@ impl Config {
     /// The listeners that other machines can reach, by setting, with their addresses: they are not encrypted.
     pub fn plain_text_beyond_loopback(&self) -> Vec<(&'static str, String)> {
         let is_plain = |(is_tls, address): &(bool, SocketAddr)| !is_tls && !is_loopback(address.ip());
-        let zenoh = zenoh_address("zenoh", &self.zenoh_endpoint).ok().filter(is_plain);
+        let own = self.router.is_none().then(|| zenoh_address("zenoh", &self.zenoh_endpoint).ok());
+        let zenoh = own.flatten().filter(is_plain);
+        let joined = self.router.iter().flat_map(JoinedRouter::plain_beyond_loopback);
+        let joined = joined.map(|endpoint| ("router.connect", endpoint.clone()));
         let is_http_plain = self.tls.is_none() && !is_loopback(self.http_addr.ip());
         let http = is_http_plain.then(|| ("http", self.http_addr.to_string()));
         let metrics = self.metrics_addr.filter(|address| !is_loopback(address.ip()));
         let metrics = metrics.map(|address| ("metrics", address.to_string()));
-        http.into_iter().chain(zenoh.map(|_| ("zenoh", self.zenoh_endpoint.clone()))).chain(metrics).collect()
+        let zenoh = zenoh.map(|_| ("zenoh", self.zenoh_endpoint.clone()));
+        http.into_iter().chain(zenoh).chain(metrics).chain(joined).collect()
     }
 }
 
@@ -202,6 +193,10 @@ impl TryFrom<RawConfig> for Config {
             address => Some(socket_address("metrics", address)?),
         };
         let tls = tls::checked(raw.tls)?;
+        let router = router::checked(raw.router, raw.insecure)?;
+        if router.is_some() {
+            router::listens_for_no_robots(&raw.zenoh, tls.as_ref(), &raw.ros2)?;
+        }
         let zenoh_endpoint = zenoh_endpoint(raw.zenoh, tls.is_some());
         let (zenoh_is_tls, zenoh_addr) = zenoh_address("zenoh", &zenoh_endpoint)?;
         if zenoh_is_tls && tls.is_none() {
@@ -222,6 +217,8 @@ impl TryFrom<RawConfig> for Config {
             }
         }
         let fleet = Name::new(raw.fleet).map_err(|e| invalid("fleet", e.to_string()))?;
+        let server_name = Some(raw.server_name).filter(|name| !name.is_empty()).map(Name::new).transpose();
+        let server_name = server_name.map_err(|e| invalid("server_name", e.to_string()))?;
         if raw.workers > MAX_WORKERS {
             return Err(invalid("workers", format!("{} is more than {MAX_WORKERS}", raw.workers)));
         }
@@ -261,7 +258,9 @@ impl TryFrom<RawConfig> for Config {
             http_addr,
             zenoh_endpoint,
             metrics_addr,
+            router,
             fleet,
+            server_name,
             workers: if raw.workers == 0 { cores } else { raw.workers },
             search_every_frame: raw.search_every_frame,
             tls,

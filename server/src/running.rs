@@ -15,6 +15,7 @@ use engine::{
     vitals::{Failure, Vitals},
     workers::Workers,
 };
+use protos::Name;
 use std::{
     net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr},
     path::Path,
@@ -32,6 +33,8 @@ pub struct RunningServer {
     pub metrics_addr: Option<SocketAddr>,
     /// Where robots connect, with the real port.
     pub zenoh_endpoint: String,
+    /// The server's name among those of a router.
+    pub server: Name,
     /// Maps and robots as the workers see them.
     pub snapshots: Arc<Snapshots>,
     /// What robots are doing now.

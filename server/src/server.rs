@@ -3,8 +3,9 @@
 use crate::{
     backup::Backups,
     bus::{Bus, BusError, Receivers},
-    config::{Config, Tls},
+    config::{Config, JoinedRouter, Tls},
     events::{EventLog, watch_changes::watch_changes},
+    fleet::{Fleet, server_name},
     gather::{self, Gatherer, GatheringTap, OfferedFrame},
     http::{App, Enrolment, Services},
     identity::{
@@ -59,6 +60,9 @@ pub enum StartError {
     /// There is no certificate.
     #[error("no certificate for encryption: {0}")]
     Certificates(String),
+    /// The server has no name.
+    #[error("{0}")]
+    Name(String),
     /// There is no token for this machine.
     #[error("{0}")]
     LocalToken(String),
@@ -114,10 +118,18 @@ impl Server {
         let disk = watch_disk(&store, &local_token, &engine, &stopping);
         let pictures = tokio::spawn(pictures::check_all((*store).clone(), stopping.clone()));
         let (live, slots) = (engine.live.clone(), engine.slots.clone());
-        let to = receivers(&config, &engine, certificates.as_ref().map(|_| store.certificates().clone()));
+        // Whoever owns the router decides who is a robot.
+        let of_robots = certificates.as_ref().filter(|_| config.router.is_none());
+        let registry = of_robots.map(|_| store.certificates().clone());
+        let to = receivers(&config, &engine, registry)?;
+        let (server, fleet) = (to.server.clone(), to.fleet.clone());
         let mut bus = Bus::open(&config, to.clone(), certificates.clone()).await?;
         let outbox = bus.outbox().clone();
-        let ros2 = Arc::new(Ros2::open(bus.session(), &config.ros2, (&to, &outbox)).await?);
+        let ros2 = match bus.session() {
+            Some(session) => Ros2::open(session, &config.ros2, (&to, &outbox)).await?,
+            None => Ros2::default(),
+        };
+        let ros2 = Arc::new(ros2);
         let publisher = Arc::new(ros2.publisher(outbox.clone()));
         vitals.probe("the outbox", move || outbox.is_running());
         let workers = Workers::start(&engine, config.workers, &publisher).map_err(StartError::Threads)?;
@@ -129,8 +141,10 @@ impl Server {
             publisher: Some(publisher.clone()),
             sessions: sessions.clone(),
             backups,
-            enrolment: enrolment(certificates.as_ref(), bus.endpoint()),
+            enrolment: enrolment(of_robots, bus.endpoint()),
             local_token_file: Some(local_token.path().to_owned()),
+            server: server.clone(),
+            fleet,
         };
         let probed = ((*store).clone(), publisher.outbox().clone(), bus.take_pinger());
         let app = Arc::new(App::new(config.clone(), store, services, &engine, stopping.clone()));
@@ -153,6 +167,7 @@ impl Server {
             http_addr,
             metrics_addr,
             zenoh_endpoint,
+            server,
             snapshots,
             live,
             slots,
@@ -333,7 +348,17 @@ async fn store_findings(store: Catalogue, mut found: Receiver<LandmarkFinding>, 
     drop(pulse);
 }
 
-fn receivers(config: &Config, engine: &Engine, certificates: Option<Arc<CertificateRegistry>>) -> Receivers {
+fn receivers(
+    config: &Config,
+    engine: &Engine,
+    certificates: Option<Arc<CertificateRegistry>>,
+) -> Result<Receivers, StartError> {
+    let server = server_name(config.server_name.as_ref(), &config.data).map_err(StartError::Name)?;
+    let start = random_start().map_err(StartError::Name)?;
+    let joined = |router: &JoinedRouter| {
+        Arc::new(Fleet::new(server.clone(), start, router.connect.clone(), engine.snapshots.clone()))
+    };
+    let fleet = config.router.as_ref().map(joined);
     let intake = Intake {
         slots: engine.slots.clone(),
         snapshots: engine.snapshots.clone(),
@@ -342,12 +367,21 @@ fn receivers(config: &Config, engine: &Engine, certificates: Option<Arc<Certific
         deadline: Duration::from_millis(u64::from(config.limits.frame_deadline_ms)),
         linked_maps_only: certificates.is_some(),
     };
-    Receivers {
+    Ok(Receivers {
         intake: Arc::new(intake),
         motion: engine.motion.clone(),
         live: engine.live.clone(),
         gazes: Arc::default(),
         vitals: engine.vitals.clone(),
         certificates,
-    }
+        server,
+        fleet,
+    })
+}
+
+/// A number that no other start has.
+fn random_start() -> Result<u64, String> {
+    let mut random = [0; 8];
+    getrandom::fill(&mut random).map_err(|e| format!("the system gives no random bytes: {e}"))?;
+    Ok(u64::from_be_bytes(random))
 }

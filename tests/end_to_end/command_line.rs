@@ -60,6 +60,7 @@ const OPTIONS: [(&str, &[&str], &[&str]); 58] = [
     ("completions", &[], &["<SHELL>", "bash", "fish"]),
     ("man", &[], &["<FOLDER>"]),
     ("server status", SERVER, &[]),
+    ("server list", SERVER, &[]),
     ("token create", SERVER, &["<NAME>", "--role", "--for-map", "--valid"]),
     ("token list", SERVER, &[]),
     ("token revoke", SERVER, &["<NUMBER>", "--yes"]),
@@ -147,6 +148,7 @@ const OPTIONS: [(&str, &[&str], &[&str]); 58] = [
     ("robot add", SERVER, &["<ROBOT>", "--map"]),
     ("robot list", SERVER, &[]),
     ("robot show", SERVER, &["<ROBOT>"]),
+    ("robot access-control", SERVER, &["--server-certificate", "--robot", "--also-map", "--fleet"]),
     ("robot remove", SERVER, &["<ROBOT>", "--yes"]),
     (
         "camera calibrate",

@@ -95,6 +95,11 @@ fn the_commands_of_move_a_map_work() {
 }
 
 #[test]
+fn the_commands_of_several_servers_work() {
+    run("several-servers");
+}
+
+#[test]
 fn the_commands_of_take_a_change_back_work() {
     run("history");
 }

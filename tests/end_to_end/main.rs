@@ -46,6 +46,8 @@ mod restart;
 mod robot_activity;
 mod ros2_robots;
 mod several_maps;
+mod several_servers;
+mod several_servers_tls;
 mod slow_http;
 mod stored_answers;
 mod style;

@@ -135,7 +135,8 @@ async fn failures_have_the_statuses_and_the_json_of_all_commands() {
     let mut writer =
         DriveWriter::create(file, &Name::new("default").expect("a name"), "test").expect("begun");
     let odom_from_robot = Some(pose2_wire(&Pose2::default()));
-    let odometry = v1::Odometry { epoch: 1, seq: 1, captured_ns: START_NS, odom_from_robot };
+    let odometry =
+        v1::Odometry { epoch: 1, seq: 1, captured_ns: START_NS, odom_from_robot, ..v1::Odometry::default() };
     let (key, body) = (Key::Odometry(robot), Body::Odometry(odometry));
     writer.write(Recorded { log_time_ns: START_NS.unsigned_abs(), key, body }).expect("written");
     writer.finish().expect("finished");

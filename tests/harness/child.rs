@@ -42,6 +42,22 @@ impl Child {
         command
     }
 
+    /// Starts the program as a server that joins the router at `router`, with these settings.
+    pub fn joined(data: &Path, (router, name): (&str, &str), settings: &[(&str, &str)]) -> Self {
+        Self::start_from(&mut Self::joins(data, (router, name), settings))
+    }
+
+    /// The command of that.
+    pub fn joins(data: &Path, (router, name): (&str, &str), settings: &[(&str, &str)]) -> Command {
+        let mut command = Command::new(program());
+        command
+            .envs(settings.iter().copied())
+            .env("WAYMARK_LOG", "warn")
+            .args(["serve", "--http", "127.0.0.1:0", "--router", router, "--server-name", name, "--data"])
+            .arg(data);
+        command
+    }
+
     /// Starts that command and waits until it says that it is ready.
     pub fn start_from(command: &mut Command) -> Self {
         let mut process = command.stdout(Stdio::piped()).spawn().expect("the program starts");

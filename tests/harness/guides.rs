@@ -204,11 +204,21 @@ impl Guide {
         );
     }
 
+    /// Whether the server opens no listener for robots, by its options or its file of settings.
+    fn joins_a_router(&self, command: &str) -> bool {
+        let file = command.split_once("--config ").and_then(|(_, rest)| rest.split_whitespace().next());
+        let settings = file.and_then(|file| fs::read_to_string(self.folder.join(file)).ok());
+        command.contains("--router ") || settings.is_some_and(|settings| settings.contains("[router]"))
+    }
+
     fn serve(&mut self, command: &str, at: &str) {
         // The old one ends first: it may hold the data directory.
         self.server = None;
         let mut shell = self.shell(&format!("exec {command}"));
         shell.env("WAYMARK_HTTP", "127.0.0.1:0").env("WAYMARK_ZENOH", "tcp/127.0.0.1:0");
+        if self.joins_a_router(command) {
+            shell.env_remove("WAYMARK_ZENOH");
+        }
         shell.stdout(Stdio::piped());
         let mut process = shell.spawn().expect("bash");
         let stdout = process.stdout.take().expect("its output");

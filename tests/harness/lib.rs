@@ -13,6 +13,7 @@ mod open_data;
 pub mod pictures;
 pub mod robots;
 pub mod ros;
+pub mod router;
 pub mod scenes;
 
 pub use child::Child;

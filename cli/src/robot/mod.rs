@@ -1,5 +1,6 @@
 //! `waymark robot`: which robots may send frames, on which map each drives, how each is.
 
+mod access_control;
 mod certificates;
 mod enrol;
 
@@ -52,6 +53,12 @@ enum Verb {
     },
     /// Revoke certificates of a robot: its messages are refused at once, and its connection is closed.
     Revoke(certificates::RevokeArgs),
+    /// Print who may do what on a zenoh router of your own that servers join, for the settings of zenohd
+    ///
+    /// Robots are those of the server, known by certificates with their names. For example:
+    ///   waymark robot access-control --server-certificate hall-server > access.json5
+    #[command(verbatim_doc_comment)]
+    AccessControl(access_control::Args),
     /// Remove a robot; its frames are refused from now on.
     Remove {
         /// The robot.
@@ -99,6 +106,7 @@ async fn on_server(session: &Session, verb: &Verb, server: &str) -> anyhow::Resu
         Verb::Enrol(args) => enrol::run(session, args, server).await,
         Verb::Certificates { robot } => certificates::list(session, robot).await,
         Verb::Revoke(args) => certificates::revoke(session, args).await,
+        Verb::AccessControl(args) => access_control::run(session, args).await,
         Verb::Remove { robot, consent } => {
             maps.robot(robot).await?;
             consent.ask(&format!("Remove the robot {robot}? Its frames are refused from then on."))?;

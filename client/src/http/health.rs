@@ -5,13 +5,14 @@ use super::{
     operation::operations,
 };
 use crate::ClientError;
-use protos::api::{Health, Readiness, Version};
+use protos::api::{Health, Readiness, Servers, Version};
 
 operations! {
     HEALTH: GET "/healthz" => health,
     READINESS: GET "/readyz" => readiness,
     VERSION: GET "/version" => version,
     METRICS: GET "/metrics" => metrics,
+    SERVERS: GET "/servers" => servers,
 }
 
 impl MapClient {
@@ -29,6 +30,11 @@ impl MapClient {
     pub async fn metrics(&self) -> Result<String, ClientError> {
         let text = whole(self.checked(self.ask(&METRICS, &[])?).await?).await?;
         Ok(String::from_utf8_lossy(&text).into_owned())
+    }
+
+    /// The servers that share a router, with their maps, and what more than one of them has.
+    pub async fn servers(&self) -> Result<Servers, ClientError> {
+        self.send(self.ask(&SERVERS, &[])?).await
     }
 
     /// Version of the server.

@@ -96,6 +96,7 @@ impl Journal {
             bearing_step_rad: scan.bearing_step_rad(),
             max_range_m: scan.max_range_m(),
             ranges_m: scan.ranges_m().to_vec(),
+            ..v1::Scan::default()
         };
         self.put(&wire.encode_to_vec())?;
         self.unsynced += 1;

@@ -57,6 +57,10 @@ pub(super) fn scan(
 ) -> Result<(String, CheckedScan), Rejection> {
     let (map, message) = sized(snapshots, robot, message, MAX_SCAN_BYTES)?;
     let wire = v1::Scan::decode(message).map_err(|e| undecodable("Scan", &e))?;
+    if !wire.map.is_empty() && wire.map != map {
+        let detail = format!("the robot is registered on {map}: its scans are matched with the walls there");
+        return Err(Rejection::new(Code::UnknownMap, "map", detail));
+    }
     Ok((map, CheckedScan::try_from(wire)?))
 }
 

@@ -51,9 +51,15 @@ fn motion() -> (MotionTracker, Name) {
 
 fn odometry(seq: u64, x_m: f64) -> Bytes {
     let odom_from_robot = Some(v1::Pose2 { x_m, ..v1::Pose2::default() });
-    v1::Odometry { epoch: 1, seq, captured_ns: seq as i64 * 1_000_000_000, odom_from_robot }
-        .encode_to_vec()
-        .into()
+    v1::Odometry {
+        epoch: 1,
+        seq,
+        captured_ns: seq as i64 * 1_000_000_000,
+        odom_from_robot,
+        ..v1::Odometry::default()
+    }
+    .encode_to_vec()
+    .into()
 }
 
 fn fix(x_m: f64) -> Fix {
@@ -248,6 +254,7 @@ fn scan_at(building: &Building, seq: u64, at: &Pose2) -> Bytes {
         bearing_step_rad: scan.bearing_step_rad(),
         max_range_m: scan.max_range_m(),
         ranges_m: scan.ranges_m().to_vec(),
+        ..v1::Scan::default()
     }
     .encode_to_vec()
     .into()
@@ -344,6 +351,7 @@ fn a_forged_message_leaves_the_robot_alone() {
         seq: 1,
         captured_ns: 1_500_000_000,
         odom_from_robot: Some(v1::Pose2::default()),
+        ..v1::Odometry::default()
     };
     assert!(motion.odometry(&r1, forged.encode_to_vec().into(), time(1.5)).is_none());
     let pose = motion.odometry_of(&r1, odometry(2, 4.0)).unwrap();

@@ -16,8 +16,8 @@ pub struct Health {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct Readiness {
-    /// `ready`, or `degraded`: everything runs, but one of `counts` is not 0, the disk has no room, or the last scheduled
-    /// backup failed.
+    /// `ready`, or `degraded`: everything runs, but one of `counts` is not 0, the disk has no room, the server has no part in
+    /// its router, another server has one of its maps, or the last scheduled backup failed.
     pub status: String,
     /// How many there are of what is wrong, for whoever asks.
     #[serde(default)]
@@ -29,6 +29,14 @@ pub struct Readiness {
     /// without one. The picture is not used; the same photograph, uploaded again, mends it.
     #[serde(default)]
     pub damaged_pictures: Vec<String>,
+    /// Why the server has no part in the router that it is to join: no connection, or a name that another server has. Told
+    /// to whoever sees all maps.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub router: Option<String>,
+    /// Maps that another server has, too, with the reason: robots are refused on them here. Only maps of the token that
+    /// asks.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub maps_not_served: BTreeMap<String, String>,
     /// The newest backup, and why the last attempt failed. A token for all maps is told the name and the reason.
     #[serde(default)]
     pub backup: BackupHealth,
@@ -85,4 +93,7 @@ pub struct Version {
     pub api: String,
     /// Of the protocol over zenoh.
     pub protocol: String,
+    /// Name of this server among those of a router.
+    #[serde(default)]
+    pub server: String,
 }

@@ -74,7 +74,6 @@ pub fn localise_reply(result: LocaliseResult) -> v1::LocaliseReply {
         matched: h.matched,
     };
     v1::LocaliseReply {
-        rejection: None,
         map: result.map,
         map_version: result.map_version,
         status: status.into(),
@@ -82,6 +81,7 @@ pub fn localise_reply(result: LocaliseResult) -> v1::LocaliseReply {
         map_from_robot: result.map_from_robot,
         hypotheses: result.hypotheses.into_iter().map(hypothesis).collect(),
         answer: result.answer,
+        ..v1::LocaliseReply::default()
     }
 }
 

@@ -30,7 +30,13 @@ pub(crate) fn messages(image_bytes: usize) -> Vec<Recorded> {
         let fix = v1::Pose2Covariance { pose: Some(pose), covariance: covariance() };
         let frame = frame(i, captured_ns, pose, image_bytes);
         let answer = answer(&frame, fix.clone());
-        let odometry = v1::Odometry { epoch: 7, seq: 3 * i, captured_ns, odom_from_robot: Some(pose) };
+        let odometry = v1::Odometry {
+            epoch: 7,
+            seq: 3 * i,
+            captured_ns,
+            odom_from_robot: Some(pose),
+            ..v1::Odometry::default()
+        };
         let fused = v1::RobotPose {
             epoch: 7,
             captured_ns,
@@ -49,7 +55,7 @@ pub(crate) fn messages(image_bytes: usize) -> Vec<Recorded> {
             all.push(Recorded { log_time_ns: START_NS + i * STEP_NS + k, key, body });
         }
     }
-    let changed = v1::MapChanged { map: "office".into(), version: 5 };
+    let changed = v1::MapChanged { map: "office".into(), version: 5, ..v1::MapChanged::default() };
     let log_time_ns = START_NS + 15 * STEP_NS;
     all.push(Recorded { log_time_ns, key: Key::MapChanged(name("office")), body: Body::MapChanged(changed) });
     all
@@ -89,6 +95,7 @@ fn scan(seq: u64, captured_ns: i64, odometry: v1::Pose2) -> v1::Scan {
         bearing_step_rad: 0.5,
         max_range_m: 30.0,
         ranges_m: vec![1.0, 2.5, 30.0, 4.0, 1.5],
+        ..v1::Scan::default()
     }
 }
 

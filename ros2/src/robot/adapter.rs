@@ -215,6 +215,7 @@ impl RobotAdapter {
             seq: self.odometry_seq,
             captured_ns: at_ns,
             odom_from_robot: Some(planar_wire(&PlanarPose::of(&odom_from_base))),
+            ..v1::Odometry::default()
         }));
         if let Some(scan) = self.waiting_scan.take() {
             let released = self.release_scan(scan, taken);

@@ -76,16 +76,16 @@ impl Policy {
         Self { robots }
     }
 
-    /// As zenoh's settings want it. `server`: the name in the certificate of the server's other router.
-    pub(super) fn access_control(&self, keys: &Keys, server: &str) -> Value {
+    /// As zenoh's settings want it. `servers`: the names in the certificates of servers, or of the server's other router.
+    pub(super) fn access_control(&self, keys: &Keys, servers: &[String]) -> Value {
         let mut rules = vec![rule(SERVER, &ALL_KEYS, &ALL_MESSAGES, &["ingress", "egress"])];
-        let mut subjects = vec![json!({ "id": SERVER, "cert_common_names": [server] })];
+        let mut subjects = vec![json!({ "id": SERVER, "cert_common_names": servers })];
         let mut policies = vec![json!({ "rules": [SERVER], "subjects": [SERVER] })];
         rules.extend(shared(keys));
         for (robot, grant) in &self.robots {
             let own = of_robot(keys, robot, grant);
             let mut ids: Vec<Value> = own.iter().map(|rule| rule["id"].clone()).collect();
-            ids.extend(["inputs", "questions", "maps"].map(Value::from));
+            ids.extend(["inputs", "questions", "maps", "watch servers", "servers"].map(Value::from));
             rules.extend(own);
             // Names of robots are not subjects of their own: one may be called as the server's.
             let subject = format!("robot {robot}");
@@ -102,6 +102,23 @@ impl Policy {
     }
 }
 
+/// The same for a router of the operator that servers join: each robot is known by the common names of its certificates, and
+/// hears changes of `maps`.
+pub fn access_control_for_router(
+    fleet: &Name,
+    robots: &BTreeMap<Name, BTreeSet<String>>,
+    maps: &BTreeSet<String>,
+    servers: &[String],
+) -> Value {
+    let grant = |common_names: &BTreeSet<String>| Grant {
+        common_names: common_names.clone(),
+        maps: maps.clone(),
+        ros2_prefix: None,
+    };
+    let robots = robots.iter().map(|(robot, names)| (robot.clone(), grant(names))).collect();
+    Policy { robots }.access_control(&Keys::new(fleet), servers)
+}
+
 /// The map itself, and every map that lies in the same coordinates.
 fn linked_with(snapshots: &Snapshots, map: &str) -> BTreeSet<String> {
     let others = snapshots.all().into_iter().filter(|other| !other.is_draft).map(|other| other.name.clone());
@@ -116,15 +133,19 @@ fn rule(id: &str, keys: &[impl AsRef<str>], messages: &[&str], flows: &[&str]) -
     json!({ "id": id, "permission": "allow", "flows": flows, "messages": messages, "key_exprs": keys })
 }
 
-/// What each robot may: learn that the server listens, and ask for changes of maps, of which only its own arrive.
-fn shared(keys: &Keys) -> [Value; 3] {
+/// What each robot may: learn that the server listens, ask for changes of maps, of which only its own arrive, and know which
+/// servers live.
+fn shared(keys: &Keys) -> [Value; 5] {
     let inputs = [keys.all_frames(), keys.all_quads(), keys.all_odometry(), keys.all_scans()];
     let questions = [keys.all_gaze(), keys.all_hellos(), keys.all_localisations(), keys.all_map_versions()];
     let maps = [keys.all_map_changes(), keys.all_map_versions()];
+    let servers = [keys.all_server_tokens()];
     [
         rule("inputs", &inputs, &["declare_subscriber"], &["egress"]),
         rule("questions", &questions, &["declare_queryable"], &["egress"]),
         rule("maps", &maps, &["declare_subscriber", "query"], &["ingress"]),
+        rule("watch servers", &servers, &["declare_liveliness_subscriber", "liveliness_query"], &["ingress"]),
+        rule("servers", &servers, &["liveliness_token"], &["egress"]),
     ]
 }
 
@@ -155,4 +176,28 @@ fn of_robot(keys: &Keys, robot: &Name, grant: &Grant) -> Vec<Value> {
         rules.push(rule(&id("speaks ROS"), &inside, &ALL_MESSAGES, &["ingress", "egress"]));
     }
     rules
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_router_of_the_operator_gives_each_robot_its_own_keys() {
+        let name = |text: &str| Name::new(text).unwrap();
+        let robots = BTreeMap::from([(name("r1"), BTreeSet::from(["r1".to_owned()]))]);
+        let maps = BTreeSet::from(["hall".to_owned()]);
+        let servers = ["a".to_owned(), "b".to_owned()];
+        let block = access_control_for_router(&name("site"), &robots, &maps, &servers);
+        assert_eq!(block["default_permission"], "deny");
+        assert_eq!(block["subjects"][0]["cert_common_names"], json!(["a", "b"]));
+        assert_eq!(block["subjects"][1]["cert_common_names"], json!(["r1"]));
+        let rules = block["rules"].as_array().unwrap();
+        let of = |id: &str| rules.iter().find(|rule| rule["id"] == id).unwrap();
+        assert_eq!(of("servers")["messages"], json!(["liveliness_token"]));
+        assert_eq!(of("r1 reads maps")["key_exprs"], json!(["waymark/1/site/map/hall/changed"]));
+        // zenoh understands it.
+        let config = json!({ "mode": "router", "access_control": block });
+        zenoh::Config::from_json5(&config.to_string()).unwrap();
+    }
 }

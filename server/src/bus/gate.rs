@@ -78,7 +78,7 @@ impl GateSettings {
                 listener: (&shown.chain_pem, &shown.key_pem),
                 client: Some((certificate, key)),
             }),
-            access: Some(policy.access_control(&self.keys, &self.link.listener_name)),
+            access: Some(policy.access_control(&self.keys, std::slice::from_ref(&self.link.listener_name))),
             robots: self.robots,
             frame_bytes: self.frame_bytes,
         };

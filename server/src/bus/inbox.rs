@@ -2,13 +2,14 @@
 //! on. A refused frame is answered; every refusal is counted. Nothing here waits or panics.
 
 use super::{BusError, Outbox, Receivers, caught};
+use crate::fleet::Duty;
 use engine::{
     intake::FrameKind,
     panics::Edge,
     slots::SlotKey,
     workers::{Publish, failed},
 };
-use protos::{Key, Keys, Name, prost::bytes::Bytes, v1};
+use protos::{Key, Keys, Name, named_map, prost::bytes::Bytes, v1};
 use std::{sync::Arc, time::Instant};
 use zenoh::{
     Session,
@@ -30,9 +31,10 @@ pub(super) async fn subscribe(
     let odometry = {
         let (keys, to, outbox) = (keys.clone(), to.clone(), outbox.clone());
         move |sample: Sample| {
-            if let Ok(Key::Odometry(robot)) = keys.parse(sample.key_expr().as_str())
-                && to.admits(&robot)
-                && let Some(pose) = to.motion.odometry(&robot, bytes(&sample), Instant::now())
+            let Ok(Key::Odometry(robot)) = keys.parse(sample.key_expr().as_str()) else { return };
+            let message = bytes(&sample);
+            if is_taken(&to, &robot, || named_map::of_odometry(&message))
+                && let Some(pose) = to.motion.odometry(&robot, message.clone(), Instant::now())
             {
                 outbox.pose(&robot, &pose);
             }
@@ -41,10 +43,10 @@ pub(super) async fn subscribe(
     let scans = {
         let (keys, to) = (keys.clone(), to.clone());
         move |sample: Sample| {
-            if let Ok(Key::Scan(robot)) = keys.parse(sample.key_expr().as_str())
-                && to.admits(&robot)
-            {
-                to.motion.scan(&robot, bytes(&sample), Instant::now());
+            let Ok(Key::Scan(robot)) = keys.parse(sample.key_expr().as_str()) else { return };
+            let message = bytes(&sample);
+            if is_taken(&to, &robot, || named_map::of_scan(&message)) {
+                to.motion.scan(&robot, message, Instant::now());
             }
         }
     };
@@ -74,6 +76,11 @@ pub(super) async fn subscribe(
         frames.await.map_err(declared("subscribe to frames"))?,
         quads.await.map_err(declared("subscribe to quads"))?,
     ])
+}
+
+/// Whether this server takes a message that is not answered.
+fn is_taken(to: &Receivers, robot: &Name, map: impl FnOnce() -> String) -> bool {
+    to.admits(robot) && to.duty(robot, map) == Duty::Take
 }
 
 /// A liveliness token of a robot's epoch appeared or went.
@@ -108,6 +115,19 @@ fn frame(keys: &Keys, to: &Receivers, outbox: &Outbox, sample: &Sample) {
 /// Passes a message of a camera image to the intake. A refusal is answered.
 pub(crate) fn take_frame(to: &Receivers, outbox: &Outbox, kind: FrameKind, slot: &SlotKey, message: Bytes) {
     let _span = tracing::debug_span!("camera", robot = %slot.robot, camera = %slot.camera).entered();
+    let map = || match kind {
+        FrameKind::Image => named_map::of_frame(&message),
+        FrameKind::Quads => named_map::of_quads(&message),
+    };
+    match to.duty(&slot.robot, map) {
+        Duty::Take => {}
+        Duty::Silent => return,
+        Duty::Refuse(rejection) => {
+            to.intake.slots.refuse(rejection.code);
+            let answer = v1::Answer { rejection: Some((&rejection).into()), ..kind.echo(message) };
+            return refuse(to, outbox, slot, answer);
+        }
+    }
     if !to.admits(&slot.robot) {
         tracing::debug!(?slot, "frame_of_a_revoked_robot");
         return to.intake.slots.refuse(protos::Code::UnknownRobot);
@@ -117,13 +137,17 @@ pub(crate) fn take_frame(to: &Receivers, outbox: &Outbox, kind: FrameKind, slot:
     let received =
         panics.catch(Edge::Message, "frame", follows, || to.intake.take(kind, slot.clone(), message.clone()));
     if let Err(answer) = received.unwrap_or_else(|| Err(internal(kind, message))) {
-        let (epoch, seq) = (answer.epoch, answer.seq);
-        tracing::debug!(epoch, seq, rejection = ?answer.rejection, "frame_refused");
-        let answer: Arc<v1::Answer> = answer.into();
-        to.live.publish_refusal(slot, answer.clone(), Instant::now());
-        // Last, so that who has the answer finds it counted.
-        outbox.answer(slot, &answer);
+        refuse(to, outbox, slot, *answer);
     }
+}
+
+/// Answers with a refusal, which is counted already.
+fn refuse(to: &Receivers, outbox: &Outbox, slot: &SlotKey, answer: v1::Answer) {
+    tracing::debug!(?slot, rejection = ?answer.rejection, "frame_refused");
+    let answer = Arc::new(answer);
+    to.live.publish_refusal(slot, answer.clone(), Instant::now());
+    // Last, so that who has the answer finds it counted.
+    outbox.answer(slot, &answer);
 }
 
 /// The answer to a frame on which the intake panicked.

@@ -5,6 +5,7 @@
 //! in it, so that none keeps the others out.
 
 use super::{BusError, Receivers, caught};
+use crate::fleet::Duty;
 use crate::localise_body::localise_body;
 use engine::{
     decode::{ImageLimits, decode_frame},
@@ -16,6 +17,7 @@ use engine::{
 use protos::{
     Code, Key, Keys, Name, Rejection,
     convert::{CheckedLocalise, localise::localise_reply},
+    named_map,
     prost::Message,
     v1,
 };
@@ -72,7 +74,7 @@ impl Localiser {
     ) -> Result<Self, BusError> {
         let (queue, jobs) = sync_channel::<Job>(MAX_WAITING);
         let (places, pulse) = (Places::default(), to.vitals.begin("the thread that localises robots"));
-        let (served, vitals) = (places.clone(), to.vitals.clone());
+        let (served, vitals, server) = (places.clone(), to.vitals.clone(), to.server.clone());
         let work = move || {
             // Dropped with the thread, however that ends.
             let _pulse = pulse;
@@ -84,7 +86,7 @@ impl Localiser {
                     || found(&job, limits),
                 );
                 served.robots().remove(&job.robot);
-                reply(&job.robot, &job.query, done.unwrap_or_else(failed));
+                reply((&job.robot, &server), &job.query, done.unwrap_or_else(failed));
             }
         };
         let thread = threads::spawn(Class::Requests, "localise", work)
@@ -93,13 +95,20 @@ impl Localiser {
             let (keys, to) = (keys.clone(), to.clone());
             move |query: Query| {
                 let Ok(Key::Localise(robot)) = keys.parse(query.key_expr().as_str()) else { return };
+                let payload = query.payload().map(|payload| payload.to_bytes()).unwrap_or_default();
+                match to.duty(&robot, || named_map::of_localise(&payload)) {
+                    Duty::Take => {}
+                    Duty::Silent => return,
+                    Duty::Refuse(refusal) => return reply((&robot, &to.server), &query, Err(refusal)),
+                }
+                drop(payload);
                 let panics = to.vitals.panics();
                 let taken =
                     panics.catch(Edge::Message, "a localisation", "it is refused as internal", || {
                         take(&to, (&queue, &places), &robot, &query)
                     });
                 if let Err(refusal) = taken.unwrap_or_else(|| failed().map(drop)) {
-                    reply(&robot, &query, Err(refusal));
+                    reply((&robot, &to.server), &query, Err(refusal));
                 }
             }
         };
@@ -180,11 +189,12 @@ fn failed() -> Result<v1::LocaliseReply, Rejection> {
     Err(Rejection::new(Code::Internal, "message", "the server failed on it; see its log"))
 }
 
-fn reply(robot: &Name, query: &Query, done: Result<v1::LocaliseReply, Rejection>) {
-    let reply = done.unwrap_or_else(|refusal| {
+fn reply((robot, server): (&Name, &Name), query: &Query, done: Result<v1::LocaliseReply, Rejection>) {
+    let mut reply = done.unwrap_or_else(|refusal| {
         tracing::debug!(%robot, %refusal, "localisation_refused");
         v1::LocaliseReply { rejection: Some((&refusal).into()), ..v1::LocaliseReply::default() }
     });
+    reply.server = server.to_string();
     if let Err(error) = query.reply(query.key_expr().clone(), reply.encode_to_vec()).wait() {
         tracing::debug!(%robot, %error, "localisation_not_sent");
     }

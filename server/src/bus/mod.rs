@@ -9,20 +9,24 @@ mod gate;
 mod gaze;
 mod hello;
 mod inbox;
+mod join;
 mod localise;
 mod outbox;
 mod ping;
+mod receiving;
 mod router;
 mod versions;
 #[cfg(test)]
 mod tests;
 
+pub use access::access_control_for_router;
 pub(crate) use inbox::{announce_presence, take_frame};
 pub use outbox::Outbox;
 pub(crate) use ping::Pinger;
 
 use crate::{
     config::Config,
+    fleet::{Duty, Fleet},
     identity::certificates::{CertificateRegistry, Certificates, LinkCertificates},
     store::now_ms,
 };
@@ -36,12 +40,16 @@ use engine::{
     vitals::{Pulse, Vitals},
 };
 use gate::{Gate, GateSettings};
-use localise::Localiser;
+use join::{Join, JoinSettings};
 use protos::{Key, Keys, Name, v1};
+use receiving::Receiving;
 use router::{RouterSettings, RouterTls};
-use std::sync::Arc;
+use std::{
+    path::PathBuf,
+    sync::{Arc, OnceLock},
+    time::Instant,
+};
 use tokio::{sync::broadcast::error::RecvError, task::JoinHandle};
-use zenoh::{pubsub::Subscriber, query::Queryable};
 
 /// Why the bus did not open.
 #[derive(Debug, thiserror::Error)]
@@ -52,6 +60,24 @@ pub enum BusError {
         /// Endpoint asked for.
         endpoint: String,
         /// What was said.
+        detail: String,
+    },
+    /// A router that is to be joined does not answer.
+    #[error("cannot join the router at {endpoints}: {detail}")]
+    Join {
+        /// Endpoints that were tried.
+        endpoints: String,
+        /// What was said.
+        detail: String,
+    },
+    /// A file of the settings cannot be used.
+    #[error("setting `{field}`: {}: {detail}", .path.display())]
+    File {
+        /// Name of the setting.
+        field: &'static str,
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
         detail: String,
     },
     /// zenoh refused a declaration on the open session.
@@ -87,6 +113,10 @@ pub struct Receivers {
     pub vitals: Arc<Vitals>,
     /// Certificates of robots, where connections are encrypted.
     pub(crate) certificates: Option<Arc<CertificateRegistry>>,
+    /// This server's name.
+    pub server: Name,
+    /// The other servers, where it shares a router with them.
+    pub(crate) fleet: Option<Arc<Fleet>>,
 }
 
 impl Receivers {
@@ -95,19 +125,35 @@ impl Receivers {
     pub(crate) fn admits(&self, robot: &Name) -> bool {
         self.certificates.as_ref().is_none_or(|certificates| certificates.admits(robot, now_ms()))
     }
+
+    /// What this server does with a message of a robot; `map` reads the map that it names.
+    pub(crate) fn duty(&self, robot: &Name, map: impl FnOnce() -> String) -> Duty {
+        self.fleet.as_ref().map_or(Duty::Take, |fleet| fleet.duty(robot, &map(), Instant::now()))
+    }
+
+    /// Whether robots are answered on a map here.
+    pub(crate) fn serves(&self, map: &Name) -> bool {
+        self.fleet.as_ref().is_none_or(|fleet| fleet.serves(map))
+    }
 }
 
 /// The open bus.
 pub struct Bus {
     endpoint: String,
-    session: zenoh::Session,
     outbox: Outbox,
     changes: JoinHandle<()>,
-    subscribers: Vec<Subscriber<()>>,
-    queryables: [Queryable<()>; 4],
+    way: Way,
+    /// Who asks the server itself, over its own router; with what answers, which is held.
     pinger: Option<Pinger>,
-    localiser: Localiser,
-    gate: Option<Gate>,
+    _pings: Option<Queryable<()>>,
+}
+
+/// How robots reach the server.
+enum Way {
+    /// By its own router, and a gate before that where connections are encrypted.
+    Own(Box<Receiving>, Option<Gate>),
+    /// By a router of the operator.
+    Joined(Join),
 }
 
 impl std::fmt::Debug for Bus {
@@ -117,12 +163,25 @@ impl std::fmt::Debug for Bus {
 }
 
 impl Bus {
-    /// Opens the router and starts to receive. Needs a multi-threaded runtime.
+    /// Opens the router, or joins one, and starts to receive. Needs a multi-threaded runtime.
     pub(crate) async fn open(
         config: &Config,
         to: Receivers,
         certificates: Option<Arc<Certificates>>,
     ) -> Result<Self, BusError> {
+        let pixels = ImageLimits { bytes: config.limits.frame_bytes, pixels: config.limits.frame_pixels };
+        let keys = Keys::new(&config.fleet);
+        if let Some((router, fleet)) = config.router.as_ref().zip(to.fleet.clone()) {
+            let endpoint = router.connect.first().cloned().unwrap_or_default();
+            let settings = JoinSettings::read(router, keys.clone(), pixels)?;
+            let cell = Arc::<OnceLock<zenoh::Session>>::default();
+            let outbox = Outbox::start(cell.clone(), keys, &to)?;
+            let changes = begin_changes(&to, &outbox);
+            let pulse = to.vitals.begin("the task that joins the router");
+            tracing::info!(endpoint, fleet = %config.fleet, server = %to.server, "the router is joined");
+            let way = Way::Joined(Join::start(settings, (to, outbox.clone()), fleet, cell, pulse));
+            return Ok(Self { endpoint, outbox, changes, way, pinger: None, _pings: None });
+        }
         let endpoint = router::endpoint(&config.zenoh_endpoint)?;
         let encrypted = certificates.filter(|_| endpoint.starts_with("tls/"));
         let (session, link) = if encrypted.is_some() {
@@ -130,24 +189,11 @@ impl Bus {
         } else {
             (router::open(&plain(config, vec![endpoint.clone()])).await?, None)
         };
-        let keys = Keys::new(&config.fleet);
-        let outbox = Outbox::start(session.clone(), keys.clone(), &to)?;
-        let changes = tokio::spawn(forward_map_changes(
-            to.clone(),
-            outbox.clone(),
-            to.vitals.begin("the task that forwards map changes"),
-        ));
-        let subscribers = inbox::subscribe(&session, &keys, &to, &outbox).await?;
+        let outbox = Outbox::start(Arc::new(OnceLock::from(session.clone())), keys.clone(), &to)?;
+        let changes = begin_changes(&to, &outbox);
         let asked = link.clone().map_or((endpoint.clone(), None), |(at, link)| (at, Some(link)));
         let (pings, pinger) = ping::answer_pings(&session, &keys, &to, asked).await?;
-        let queryables = [
-            pings,
-            gaze::answer_gaze(&session, &keys, &to).await?,
-            versions::answer_versions(&session, &keys, &to).await?,
-            hello::answer_hellos(&session, &keys, &to).await?,
-        ];
-        let pixels = ImageLimits { bytes: config.limits.frame_bytes, pixels: config.limits.frame_pixels };
-        let localiser = Localiser::start(&session, &keys, &to, pixels).await?;
+        let receiving = Receiving::start(session, &keys, (&to, &outbox), pixels).await?;
         let gate = match encrypted.zip(link) {
             None => None,
             Some((certificates, (link_endpoint, link))) => {
@@ -167,8 +213,8 @@ impl Bus {
             }
         };
         tracing::info!(endpoint, fleet = %config.fleet, "robots may connect");
-        let pinger = Some(pinger);
-        Ok(Self { endpoint, session, outbox, changes, subscribers, queryables, pinger, localiser, gate })
+        let way = Way::Own(Box::new(receiving), gate);
+        Ok(Self { endpoint, outbox, changes, way, pinger: Some(pinger), _pings: Some(pings) })
     }
 
     /// Where robots connect, with the real port.
@@ -176,9 +222,12 @@ impl Bus {
         &self.endpoint
     }
 
-    /// The session of the router, for robots of other middleware.
-    pub(crate) fn session(&self) -> &zenoh::Session {
-        &self.session
+    /// The session of the server's own router, for robots of other middleware.
+    pub(crate) fn session(&self) -> Option<&zenoh::Session> {
+        match &self.way {
+            Way::Own(receiving, _) => Some(&receiving.session),
+            Way::Joined(_) => None,
+        }
     }
 
     /// Who asks the server itself. Taken once.
@@ -194,26 +243,35 @@ impl Bus {
     /// Stops receiving, sends what is queued, closes the router.
     pub async fn close(self) {
         self.changes.abort();
-        let gate = self.gate;
-        for subscriber in self.subscribers {
-            if let Err(error) = subscriber.undeclare().await {
-                tracing::warn!(%error, "zenoh_undeclare_failed");
+        match self.way {
+            Way::Own(receiving, gate) => {
+                let session = receiving.end().await;
+                self.outbox.drain().await;
+                if let Some(gate) = gate {
+                    gate.close().await;
+                }
+                close(&session).await;
             }
-        }
-        for queryable in self.queryables {
-            if let Err(error) = queryable.undeclare().await {
-                tracing::warn!(%error, "zenoh_undeclare_failed");
+            Way::Joined(join) => {
+                let announced = join.end().await;
+                self.outbox.drain().await;
+                if let Some(announced) = announced {
+                    close(&announced.session).await;
+                }
             }
-        }
-        self.localiser.close().await;
-        self.outbox.drain().await;
-        if let Some(gate) = gate {
-            gate.close().await;
-        }
-        if let Err(error) = self.session.close().await {
-            tracing::warn!(%error, "zenoh_close_failed");
         }
     }
+}
+
+async fn close(session: &zenoh::Session) {
+    if let Err(error) = session.close().await {
+        tracing::warn!(%error, "zenoh_close_failed");
+    }
+}
+
+fn begin_changes(to: &Receivers, outbox: &Outbox) -> JoinHandle<()> {
+    let pulse = to.vitals.begin("the task that forwards map changes");
+    tokio::spawn(forward_map_changes(to.clone(), outbox.clone(), pulse))
 }
 
 fn plain(config: &Config, listen: Vec<String>) -> RouterSettings<'_> {
@@ -256,8 +314,11 @@ async fn forward_map_changes(to: Receivers, outbox: Outbox, pulse: Pulse) {
         match changes.recv().await {
             Ok(change) => {
                 let version = change.version.filter(|_| !change.is_draft);
-                if let (Some(version), Ok(map)) = (version, protos::Name::new(change.map.as_str())) {
-                    let message = v1::MapChanged { map: change.map.clone(), version };
+                if let (Some(version), Ok(map)) = (version, protos::Name::new(change.map.as_str()))
+                    && to.serves(&map)
+                {
+                    let server = to.server.to_string();
+                    let message = v1::MapChanged { map: change.map.clone(), version, server };
                     outbox.send(&Key::MapChanged(map), &message);
                 }
                 to.live.map_changed(change.map, change.version);

@@ -15,7 +15,7 @@ use engine::{
 use protos::{Key, Keys, Name, prost::Message, v1};
 use std::{
     sync::{
-        Arc, Mutex, PoisonError,
+        Arc, Mutex, OnceLock, PoisonError,
         atomic::{AtomicU64, Ordering},
         mpsc::{Receiver, SyncSender, sync_channel},
     },
@@ -61,7 +61,12 @@ impl std::fmt::Debug for Outbox {
 }
 
 impl Outbox {
-    pub(super) fn start(session: zenoh::Session, keys: Keys, to: &Receivers) -> Result<Self, BusError> {
+    /// Sends on the session in `session`; what is sent while there is none is lost, as there is nobody to hear it.
+    pub(super) fn start(
+        session: Arc<OnceLock<zenoh::Session>>,
+        keys: Keys,
+        to: &Receivers,
+    ) -> Result<Self, BusError> {
         let panics = to.vitals.panics().clone();
         let (queue, messages) = sync_channel(QUEUE);
         let (heart, waiting) = (to.vitals.hearts().begin("the outbox"), Arc::<AtomicU64>::default());
@@ -112,9 +117,20 @@ impl Outbox {
     }
 
     pub(super) fn send(&self, key: &Key, message: &impl Message) {
+        self.send_bytes(key, message.encode_to_vec());
+    }
+
+    /// A message and what it lacks, as one: the bytes of two messages one after the other are those of both merged.
+    fn send_parts<M: Message>(&self, key: &Key, message: &M, rest: &M) {
+        let mut bytes = message.encode_to_vec();
+        bytes.extend(rest.encode_to_vec());
+        self.send_bytes(key, bytes);
+    }
+
+    fn send_bytes(&self, key: &Key, bytes: Vec<u8>) {
         let priority =
             if matches!(key, Key::MapChanged(_)) { Priority::Data } else { Priority::InteractiveHigh };
-        let message = OutgoingMessage { key: self.keys.build(key), bytes: message.encode_to_vec(), priority };
+        let message = OutgoingMessage { key: self.keys.build(key), bytes, priority };
         let queue = self.queue.lock().unwrap_or_else(PoisonError::into_inner);
         // Counted first: the thread may have sent it before this one goes on.
         self.waiting.fetch_add(1, Ordering::Relaxed);
@@ -141,19 +157,21 @@ impl Publish for Outbox {
         if !self.to.admits(&key.robot) {
             return;
         }
-        self.send(&Key::Answer(key.robot.clone(), key.camera.clone()), answer);
+        let server = v1::Answer { server: self.to.server.to_string(), ..v1::Answer::default() };
+        self.send_parts(&Key::Answer(key.robot.clone(), key.camera.clone()), answer, &server);
     }
 
     fn pose(&self, robot: &Name, pose: &v1::RobotPose) {
         if !self.to.admits(robot) {
             return;
         }
-        self.send(&Key::Pose(robot.clone()), pose);
+        let server = v1::RobotPose { server: self.to.server.to_string(), ..v1::RobotPose::default() };
+        self.send_parts(&Key::Pose(robot.clone()), pose, &server);
     }
 }
 
 fn deliver(
-    session: &zenoh::Session,
+    session: &OnceLock<zenoh::Session>,
     messages: &Receiver<Queued>,
     panics: &Panics,
     (heart, waiting): &(Arc<Heartbeat>, Arc<AtomicU64>),
@@ -162,6 +180,7 @@ fn deliver(
         waiting.fetch_sub(1, Ordering::Relaxed);
         heart.beat();
         let Queued::Message(OutgoingMessage { key, bytes, priority }) = queued else { continue };
+        let Some(session) = session.get() else { continue };
         let put = || {
             let put = session.put(key.as_str(), bytes).express(true);
             put.congestion_control(CongestionControl::Drop).priority(priority).wait()

@@ -1,6 +1,6 @@
 //! The embedded zenoh routers: settings and opening.
 
-use super::BusError;
+use super::{BusError, join::Credentials};
 use crate::identity::certificates::PemKey;
 use base64::{Engine as _, prelude::BASE64_STANDARD};
 use serde_json::{Value, json};
@@ -25,6 +25,8 @@ const FRAGMENTS_WAIT_US: u64 = 50_000;
 const WAIT_BEFORE_CLOSE_US: u64 = 1_000_000;
 /// Longest wait for the router to open.
 const OPEN_TIMEOUT: Duration = Duration::from_secs(10);
+/// Longest attempt to join a router, within [`OPEN_TIMEOUT`].
+const JOIN_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// Certificates of a router, PEM.
 pub(super) struct RouterTls<'a> {
@@ -63,7 +65,22 @@ pub(super) fn endpoint(asked: &str) -> Result<String, BusError> {
 pub(super) async fn open(settings: &RouterSettings<'_>) -> Result<zenoh::Session, BusError> {
     let endpoint = settings.listen.first().cloned().unwrap_or_default();
     let fault = |detail: String| BusError::Listen { endpoint: endpoint.clone(), detail };
-    let config = config(settings).map_err(|e| fault(e.to_string()))?;
+    session(config(settings), fault).await
+}
+
+/// Opens a session that joins a router at `endpoints`.
+pub(super) async fn opened(
+    endpoints: &str,
+    config: zenoh::Result<zenoh::Config>,
+) -> Result<zenoh::Session, BusError> {
+    session(config, |detail| BusError::Join { endpoints: endpoints.to_owned(), detail }).await
+}
+
+async fn session(
+    config: zenoh::Result<zenoh::Config>,
+    fault: impl Fn(String) -> BusError,
+) -> Result<zenoh::Session, BusError> {
+    let config = config.map_err(|e| fault(e.to_string()))?;
     match tokio::time::timeout(OPEN_TIMEOUT, zenoh::open(config)).await {
         Ok(opened) => opened.map_err(|e| fault(e.to_string())),
         Err(_) => Err(fault(format!("not open after {OPEN_TIMEOUT:?}"))),
@@ -90,7 +107,41 @@ pub(super) async fn open_client(
     zenoh::open(config).await.map_err(|e| fault(e.to_string()))
 }
 
+/// A client of a router at one of `endpoints`; links and queues are as those of the server's own router.
+pub(super) fn client_config(
+    endpoints: &[String],
+    credentials: Option<&Credentials>,
+    frame_bytes: usize,
+) -> zenoh::Result<zenoh::Config> {
+    let settings =
+        RouterSettings { listen: Vec::new(), connect: None, tls: None, access: None, robots: 0, frame_bytes };
+    let mut config = settings_of(&settings);
+    config["mode"] = "client".into();
+    config["connect"] = json!({
+        "endpoints": endpoints,
+        "timeout_ms": JOIN_TIMEOUT.as_millis() as u64,
+        "exit_on_failure": true,
+        "retry": { "period_init_ms": 100, "period_max_ms": 1000, "period_increase_factor": 2 },
+    });
+    if let Some(Credentials { certificate, key, authority }) = credentials {
+        let encoded = |pem: &str| BASE64_STANDARD.encode(pem);
+        config["transport"]["link"]["tls"] = json!({
+            "root_ca_certificate_base64": encoded(authority),
+            "connect_certificate_base64": encoded(certificate),
+            "connect_private_key_base64": encoded(key),
+            "enable_mtls": true,
+            "verify_name_on_connect": true,
+            "close_link_on_expiration": true,
+        });
+    }
+    zenoh::Config::from_json5(&config.to_string())
+}
+
 fn config(settings: &RouterSettings<'_>) -> zenoh::Result<zenoh::Config> {
+    zenoh::Config::from_json5(&settings_of(settings).to_string())
+}
+
+fn settings_of(settings: &RouterSettings<'_>) -> Value {
     let RouterSettings { listen, connect, tls, access, robots, frame_bytes } = settings;
     let fragments_us = if connect.is_some() { FRAGMENTS_WAIT_US } else { WAIT_BEFORE_DROP_US };
     // No time stamps: clocks of robots decide nothing here, and a clock far ahead would have its samples refused.
@@ -130,7 +181,7 @@ fn config(settings: &RouterSettings<'_>) -> zenoh::Result<zenoh::Config> {
     if let Some(access) = access {
         config["access_control"] = access.clone();
     }
-    zenoh::Config::from_json5(&config.to_string())
+    config
 }
 
 fn tls_config(RouterTls { authorities, listener, client }: &RouterTls<'_>) -> Value {

@@ -50,6 +50,8 @@ async fn running_with(
         gazes: Arc::default(),
         vitals: engine.vitals.clone(),
         certificates,
+        server: Name::new("test").unwrap(),
+        fleet: None,
     };
     let bus = Bus::open(&config, to, None).await.unwrap();
     let workers = Workers::start(&engine, workers, &Arc::new(bus.outbox().clone())).unwrap();
@@ -275,7 +277,10 @@ async fn a_subscriber_that_does_not_read_delays_no_answer() {
     let subscriber = slow.declare_subscriber(keys.build(&changed)).await.unwrap();
     let robot = running.robot("r1").await;
     let tell = |version| {
-        running.bus.outbox().send(&changed, &v1::MapChanged { map: "m".repeat(64), version });
+        running
+            .bus
+            .outbox()
+            .send(&changed, &v1::MapChanged { map: "m".repeat(64), version, ..v1::MapChanged::default() });
     };
     // The subscription is there once a change arrives.
     let arrived = async {

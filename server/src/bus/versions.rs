@@ -29,12 +29,14 @@ pub(super) async fn answer_versions(
 fn reply(keys: &Keys, to: &Receivers, query: &Query) {
     for map in to.intake.snapshots.all().into_iter().filter(|map| !map.is_draft) {
         let Ok(name) = Name::new(map.name.as_str()) else { continue };
+        let name_of = name.clone();
         let key = keys.build(&Key::MapVersion(name));
         let asked = KeyExpr::new(key.as_str()).is_ok_and(|key| query.key_expr().intersects(&key));
-        if !asked {
+        if !asked || !to.serves(&name_of) {
             continue;
         }
-        let message = v1::MapChanged { map: map.name.clone(), version: map.version };
+        let message =
+            v1::MapChanged { map: map.name.clone(), version: map.version, server: to.server.to_string() };
         if let Err(error) = query.reply(key, message.encode_to_vec()).wait() {
             tracing::debug!(map = map.name, %error, "version_not_sent");
             return;

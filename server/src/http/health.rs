@@ -55,21 +55,26 @@ async fn readyz(State(app): State<AppState>, parts: Parts) -> Result<Json<Readin
     if !sees_all {
         backup = BackupHealth { newest: None, failed: None, ..backup };
     }
+    let (router, mut maps_not_served) = app.fleet.as_ref().map(|fleet| fleet.faults()).unwrap_or_default();
+    let is_alone = router.is_some() || !maps_not_served.is_empty();
+    maps_not_served.retain(|map, _| asker.as_ref().is_some_and(|asker: &Principal| asker.may_see(map)));
     let storage = storage(app.store.disk().space());
     let has_no_room = storage.refused.is_some();
-    let is_degraded = counts != ReadinessCounts::default() || scheduled_failed || has_no_room;
-    let status = if is_degraded { "degraded" } else { "ready" }.to_owned();
+    let has_faults = counts != ReadinessCounts::default() || scheduled_failed;
+    let status = if has_faults || has_no_room || is_alone { "degraded" } else { "ready" }.to_owned();
     let panics =
         Edge::ALL.into_iter().map(|edge| (edge.name().to_owned(), vitals.panics().at(edge))).collect();
     let hearts = vitals.hearts().all();
     let seen = hearts.iter().filter(|_| sees_all);
     let parts_still_s = seen.map(|heart| (heart.part().to_owned(), heart.still().as_secs())).collect();
-    let storage = sees_all.then_some(storage);
+    let (storage, router) = (sees_all.then_some(storage), router.filter(|_| sees_all));
     Ok(Json(Readiness {
         status,
         counts,
         maps_not_in_use,
         damaged_pictures,
+        router,
+        maps_not_served,
         backup,
         parts_still_s,
         storage,
@@ -110,11 +115,12 @@ fn not_ready(failure: &Failure, sees_all: bool) -> ApiError {
 
 /// What runs here.
 #[utoipa::path(get, path = "/version", tag = "health", responses((status = 200, body = Version)))]
-async fn version() -> Json<Version> {
+async fn version(State(app): State<AppState>) -> Json<Version> {
     Json(Version {
         name: "waymark".to_owned(),
         version: env!("CARGO_PKG_VERSION").to_owned(),
         api: "v1".to_owned(),
         protocol: protos::keys::PROTOCOL.to_owned(),
+        server: app.server.to_string(),
     })
 }

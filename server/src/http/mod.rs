@@ -53,6 +53,7 @@ mod room;
 mod ros2;
 mod router;
 mod security;
+mod servers;
 mod stored_answers;
 mod tokens;
 mod underlay;
@@ -71,6 +72,7 @@ pub(crate) use router::router;
 use crate::{
     backup::Backups,
     config::Config,
+    fleet::Fleet,
     gather::Gatherer,
     identity::Sessions,
     jobs::Jobs,
@@ -94,6 +96,7 @@ use engine::{
     workers::Engine,
 };
 use error::ApiError;
+use protos::Name;
 use reused_answers::ReusedAnswers;
 pub(crate) use robot_certificates::Enrolment;
 use std::{
@@ -142,6 +145,10 @@ pub(crate) struct App {
     pub(crate) backups: Arc<Backups>,
     /// What robots are enrolled with, where their connections are encrypted.
     pub(crate) enrolment: Option<Enrolment>,
+    /// This server's name.
+    pub(crate) server: Name,
+    /// The servers of its router, if it joins one.
+    pub(crate) fleet: Option<Arc<Fleet>>,
     /// Becomes true when the server stops; ends event streams.
     pub(crate) stopping: watch::Receiver<bool>,
     /// How often each token and address may ask.
@@ -169,6 +176,8 @@ pub(crate) struct Services {
     pub(crate) local_token_file: Option<PathBuf>,
     pub(crate) backups: Arc<Backups>,
     pub(crate) enrolment: Option<Enrolment>,
+    pub(crate) server: Name,
+    pub(crate) fleet: Option<Arc<Fleet>>,
 }
 
 /// The state of the router.
@@ -178,10 +187,12 @@ impl App {
     pub(crate) fn new(
         config: Arc<Config>,
         store: Catalogue,
-        Services { jobs, gatherer, ros2, publisher, sessions, local_token_file, backups, enrolment }: Services,
+        services: Services,
         engine: &Engine,
         stopping: watch::Receiver<bool>,
     ) -> Self {
+        let Services { jobs, gatherer, ros2, publisher, sessions, .. } = services;
+        let Services { local_token_file, backups, enrolment, server, fleet, .. } = services;
         let vision = Arc::new(Semaphore::new(config.workers));
         let streams = Arc::new(Semaphore::new(config.limits.streams));
         let uploads = Semaphore::new(config.limits.uploads);
@@ -207,6 +218,8 @@ impl App {
             local_token_file,
             backups,
             enrolment,
+            server,
+            fleet,
             stopping,
             rates,
             reused: ReusedAnswers::default(),

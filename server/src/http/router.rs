@@ -9,7 +9,7 @@ use super::{
     metrics, modalities, page_session, pages, pose_by_hand, recognise, reference_runs, refused_views,
     relocalisation, replay, reused_answers, revision, robot_activity, robot_certificates, robots, ros2,
     security::with_security,
-    stored_answers, tokens, underlay, views, visibility, visibility_settings, walls,
+    servers, stored_answers, tokens, underlay, views, visibility, visibility_settings, walls,
 };
 use crate::config::Limits;
 use axum::{
@@ -69,6 +69,7 @@ fn api(limits: &Limits) -> OpenApiRouter<AppState> {
         .merge(robot_certificates::router())
         .merge(relocalisation::router())
         .merge(ros2::router())
+        .merge(servers::router())
         .merge(cameras::router())
         .merge(backups::router())
         .merge(live::router())

@@ -89,6 +89,8 @@ impl Service {
             config,
             store.clone(),
             Services {
+                server: protos::Name::new("test").unwrap(),
+                fleet: None,
                 jobs,
                 gatherer,
                 ros2: Arc::default(),
@@ -175,7 +177,8 @@ fn driven(service: &Service) -> String {
         // As much time passes between messages as their stamps say.
         let received = begun + Duration::from_nanos(captured_ns as u64);
         let odom_from_robot = Some(v1::Pose2 { x_m: seq as f64 * 0.1, ..v1::Pose2::default() });
-        let odometry = v1::Odometry { epoch: 1, seq, captured_ns, odom_from_robot };
+        let odometry =
+            v1::Odometry { epoch: 1, seq, captured_ns, odom_from_robot, ..v1::Odometry::default() };
         service.engine.motion.odometry(&r1, odometry.encode_to_vec().into(), received);
     }
     assert_eq!(service.engine.motion.recording(&r1).unwrap().odometry, 20);

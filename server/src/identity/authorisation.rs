@@ -82,6 +82,7 @@ pub(crate) const TABLE: &[Rule] = &[
     server("DELETE", "/tokens/{token}", Admin),
     server("GET", "/audit", Admin),
     server("GET", "/audit/check", Admin),
+    server("GET", "/servers", Viewer),
     server("GET", "/backups", Admin),
     server("POST", "/backups", Admin),
     server("GET", "/backups/{backup}", Admin),

@@ -3,7 +3,7 @@
 use super::Fleet;
 use client::{
     RobotClient,
-    protos::{Key, Keys, Name, prost::Message},
+    protos::{Key, Keys, Name, ServerToken, prost::Message},
     v1,
 };
 use std::{
@@ -37,7 +37,8 @@ fn every_key(robot: &str, map: &str) -> Vec<Key> {
         Key::Hello(robot.clone()),
         Key::Localise(robot),
         Key::MapChanged(map.clone()),
-        Key::MapVersion(map),
+        Key::MapVersion(map.clone()),
+        Key::Server(map.clone(), ServerToken::Serves(map)),
     ];
     for key in &all {
         match key {
@@ -52,7 +53,8 @@ fn every_key(robot: &str, map: &str) -> Vec<Key> {
             | Key::Hello(_)
             | Key::Localise(_)
             | Key::MapChanged(_)
-            | Key::MapVersion(_) => {}
+            | Key::MapVersion(_)
+            | Key::Server(..) => {}
         }
     }
     all

@@ -53,7 +53,13 @@ pub(super) fn write_recording(path: &Path, readings: &[Reading]) {
     for (i, reading) in readings.iter().enumerate() {
         let (captured_ns, number) = (captured_ns(i), i as u64 + 1);
         let odom = pose2_wire(&reading.odom_from_robot);
-        let odometry = v1::Odometry { epoch: 1, seq: number, captured_ns, odom_from_robot: Some(odom) };
+        let odometry = v1::Odometry {
+            epoch: 1,
+            seq: number,
+            captured_ns,
+            odom_from_robot: Some(odom),
+            ..v1::Odometry::default()
+        };
         let scan = scan_of(&reading.scan, &reading.odom_from_robot, captured_ns);
         let frame = v1::Frame {
             epoch: 1,

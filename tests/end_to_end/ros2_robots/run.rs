@@ -88,7 +88,8 @@ impl Native {
     pub(super) async fn odometry(&mut self, readings: &SensorReadings, captured_ns: i64) {
         self.seq += 1;
         let odom_from_robot = Some(pose2(&readings.step.odom_from_robot));
-        let odometry = v1::Odometry { epoch: 1, seq: self.seq, captured_ns, odom_from_robot };
+        let odometry =
+            v1::Odometry { epoch: 1, seq: self.seq, captured_ns, odom_from_robot, ..v1::Odometry::default() };
         self.put("odometry", odometry.encode_to_vec()).await;
     }
 

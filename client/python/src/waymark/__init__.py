@@ -26,6 +26,7 @@ from waymark.errors import (
     NoAnswer,
     NotAdmitted,
     Refused,
+    ServerGone,
     Superseded,
     TlsRefused,
     Unexpected,
@@ -48,6 +49,7 @@ from waymark.wire import (
     QuadAnswer,
     RobotPose,
     Scan,
+    ServerEvent,
 )
 
 __version__ = "0.1.0"
@@ -94,6 +96,8 @@ __all__ = [
     "RobotFile",
     "RobotPose",
     "Scan",
+    "ServerEvent",
+    "ServerGone",
     "Size",
     "Subscription",
     "Superseded",

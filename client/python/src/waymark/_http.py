@@ -63,6 +63,7 @@ OPERATIONS: dict[str, tuple[str, str]] = {
     "undo_commit": ("POST", "/maps/{map}/commits/{commit}/undo"),
     "health": ("GET", "/healthz"),
     "readiness": ("GET", "/readyz"),
+    "servers": ("GET", "/servers"),
     "version": ("GET", "/version"),
     "metrics": ("GET", "/metrics"),
     "add_landmarks": ("POST", "/maps/{map}/bulk/create-landmarks"),

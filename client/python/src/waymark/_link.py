@@ -22,6 +22,7 @@ import zenoh
 from google.protobuf.message import DecodeError, Message
 
 from waymark._messages import frame_message, localise_request, localise_result
+from waymark._servers import Servers
 from waymark._values import fill, from_message
 from waymark.api.localise import LocaliseResult
 from waymark.errors import InvalidInput, NoAnswer, NotAdmitted, TlsRefused, Unexpected, Unreachable
@@ -29,7 +30,7 @@ from waymark.image import Capture, Picture
 from waymark.quads import Quads
 from waymark.robot_file import RobotFile
 from waymark.v1 import waymark_pb2 as pb
-from waymark.wire import Answer, CameraAnswer, GazeAdvice, GazeRequest, MapChanged, Pose2, RobotPose, Scan
+from waymark.wire import Answer, CameraAnswer, GazeAdvice, GazeRequest, MapChanged, Pose2, RobotPose, Scan, ServerEvent
 
 T = TypeVar("T")
 M = TypeVar("M", bound=Message)
@@ -135,12 +136,20 @@ class Link:
         self._congestion = zenoh.CongestionControl.BLOCK if delivery == "every" else zenoh.CongestionControl.DROP
         self.answers: Listeners[CameraAnswer] = Listeners()
         self.poses: Listeners[RobotPose] = Listeners()
+        self.server_events: Listeners[ServerEvent] = Listeners()
+        self.servers = Servers(self.server_events.call)
+        servers = f"{prefix}/server"
         self._session = _open(endpoint, delivery, timeout_s, file)
         if file is not None:
             self._greet(file, delivery, timeout_s)
         try:
             # Held: dropping them ends subscriptions and token.
             self._held: list[Any] = [
+                # Whether a server lives is known before what it has.
+                *(
+                    self._session.liveliness().declare_subscriber(key, self._on_server, history=True)
+                    for key in (f"{servers}/*/alive/*", f"{servers}/*/serves/*", f"{servers}/*/robot/{robot}")
+                ),
                 self._session.declare_subscriber(f"{self._own}/answer/*", self._on_answer),
                 self._session.declare_subscriber(f"{self._own}/pose", self._on_pose),
                 self._session.liveliness().declare_token(f"{self._own}/alive/{self.epoch}"),
@@ -190,11 +199,15 @@ class Link:
             f"the server at {self.endpoint} takes no messages of robot {self.robot} with this certificate"
         )
 
+    def _on_server(self, sample: zenoh.Sample) -> None:
+        self.servers.hear(str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT)
+
     def _on_answer(self, sample: zenoh.Sample) -> None:
         if not self.answers:
             return
         answer = _decoded(Answer, pb.Answer(), sample)
-        if answer is not None:
+        # Refusals are of whoever says them.
+        if answer is not None and (answer.status == "rejected" or self.servers.takes(answer.map, answer.server)):
             self.answers.call(CameraAnswer(str(sample.key_expr).rsplit("/", 1)[1], answer))
 
     def _on_pose(self, sample: zenoh.Sample) -> None:
@@ -202,7 +215,7 @@ class Link:
             return
         pose = _decoded(RobotPose, pb.RobotPose(), sample)
         # A pose of another epoch belongs to another program under this robot's name.
-        if pose is not None and pose.epoch == self.epoch:
+        if pose is not None and pose.epoch == self.epoch and self.servers.takes(pose.map, pose.server):
             self.poses.call(pose)
 
     def on_map_changed(self, map: str, listener: Listener[MapChanged]) -> Subscription:
@@ -240,13 +253,14 @@ class Link:
 
     def publish_frame(self, camera: str, frame: Capture | Quads | Picture, seq: int) -> None:
         """Sends a frame, or the quads of one."""
-        kind, message = frame_message(frame, self.epoch, seq)
+        kind, message = frame_message(frame, self.epoch, seq, self.servers.map)
         self._put(f"{self._own}/{kind}/{name('camera', camera)}", message, zenoh.Priority.DATA_LOW)
 
     def publish_odometry(self, odom_from_robot: Pose2, captured_ns: int | None) -> int:
         """Sends odometry, read now or at `captured_ns`."""
         seq = self.next_seq()
-        message = pb.Odometry(epoch=self.epoch, seq=seq, captured_ns=captured_ns or time.time_ns())
+        captured_ns = captured_ns or time.time_ns()
+        message = pb.Odometry(epoch=self.epoch, seq=seq, captured_ns=captured_ns, map=self.servers.map)
         fill(message.odom_from_robot, odom_from_robot)
         self._put(f"{self._own}/odometry", message.SerializeToString(), zenoh.Priority.DATA)
         return seq
@@ -256,6 +270,7 @@ class Link:
         seq = self.next_seq()
         message = pb.Scan(epoch=self.epoch, seq=seq)
         fill(message, scan)
+        message.map = scan.map or self.servers.map
         self._put(f"{self._own}/scan", message.SerializeToString(), zenoh.Priority.DATA)
         return seq
 
@@ -269,6 +284,7 @@ class Link:
         """Asks where to look."""
         message = pb.GazeRequest()
         fill(message, request)
+        message.map = request.map or self.servers.map
         advice = self._ask(f"{self._own}/rpc/gaze", message.SerializeToString(), pb.GazeAdvice(), wait_s)
         if advice is None:
             raise NoAnswer(f"no gaze advice within {wait_s} s from {self.endpoint}")
@@ -276,7 +292,7 @@ class Link:
 
     def localise(self, frame: Capture | Picture | None, scan: Scan | None, map: str, wait_s: float) -> LocaliseResult:
         """Asks where the robot is."""
-        request = localise_request(frame, scan, map, wait_s)
+        request = localise_request(frame, scan, map or self.servers.map, wait_s)
         reply = self._ask(f"{self._own}/rpc/localise", request, pb.LocaliseReply(), wait_s)
         if reply is None:
             raise NoAnswer(f"no localisation within {wait_s} s from {self.endpoint}")

@@ -25,14 +25,14 @@ _STATUS: dict[int, LocaliseStatus] = {
 _OPTIONAL = ("intrinsics", "robot_from_camera", "odometry", "prior")
 
 
-def frame_message(frame: Capture | Quads | Picture, epoch: int, seq: int) -> tuple[str, bytes]:
-    """The part of the key, and the message of a frame or of quads."""
+def frame_message(frame: Capture | Quads | Picture, epoch: int, seq: int, map: str = "") -> tuple[str, bytes]:
+    """The part of the key, and the message of a frame or of quads; on `map` unless it names one."""
     if isinstance(frame, Quads):
-        return "quads", _quads_bytes(frame, epoch, seq)
-    return "frame", frame_bytes(frame, epoch, seq)
+        return "quads", _quads_bytes(frame, epoch, seq, map)
+    return "frame", frame_bytes(frame, epoch, seq, map)
 
 
-def frame_bytes(frame: Capture | Picture, epoch: int, seq: int) -> bytes:
+def frame_bytes(frame: Capture | Picture, epoch: int, seq: int, map: str = "") -> bytes:
     """The `Frame` message of a frame. The image is copied once, into the message."""
     capture = frame if isinstance(frame, Capture) else Capture(as_image(frame))
     image = capture.image
@@ -44,7 +44,7 @@ def frame_bytes(frame: Capture | Picture, epoch: int, seq: int) -> bytes:
         width_px=image.width_px,
         height_px=image.height_px,
         deadline_ms=capture.deadline_ms,
-        map=capture.map,
+        map=capture.map or map,
     )
     for field in _OPTIONAL:
         value = getattr(capture, field)
@@ -64,7 +64,7 @@ def _varint(number: int) -> bytes:
     return bytes(out)
 
 
-def _quads_bytes(quads: Quads, epoch: int, seq: int) -> bytes:
+def _quads_bytes(quads: Quads, epoch: int, seq: int, map: str) -> bytes:
     message = pb.Quads(
         epoch=epoch,
         seq=seq,
@@ -73,7 +73,7 @@ def _quads_bytes(quads: Quads, epoch: int, seq: int) -> bytes:
         height_px=quads.height_px,
         quads=[_found_quad(quad) for quad in quads.quads],
         deadline_ms=quads.deadline_ms,
-        map=quads.map,
+        map=quads.map or map,
     )
     for field in _OPTIONAL:
         value = getattr(quads, field)

@@ -10,14 +10,15 @@ from collections.abc import AsyncIterator
 from typing import Any, Generic, TypeVar
 from weakref import WeakSet
 
-from waymark._link import INBOX, Delivery, Link, Listener, Subscription
+from waymark._link import INBOX, Delivery, Link, Listener, Subscription, name
+from waymark._servers import LOOK_EVERY_S
 from waymark.api.localise import LocaliseResult
 from waymark.errors import NoAnswer
 from waymark.image import Capture, Picture
 from waymark.quads import Quads
 from waymark.robot import matching
 from waymark.robot_file import RobotFile
-from waymark.wire import Answer, CameraAnswer, GazeAdvice, GazeRequest, MapChanged, Pose2, RobotPose, Scan
+from waymark.wire import Answer, CameraAnswer, GazeAdvice, GazeRequest, MapChanged, Pose2, RobotPose, Scan, ServerEvent
 
 T = TypeVar("T")
 
@@ -130,6 +131,18 @@ class AsyncRobot:
         """Epoch of this start of the robot's software."""
         return self._link.epoch
 
+    def enter_map(self, map: str | None) -> None:
+        """From now on frames, odometry, scans and questions name this map, unless they name one themselves; `None`:
+        none, and the server where the robot is registered takes them. For a robot that drives into a building whose map
+        another server on the same router has: it is registered there, too, and goes on."""
+        self._link.servers.enter(name("map", map) if map is not None else "")
+
+    def server_events(self) -> AsyncInbox[ServerEvent]:
+        """When the server of the robot's map goes and comes back, where several servers share a router."""
+        inbox: AsyncInbox[ServerEvent] = AsyncInbox()
+        self._inboxes.add(inbox)
+        return inbox._attach(self._link.server_events.add(inbox._push))
+
     async def publish_frame(self, camera: str, frame: Capture | Quads | Picture) -> int:
         """Sends a frame, or the quads of one, and returns its number."""
         seq = self._link.next_seq()
@@ -138,7 +151,8 @@ class AsyncRobot:
 
     async def recognise(self, camera: str, frame: Capture | Quads | Picture, *, wait_s: float = 10.0) -> Answer:
         """Sends a frame, or the quads of one, and waits for its answer. One at a time for each camera, or the older is
-        `Superseded`."""
+        `Superseded`. Raises `ServerGone` as soon as it is known that the server of the robot's map is not there."""
+        self._link.servers.raise_if_gone()
         seq = self._link.next_seq()
         answers: AsyncInbox[CameraAnswer] = AsyncInbox()
         async with answers._attach(self._link.answers.add(answers._push)):
@@ -146,9 +160,10 @@ class AsyncRobot:
             loop = asyncio.get_running_loop()
             until = loop.time() + wait_s
             while (left := until - loop.time()) > 0:
-                answer = matching(await answers.get(left), camera, self.epoch, seq)
+                answer = matching(await answers.get(min(left, LOOK_EVERY_S)), camera, self.epoch, seq)
                 if answer is not None:
                     return answer
+                self._link.servers.raise_if_gone()
         raise NoAnswer(f"no answer to frame {seq} within {wait_s} s from {self._link.endpoint}")
 
     def answers(self) -> AsyncInbox[CameraAnswer]:

@@ -32,6 +32,9 @@ ADVICE: dict[str, str] = {
     "certificate_expired": "enrol the robot again: waymark robot enrol",
     "not_admitted": "it was revoked, is another robot's, or the robot was removed: see waymark robot certificates",
     "no_answer": "the frame or its answer was dropped, or the work takes longer: send again, or give a longer `wait_s`",
+    "server_gone": "is it running, and has it a connection to the router? `Robot.server_events` tells when it is back",
+    "map_contested": "several servers have the map: delete or rename it on all but one",
+    "robot_contested": "several servers have the robot: `Robot.enter_map`, or remove it from all but one",
     "superseded": "send the next frame of a camera when the last is answered",
     "no_encoder": "pip install 'waymark-client[jpeg]', or send the raw image",
     "unexpected": "are client and server of the same version?",
@@ -120,6 +123,12 @@ class NoAnswer(WaymarkError):
     """No answer to a frame or a question in time."""
 
     default_code = "no_answer"
+
+
+class ServerGone(WaymarkError):
+    """The server of the robot's map is gone: nobody answers until it is back."""
+
+    default_code = "server_gone"
 
 
 class Superseded(WaymarkError):

@@ -12,13 +12,14 @@ from collections.abc import Iterator
 from typing import Any, Generic, TypeVar
 from weakref import WeakSet
 
-from waymark._link import INBOX, Delivery, Link, Listener, Subscription
+from waymark._link import INBOX, Delivery, Link, Listener, Subscription, name
+from waymark._servers import LOOK_EVERY_S
 from waymark.api.localise import LocaliseResult
 from waymark.errors import NoAnswer, Superseded
 from waymark.image import Capture, Picture
 from waymark.quads import Quads
 from waymark.robot_file import RobotFile
-from waymark.wire import Answer, CameraAnswer, GazeAdvice, GazeRequest, MapChanged, Pose2, RobotPose, Scan
+from waymark.wire import Answer, CameraAnswer, GazeAdvice, GazeRequest, MapChanged, Pose2, RobotPose, Scan, ServerEvent
 
 T = TypeVar("T")
 
@@ -129,6 +130,18 @@ class Robot:
         """Epoch of this start of the robot's software."""
         return self._link.epoch
 
+    def enter_map(self, map: str | None) -> None:
+        """From now on frames, odometry, scans and questions name this map, unless they name one themselves; `None`:
+        none, and the server where the robot is registered takes them. For a robot that drives into a building whose map
+        another server on the same router has: it is registered there, too, and goes on."""
+        self._link.servers.enter(name("map", map) if map is not None else "")
+
+    def server_events(self) -> Inbox[ServerEvent]:
+        """When the server of the robot's map goes and comes back, where several servers share a router."""
+        inbox: Inbox[ServerEvent] = Inbox()
+        self._inboxes.add(inbox)
+        return inbox._attach(self._link.server_events.add(inbox._push))
+
     def publish_frame(self, camera: str, frame: Capture | Quads | Picture) -> int:
         """Sends a frame, or the quads of one, and returns its number, at once."""
         seq = self._link.next_seq()
@@ -137,17 +150,19 @@ class Robot:
 
     def recognise(self, camera: str, frame: Capture | Quads | Picture, *, wait_s: float = 10.0) -> Answer:
         """Sends a frame, or the quads of one, and waits for its answer. One at a time for each camera, or the older is
-        `Superseded`."""
+        `Superseded`. Raises `ServerGone` as soon as it is known that the server of the robot's map is not there."""
+        self._link.servers.raise_if_gone()
         seq = self._link.next_seq()
         answers: Inbox[CameraAnswer] = Inbox()
         with answers._attach(self._link.answers.add(answers._push)):
             self._link.publish_frame(camera, frame, seq)
             until = time.monotonic() + wait_s
             while (left := until - time.monotonic()) > 0:
-                arrived = answers.get(left)
+                arrived = answers.get(min(left, LOOK_EVERY_S))
                 answer = matching(arrived, camera, self.epoch, seq)
                 if answer is not None:
                     return answer
+                self._link.servers.raise_if_gone()
         raise NoAnswer(f"no answer to frame {seq} within {wait_s} s from {self._link.endpoint}")
 
     def answers(self) -> Inbox[CameraAnswer]:

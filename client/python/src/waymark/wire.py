@@ -287,6 +287,9 @@ class Answer:
             raise Refused(self.rejection.detail, code=self.rejection.code, field=self.rejection.field)
         return self
 
+    # The server that answers, over zenoh.
+    server: str = ""
+
 
 @dataclass(frozen=True, slots=True)
 class CameraAnswer:
@@ -307,6 +310,8 @@ class Scan:
     odom_from_robot: Pose2
     robot_from_laser: Pose2 = Pose2()
     captured_ns: int = field(default_factory=time.time_ns)
+    # The map that the robot is on, where several servers share a router; empty: that of `Robot.enter_map`.
+    map: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -323,6 +328,8 @@ class RobotPose:
     laser_corrections: int = 0
     age_ms: float = 0.0
     trust: PoseTrust = "unspecified"
+    # The server that fused it.
+    server: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -331,6 +338,8 @@ class MapChanged:
 
     map: str = ""
     version: int = 0
+    # The server that serves the map.
+    server: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -351,6 +360,8 @@ class GazeRequest:
     at_ns: int = field(default_factory=time.time_ns)
     looked_at: str = ""
     recognised: bool = False
+    # As that of a scan.
+    map: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -370,3 +381,15 @@ class GazeAdvice:
     gain_nats: float = 0.0
     range_m: float = 0.0
     incidence_rad: float = 0.0
+    # The server that answers.
+    server: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class ServerEvent:
+    """The server of the robot is gone, and nobody answers until it is back; or there is one again. `map` is that of
+    `Robot.enter_map`; empty: the robot's own."""
+
+    kind: Literal["gone", "back"]
+    server: str
+    map: str = ""

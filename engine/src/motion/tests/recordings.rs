@@ -20,6 +20,7 @@ fn recordings_are_one_a_robot_and_bounded() {
         seq: 1,
         captured_ns: 9_000_000_000,
         odom_from_robot: Some(v1::Pose2::default()),
+        ..v1::Odometry::default()
     };
     motion.odometry(&r1, again.encode_to_vec().into(), time(9.0));
     let status = motion.recording(&r1).unwrap();

@@ -30,7 +30,13 @@ impl Drive {
     fn odometry(&mut self, s: f64, off_s: f64) -> Option<v1::RobotPose> {
         self.seq += 1;
         let odom_from_robot = Some(v1::Pose2 { x_m: s, ..v1::Pose2::default() });
-        let message = v1::Odometry { epoch: 1, seq: self.seq, captured_ns: ns(s + off_s), odom_from_robot };
+        let message = v1::Odometry {
+            epoch: 1,
+            seq: self.seq,
+            captured_ns: ns(s + off_s),
+            odom_from_robot,
+            ..v1::Odometry::default()
+        };
         self.motion.odometry(&self.r1, message.encode_to_vec().into(), time(s))
     }
 
@@ -132,7 +138,13 @@ fn one_stray_stamp_of_slow_odometry_is_no_jump() {
     let (motion, r1) = motion();
     let send = |seq: u64, stamp_s: f64| {
         let odom_from_robot = Some(v1::Pose2 { x_m: 2.0 * seq as f64, ..v1::Pose2::default() });
-        let message = v1::Odometry { epoch: 1, seq, captured_ns: ns(stamp_s), odom_from_robot };
+        let message = v1::Odometry {
+            epoch: 1,
+            seq,
+            captured_ns: ns(stamp_s),
+            odom_from_robot,
+            ..v1::Odometry::default()
+        };
         motion.odometry(&r1, message.encode_to_vec().into(), time(seq as f64))
     };
     send(1, 1.0);
@@ -176,7 +188,13 @@ fn one_stray_stamp_of_a_scan_changes_nothing() {
         let truth = |s: f64| Pose2::new(12.0 + s, 0.1, 0.0);
         let odometry = |seq: u64, s: f64| {
             let odom_from_robot = Some(v1::Pose2 { x_m: 7.0 + s, y_m: 0.1, theta_rad: 0.0 });
-            let message = v1::Odometry { epoch: 1, seq, captured_ns: ns(s), odom_from_robot };
+            let message = v1::Odometry {
+                epoch: 1,
+                seq,
+                captured_ns: ns(s),
+                odom_from_robot,
+                ..v1::Odometry::default()
+            };
             motion.odometry(&r1, message.encode_to_vec().into(), time(s))
         };
         let scan = |seq: u64, s: f64, off_s: f64| {
@@ -248,7 +266,13 @@ fn odometry_that_jumped_with_the_clock_loses_the_pose() {
         drive.seq += 1;
         let odom_from_robot = Some(v1::Pose2 { x_m: 500.0, ..v1::Pose2::default() });
         let s = 3.0 + i as f64 / RATE as f64;
-        let message = v1::Odometry { epoch: 1, seq: drive.seq, captured_ns: ns(s + HOUR), odom_from_robot };
+        let message = v1::Odometry {
+            epoch: 1,
+            seq: drive.seq,
+            captured_ns: ns(s + HOUR),
+            odom_from_robot,
+            ..v1::Odometry::default()
+        };
         drive.motion.odometry(&drive.r1, message.encode_to_vec().into(), time(s));
     }
     assert_eq!(drive.motion.pose(&drive.r1, "hall", time(4.5)), None);
@@ -323,7 +347,13 @@ fn messages_that_come_late_are_no_stray_ones() {
         drive.seq += 1;
         let s = 2.0 + f64::from(i) * 0.05;
         let odom_from_robot = Some(v1::Pose2 { x_m: s, ..v1::Pose2::default() });
-        let message = v1::Odometry { epoch: 1, seq: drive.seq, captured_ns: ns(s), odom_from_robot };
+        let message = v1::Odometry {
+            epoch: 1,
+            seq: drive.seq,
+            captured_ns: ns(s),
+            odom_from_robot,
+            ..v1::Odometry::default()
+        };
         let pose = drive.motion.odometry(&drive.r1, message.encode_to_vec().into(), time(3.5));
         taken += u32::from(pose.is_some());
     }

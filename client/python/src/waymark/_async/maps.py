@@ -27,6 +27,7 @@ from waymark.api import (
     Readiness,
     Replay,
     RollbackOutcome,
+    Servers,
     TransformResponse,
     Underlay,
     UnderlayPlace,
@@ -52,6 +53,10 @@ class AsyncLiveEvents(AsyncStream[LiveEvent]):
 
 class AsyncMaps(AsyncBase):
     """Operations on maps."""
+
+    async def servers(self) -> Servers:
+        """The servers that share a router, with their maps, and what more than one of them has."""
+        return await self._send(Servers, "servers")
 
     async def health(self) -> Health:
         """Whether the process answers."""

@@ -28,6 +28,7 @@ from waymark.api import (
     Readiness,
     Replay,
     RollbackOutcome,
+    Servers,
     TransformResponse,
     Underlay,
     UnderlayPlace,
@@ -53,6 +54,10 @@ class LiveEvents(Stream[LiveEvent]):
 
 class Maps(Base):
     """Operations on maps."""
+
+    def servers(self) -> Servers:
+        """The servers that share a router, with their maps, and what more than one of them has."""
+        return self._send(Servers, "servers")
 
     def health(self) -> Health:
         """Whether the process answers."""

@@ -141,6 +141,7 @@ from waymark.api.robots import (
     UploadedView,
     UploadedViews,
 )
+from waymark.api.servers import ServedMap, ServerBody, Servers
 from waymark.api.stored_answers import (
     AnswerStatus,
     LandmarkIcon,
@@ -301,7 +302,10 @@ __all__ = [
     "Role",
     "RollbackOutcome",
     "Ros2Status",
+    "ServedMap",
+    "ServerBody",
     "ServerEvent",
+    "Servers",
     "Size",
     "SizeAndPlace",
     "StorageHealth",

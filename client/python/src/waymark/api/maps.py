@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from waymark.api.backups import BackupHealth
@@ -164,6 +164,10 @@ class Readiness:
     parts_still_s: dict[str, int] | None = None
     counts: ReadinessCounts = ReadinessCounts(0, 0)
     storage: StorageHealth | None = None
+    # Why the server has no part in the router that it is to join.
+    router: str | None = None
+    # Maps that another server has, too, with the reason: robots are refused on them here.
+    maps_not_served: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,3 +178,5 @@ class Version:
     version: str
     api: str
     protocol: str
+    # Name of the server among those of a router.
+    server: str = ""

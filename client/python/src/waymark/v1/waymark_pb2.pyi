@@ -453,7 +453,7 @@ class Hypothesis(_message.Message):
     def __init__(self, probability: _Optional[float] = ..., map_from_robot: _Optional[_Union[Pose2Covariance, _Mapping]] = ...) -> None: ...
 
 class Answer(_message.Message):
-    __slots__ = ("epoch", "seq", "captured_ns", "map", "map_version", "status", "rejection", "quads", "map_from_robot", "pose_landmarks", "latency_ms", "timings", "clock_suspect", "pose_refusal", "hypotheses", "guided_map_from_robot", "guided_landmarks", "only_expected", "pose_refusal_detail", "camera_pose", "camera_pose_refusal")
+    __slots__ = ("epoch", "seq", "captured_ns", "map", "map_version", "status", "rejection", "quads", "map_from_robot", "pose_landmarks", "latency_ms", "timings", "clock_suspect", "pose_refusal", "hypotheses", "guided_map_from_robot", "guided_landmarks", "only_expected", "pose_refusal_detail", "camera_pose", "camera_pose_refusal", "server")
     EPOCH_FIELD_NUMBER: _ClassVar[int]
     SEQ_FIELD_NUMBER: _ClassVar[int]
     CAPTURED_NS_FIELD_NUMBER: _ClassVar[int]
@@ -475,6 +475,7 @@ class Answer(_message.Message):
     POSE_REFUSAL_DETAIL_FIELD_NUMBER: _ClassVar[int]
     CAMERA_POSE_FIELD_NUMBER: _ClassVar[int]
     CAMERA_POSE_REFUSAL_FIELD_NUMBER: _ClassVar[int]
+    SERVER_FIELD_NUMBER: _ClassVar[int]
     epoch: int
     seq: int
     captured_ns: int
@@ -496,22 +497,25 @@ class Answer(_message.Message):
     pose_refusal_detail: PoseRefusalDetail
     camera_pose: CameraPose
     camera_pose_refusal: str
-    def __init__(self, epoch: _Optional[int] = ..., seq: _Optional[int] = ..., captured_ns: _Optional[int] = ..., map: _Optional[str] = ..., map_version: _Optional[int] = ..., status: _Optional[_Union[Status, str]] = ..., rejection: _Optional[_Union[Rejection, _Mapping]] = ..., quads: _Optional[_Iterable[_Union[QuadAnswer, _Mapping]]] = ..., map_from_robot: _Optional[_Union[Pose2Covariance, _Mapping]] = ..., pose_landmarks: _Optional[_Iterable[str]] = ..., latency_ms: _Optional[float] = ..., timings: _Optional[_Iterable[_Union[StageTime, _Mapping]]] = ..., clock_suspect: bool = ..., pose_refusal: _Optional[str] = ..., hypotheses: _Optional[_Iterable[_Union[Hypothesis, _Mapping]]] = ..., guided_map_from_robot: _Optional[_Union[Pose2Covariance, _Mapping]] = ..., guided_landmarks: _Optional[_Iterable[str]] = ..., only_expected: bool = ..., pose_refusal_detail: _Optional[_Union[PoseRefusalDetail, _Mapping]] = ..., camera_pose: _Optional[_Union[CameraPose, _Mapping]] = ..., camera_pose_refusal: _Optional[str] = ...) -> None: ...
+    server: str
+    def __init__(self, epoch: _Optional[int] = ..., seq: _Optional[int] = ..., captured_ns: _Optional[int] = ..., map: _Optional[str] = ..., map_version: _Optional[int] = ..., status: _Optional[_Union[Status, str]] = ..., rejection: _Optional[_Union[Rejection, _Mapping]] = ..., quads: _Optional[_Iterable[_Union[QuadAnswer, _Mapping]]] = ..., map_from_robot: _Optional[_Union[Pose2Covariance, _Mapping]] = ..., pose_landmarks: _Optional[_Iterable[str]] = ..., latency_ms: _Optional[float] = ..., timings: _Optional[_Iterable[_Union[StageTime, _Mapping]]] = ..., clock_suspect: bool = ..., pose_refusal: _Optional[str] = ..., hypotheses: _Optional[_Iterable[_Union[Hypothesis, _Mapping]]] = ..., guided_map_from_robot: _Optional[_Union[Pose2Covariance, _Mapping]] = ..., guided_landmarks: _Optional[_Iterable[str]] = ..., only_expected: bool = ..., pose_refusal_detail: _Optional[_Union[PoseRefusalDetail, _Mapping]] = ..., camera_pose: _Optional[_Union[CameraPose, _Mapping]] = ..., camera_pose_refusal: _Optional[str] = ..., server: _Optional[str] = ...) -> None: ...
 
 class Odometry(_message.Message):
-    __slots__ = ("epoch", "seq", "captured_ns", "odom_from_robot")
+    __slots__ = ("epoch", "seq", "captured_ns", "odom_from_robot", "map")
     EPOCH_FIELD_NUMBER: _ClassVar[int]
     SEQ_FIELD_NUMBER: _ClassVar[int]
     CAPTURED_NS_FIELD_NUMBER: _ClassVar[int]
     ODOM_FROM_ROBOT_FIELD_NUMBER: _ClassVar[int]
+    MAP_FIELD_NUMBER: _ClassVar[int]
     epoch: int
     seq: int
     captured_ns: int
     odom_from_robot: Pose2
-    def __init__(self, epoch: _Optional[int] = ..., seq: _Optional[int] = ..., captured_ns: _Optional[int] = ..., odom_from_robot: _Optional[_Union[Pose2, _Mapping]] = ...) -> None: ...
+    map: str
+    def __init__(self, epoch: _Optional[int] = ..., seq: _Optional[int] = ..., captured_ns: _Optional[int] = ..., odom_from_robot: _Optional[_Union[Pose2, _Mapping]] = ..., map: _Optional[str] = ...) -> None: ...
 
 class Scan(_message.Message):
-    __slots__ = ("epoch", "seq", "captured_ns", "odom_from_robot", "robot_from_laser", "first_bearing_rad", "bearing_step_rad", "max_range_m", "ranges_m")
+    __slots__ = ("epoch", "seq", "captured_ns", "odom_from_robot", "robot_from_laser", "first_bearing_rad", "bearing_step_rad", "max_range_m", "ranges_m", "map")
     EPOCH_FIELD_NUMBER: _ClassVar[int]
     SEQ_FIELD_NUMBER: _ClassVar[int]
     CAPTURED_NS_FIELD_NUMBER: _ClassVar[int]
@@ -521,6 +525,7 @@ class Scan(_message.Message):
     BEARING_STEP_RAD_FIELD_NUMBER: _ClassVar[int]
     MAX_RANGE_M_FIELD_NUMBER: _ClassVar[int]
     RANGES_M_FIELD_NUMBER: _ClassVar[int]
+    MAP_FIELD_NUMBER: _ClassVar[int]
     epoch: int
     seq: int
     captured_ns: int
@@ -530,10 +535,11 @@ class Scan(_message.Message):
     bearing_step_rad: float
     max_range_m: float
     ranges_m: _containers.RepeatedScalarFieldContainer[float]
-    def __init__(self, epoch: _Optional[int] = ..., seq: _Optional[int] = ..., captured_ns: _Optional[int] = ..., odom_from_robot: _Optional[_Union[Pose2, _Mapping]] = ..., robot_from_laser: _Optional[_Union[Pose2, _Mapping]] = ..., first_bearing_rad: _Optional[float] = ..., bearing_step_rad: _Optional[float] = ..., max_range_m: _Optional[float] = ..., ranges_m: _Optional[_Iterable[float]] = ...) -> None: ...
+    map: str
+    def __init__(self, epoch: _Optional[int] = ..., seq: _Optional[int] = ..., captured_ns: _Optional[int] = ..., odom_from_robot: _Optional[_Union[Pose2, _Mapping]] = ..., robot_from_laser: _Optional[_Union[Pose2, _Mapping]] = ..., first_bearing_rad: _Optional[float] = ..., bearing_step_rad: _Optional[float] = ..., max_range_m: _Optional[float] = ..., ranges_m: _Optional[_Iterable[float]] = ..., map: _Optional[str] = ...) -> None: ...
 
 class RobotPose(_message.Message):
-    __slots__ = ("epoch", "captured_ns", "map", "map_from_robot", "modalities", "corrections", "laser_corrections", "age_ms", "trust")
+    __slots__ = ("epoch", "captured_ns", "map", "map_from_robot", "modalities", "corrections", "laser_corrections", "age_ms", "trust", "server")
     EPOCH_FIELD_NUMBER: _ClassVar[int]
     CAPTURED_NS_FIELD_NUMBER: _ClassVar[int]
     MAP_FIELD_NUMBER: _ClassVar[int]
@@ -543,6 +549,7 @@ class RobotPose(_message.Message):
     LASER_CORRECTIONS_FIELD_NUMBER: _ClassVar[int]
     AGE_MS_FIELD_NUMBER: _ClassVar[int]
     TRUST_FIELD_NUMBER: _ClassVar[int]
+    SERVER_FIELD_NUMBER: _ClassVar[int]
     epoch: int
     captured_ns: int
     map: str
@@ -552,18 +559,21 @@ class RobotPose(_message.Message):
     laser_corrections: int
     age_ms: float
     trust: PoseTrust
-    def __init__(self, epoch: _Optional[int] = ..., captured_ns: _Optional[int] = ..., map: _Optional[str] = ..., map_from_robot: _Optional[_Union[Pose2Covariance, _Mapping]] = ..., modalities: _Optional[_Iterable[str]] = ..., corrections: _Optional[int] = ..., laser_corrections: _Optional[int] = ..., age_ms: _Optional[float] = ..., trust: _Optional[_Union[PoseTrust, str]] = ...) -> None: ...
+    server: str
+    def __init__(self, epoch: _Optional[int] = ..., captured_ns: _Optional[int] = ..., map: _Optional[str] = ..., map_from_robot: _Optional[_Union[Pose2Covariance, _Mapping]] = ..., modalities: _Optional[_Iterable[str]] = ..., corrections: _Optional[int] = ..., laser_corrections: _Optional[int] = ..., age_ms: _Optional[float] = ..., trust: _Optional[_Union[PoseTrust, str]] = ..., server: _Optional[str] = ...) -> None: ...
 
 class MapChanged(_message.Message):
-    __slots__ = ("map", "version")
+    __slots__ = ("map", "version", "server")
     MAP_FIELD_NUMBER: _ClassVar[int]
     VERSION_FIELD_NUMBER: _ClassVar[int]
+    SERVER_FIELD_NUMBER: _ClassVar[int]
     map: str
     version: int
-    def __init__(self, map: _Optional[str] = ..., version: _Optional[int] = ...) -> None: ...
+    server: str
+    def __init__(self, map: _Optional[str] = ..., version: _Optional[int] = ..., server: _Optional[str] = ...) -> None: ...
 
 class GazeRequest(_message.Message):
-    __slots__ = ("map_from_robot", "camera_x_m", "camera_y_m", "camera_z_m", "pan_rad", "tilt_rad", "rate_radps", "pan_range_rad", "tilt_range_rad", "criterion", "at_ns", "looked_at", "recognised")
+    __slots__ = ("map_from_robot", "camera_x_m", "camera_y_m", "camera_z_m", "pan_rad", "tilt_rad", "rate_radps", "pan_range_rad", "tilt_range_rad", "criterion", "at_ns", "looked_at", "recognised", "map")
     MAP_FROM_ROBOT_FIELD_NUMBER: _ClassVar[int]
     CAMERA_X_M_FIELD_NUMBER: _ClassVar[int]
     CAMERA_Y_M_FIELD_NUMBER: _ClassVar[int]
@@ -577,6 +587,7 @@ class GazeRequest(_message.Message):
     AT_NS_FIELD_NUMBER: _ClassVar[int]
     LOOKED_AT_FIELD_NUMBER: _ClassVar[int]
     RECOGNISED_FIELD_NUMBER: _ClassVar[int]
+    MAP_FIELD_NUMBER: _ClassVar[int]
     map_from_robot: Pose2Covariance
     camera_x_m: float
     camera_y_m: float
@@ -590,10 +601,11 @@ class GazeRequest(_message.Message):
     at_ns: int
     looked_at: str
     recognised: bool
-    def __init__(self, map_from_robot: _Optional[_Union[Pose2Covariance, _Mapping]] = ..., camera_x_m: _Optional[float] = ..., camera_y_m: _Optional[float] = ..., camera_z_m: _Optional[float] = ..., pan_rad: _Optional[float] = ..., tilt_rad: _Optional[float] = ..., rate_radps: _Optional[float] = ..., pan_range_rad: _Optional[_Iterable[float]] = ..., tilt_range_rad: _Optional[_Iterable[float]] = ..., criterion: _Optional[_Union[GazeCriterion, str]] = ..., at_ns: _Optional[int] = ..., looked_at: _Optional[str] = ..., recognised: bool = ...) -> None: ...
+    map: str
+    def __init__(self, map_from_robot: _Optional[_Union[Pose2Covariance, _Mapping]] = ..., camera_x_m: _Optional[float] = ..., camera_y_m: _Optional[float] = ..., camera_z_m: _Optional[float] = ..., pan_rad: _Optional[float] = ..., tilt_rad: _Optional[float] = ..., rate_radps: _Optional[float] = ..., pan_range_rad: _Optional[_Iterable[float]] = ..., tilt_range_rad: _Optional[_Iterable[float]] = ..., criterion: _Optional[_Union[GazeCriterion, str]] = ..., at_ns: _Optional[int] = ..., looked_at: _Optional[str] = ..., recognised: bool = ..., map: _Optional[str] = ...) -> None: ...
 
 class GazeAdvice(_message.Message):
-    __slots__ = ("map", "map_version", "rejection", "action", "landmark", "pan_rad", "tilt_rad", "utility", "probability", "margin_m", "gain_nats", "range_m", "incidence_rad")
+    __slots__ = ("map", "map_version", "rejection", "action", "landmark", "pan_rad", "tilt_rad", "utility", "probability", "margin_m", "gain_nats", "range_m", "incidence_rad", "server")
     MAP_FIELD_NUMBER: _ClassVar[int]
     MAP_VERSION_FIELD_NUMBER: _ClassVar[int]
     REJECTION_FIELD_NUMBER: _ClassVar[int]
@@ -607,6 +619,7 @@ class GazeAdvice(_message.Message):
     GAIN_NATS_FIELD_NUMBER: _ClassVar[int]
     RANGE_M_FIELD_NUMBER: _ClassVar[int]
     INCIDENCE_RAD_FIELD_NUMBER: _ClassVar[int]
+    SERVER_FIELD_NUMBER: _ClassVar[int]
     map: str
     map_version: int
     rejection: Rejection
@@ -620,7 +633,8 @@ class GazeAdvice(_message.Message):
     gain_nats: float
     range_m: float
     incidence_rad: float
-    def __init__(self, map: _Optional[str] = ..., map_version: _Optional[int] = ..., rejection: _Optional[_Union[Rejection, _Mapping]] = ..., action: _Optional[_Union[GazeAction, str]] = ..., landmark: _Optional[str] = ..., pan_rad: _Optional[float] = ..., tilt_rad: _Optional[float] = ..., utility: _Optional[float] = ..., probability: _Optional[float] = ..., margin_m: _Optional[float] = ..., gain_nats: _Optional[float] = ..., range_m: _Optional[float] = ..., incidence_rad: _Optional[float] = ...) -> None: ...
+    server: str
+    def __init__(self, map: _Optional[str] = ..., map_version: _Optional[int] = ..., rejection: _Optional[_Union[Rejection, _Mapping]] = ..., action: _Optional[_Union[GazeAction, str]] = ..., landmark: _Optional[str] = ..., pan_rad: _Optional[float] = ..., tilt_rad: _Optional[float] = ..., utility: _Optional[float] = ..., probability: _Optional[float] = ..., margin_m: _Optional[float] = ..., gain_nats: _Optional[float] = ..., range_m: _Optional[float] = ..., incidence_rad: _Optional[float] = ..., server: _Optional[str] = ...) -> None: ...
 
 class LocaliseRequest(_message.Message):
     __slots__ = ("frame", "scan", "map", "deadline_ms")
@@ -647,7 +661,7 @@ class LocaliseHypothesis(_message.Message):
     def __init__(self, map_from_robot: _Optional[_Union[Pose2Covariance, _Mapping]] = ..., probability: _Optional[float] = ..., landmarks: _Optional[_Iterable[str]] = ..., matched: _Optional[float] = ...) -> None: ...
 
 class LocaliseReply(_message.Message):
-    __slots__ = ("rejection", "map", "map_version", "status", "reason", "map_from_robot", "hypotheses", "answer")
+    __slots__ = ("rejection", "map", "map_version", "status", "reason", "map_from_robot", "hypotheses", "answer", "server")
     REJECTION_FIELD_NUMBER: _ClassVar[int]
     MAP_FIELD_NUMBER: _ClassVar[int]
     MAP_VERSION_FIELD_NUMBER: _ClassVar[int]
@@ -656,6 +670,7 @@ class LocaliseReply(_message.Message):
     MAP_FROM_ROBOT_FIELD_NUMBER: _ClassVar[int]
     HYPOTHESES_FIELD_NUMBER: _ClassVar[int]
     ANSWER_FIELD_NUMBER: _ClassVar[int]
+    SERVER_FIELD_NUMBER: _ClassVar[int]
     rejection: Rejection
     map: str
     map_version: int
@@ -664,4 +679,5 @@ class LocaliseReply(_message.Message):
     map_from_robot: Pose2Covariance
     hypotheses: _containers.RepeatedCompositeFieldContainer[LocaliseHypothesis]
     answer: Answer
-    def __init__(self, rejection: _Optional[_Union[Rejection, _Mapping]] = ..., map: _Optional[str] = ..., map_version: _Optional[int] = ..., status: _Optional[_Union[LocaliseStatus, str]] = ..., reason: _Optional[str] = ..., map_from_robot: _Optional[_Union[Pose2Covariance, _Mapping]] = ..., hypotheses: _Optional[_Iterable[_Union[LocaliseHypothesis, _Mapping]]] = ..., answer: _Optional[_Union[Answer, _Mapping]] = ...) -> None: ...
+    server: str
+    def __init__(self, rejection: _Optional[_Union[Rejection, _Mapping]] = ..., map: _Optional[str] = ..., map_version: _Optional[int] = ..., status: _Optional[_Union[LocaliseStatus, str]] = ..., reason: _Optional[str] = ..., map_from_robot: _Optional[_Union[Pose2Covariance, _Mapping]] = ..., hypotheses: _Optional[_Iterable[_Union[LocaliseHypothesis, _Mapping]]] = ..., answer: _Optional[_Union[Answer, _Mapping]] = ..., server: _Optional[str] = ...) -> None: ...
