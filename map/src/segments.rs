@@ -10,7 +10,7 @@ use std::f64::consts::PI;
 
 /// Shortest length of a segment, metres.
 pub const MIN_SEGMENT_M: f64 = 0.01;
-/// Standard deviation of a wall given by hand, across it, metres.
+/// Standard deviation of each end of a wall given by hand, across it, metres.
 const BY_HAND_SIGMA_M: f64 = 0.01;
 
 /// A straight piece of wall. `a` to `b` runs so that the free side, from which it was measured, is on the left: the
@@ -83,13 +83,14 @@ impl LaserSegment {
         (if is_same { 1.0 } else { -1.0 }, Vector2::new(-n.y, n.x).dot(&middle.coords))
     }
 
-    /// From ends `[ax, ay, bx, by]` (metres) measured by hand, each known to 1 cm across the wall.
+    /// From ends `[ax, ay, bx, by]` (metres) measured by hand, each known to 1 cm across the wall, independently.
     pub fn by_hand(&[ax, ay, bx, by]: &[f64; 4]) -> Result<Self, OutOfRange> {
         let (a, b) = (Point2::new(ax, ay), Point2::new(bx, by));
         let length = (b - a).norm().max(MIN_SEGMENT_M);
         let variance = BY_HAND_SIGMA_M * BY_HAND_SIGMA_M;
-        // Each end is known to sigma: the direction to sqrt(2) sigma / length, the middle to sigma at most.
-        let covariance = Matrix2::new(2.0 * variance / (length * length), 0.0, 0.0, variance);
+        // Offset of the middle: half the sum of those of the ends; direction: their difference by the length. The two are
+        // uncorrelated about the middle, and about no other point.
+        let covariance = Matrix2::new(2.0 * variance / (length * length), 0.0, 0.0, 0.5 * variance);
         Self::about_middle(a, b, &covariance)
     }
 
@@ -151,6 +152,8 @@ impl LaserSegment {
 mod tests {
     use super::*;
     use nalgebra::{Matrix3, Vector3};
+    use rand::{RngExt as _, SeedableRng as _};
+    use rand_chacha::ChaCha8Rng;
 
     fn wall() -> LaserSegment {
         let covariance = Matrix2::new(1e-4, 3e-5, 3e-5, 2e-4);
@@ -167,13 +170,71 @@ mod tests {
         assert!((back.rho_m - w.rho_m).abs() < 1e-12);
     }
 
+    /// Variance of a point of the wall's line across it, by (alpha, rho) alone, m^2. `along` runs from 0 at `a` to 1 at `b`.
+    fn variance_across(wall: &LaserSegment, along: f64) -> f64 {
+        let p = wall.a + (wall.b - wall.a) * along;
+        let (s, c) = wall.alpha_rad.sin_cos();
+        // Offset of the point from the line: cos(alpha) x + sin(alpha) y - rho.
+        let j = Vector2::new(c * p.y - s * p.x, -1.0);
+        (j.transpose() * wall.covariance * j)[0]
+    }
+
+    /// What two independent ends give: a quarter of the sum in the middle, all of one at its end.
+    fn by_ends(along: f64) -> f64 {
+        let sigma = BY_HAND_SIGMA_M;
+        sigma * sigma * ((1.0 - along).powi(2) + along.powi(2))
+    }
+
     #[test]
-    fn a_wall_by_hand_is_as_well_known_far_from_the_origin() {
-        let expected = Matrix2::new(2.0 * 1e-4 / 4.0, 0.0, 0.0, 1e-4);
-        for far_m in [0.0, 300.0] {
-            let wall = LaserSegment::by_hand(&[far_m, far_m, far_m + 2.0, far_m]).unwrap();
-            assert!((wall.covariance_about_middle() - expected).norm() < 1e-9, "{far_m} m from the origin");
+    fn points_of_a_wall_by_hand_are_as_well_known_wherever_the_origin_is() {
+        let mut random = ChaCha8Rng::seed_from_u64(5);
+        for _ in 0..2000 {
+            let mut draw = |low: f64, high: f64| random.random_range(low..high);
+            let (x, y, length, turn) = (draw(-1e4, 1e4), draw(-1e4, 1e4), draw(0.2, 50.0), draw(-PI, PI));
+            let (along, pose) =
+                (draw(-0.5, 1.5), Pose2::new(draw(-1e4, 1e4), draw(-1e4, 1e4), draw(-PI, PI)));
+            let (s, c) = turn.sin_cos();
+            let wall = LaserSegment::by_hand(&[x, y, x + length * c, y + length * s]).unwrap();
+            let moved = wall.transformed(&Pose2Covariance { pose, covariance: Matrix3::zeros() });
+            let again = LaserSegment::by_hand(&[moved.a.x, moved.a.y, moved.b.x, moved.b.y]).unwrap();
+            for (wall, what) in [(&wall, "given"), (&moved, "moved"), (&again, "given where it was moved to")]
+            {
+                let (variance, expected) = (variance_across(wall, along), by_ends(along));
+                assert!((variance - expected).abs() < 1e-3 * expected, "{what}: {variance}, not {expected}");
+                let offset = wall.covariance_about_middle()[(1, 1)];
+                assert!((offset - by_ends(0.5)).abs() < 1e-3 * by_ends(0.5), "{what}: {offset}");
+            }
         }
+    }
+
+    #[test]
+    fn ends_drawn_anew_give_the_covariance_of_a_wall_by_hand() {
+        // Oracle: both ends moved by what a tape measure is wrong, far from the origin.
+        let (a, b) = (Point2::new(300.0, 299.0), Point2::new(302.0, 300.0));
+        let wall = LaserSegment::by_hand(&[a.x, a.y, b.x, b.y]).unwrap();
+        let mut sum = Matrix2::zeros();
+        let step = BY_HAND_SIGMA_M * 1e-3;
+        for (da, db) in [(step, 0.0), (0.0, step)] {
+            let (n, zero) = (wall.facing(), Matrix2::zeros());
+            let off =
+                |sign: f64| LaserSegment::from_ends(a + n * da * sign, b + n * db * sign, zero).unwrap();
+            let (up, down) = (off(1.0), off(-1.0));
+            let d = Vector2::new(wrap_rad(up.alpha_rad - down.alpha_rad), up.rho_m - down.rho_m) / 2e-3;
+            sum += d * d.transpose();
+        }
+        for k in 0..4 {
+            let (i, j) = (k / 2, k % 2);
+            let weight = (sum[(i, i)] * sum[(j, j)]).sqrt();
+            assert!(
+                (sum[(i, j)] - wall.covariance[(i, j)]).abs() < 1e-6 * weight,
+                "{sum} {}",
+                wall.covariance
+            );
+        }
+        assert!(
+            sum[(0, 1)].abs() > 0.99 * (sum[(0, 0)] * sum[(1, 1)]).sqrt(),
+            "direction and distance go together far from the origin"
+        );
     }
 
     #[test]
