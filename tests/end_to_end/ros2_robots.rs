@@ -2,6 +2,7 @@
 //! get the answers that a native robot gets for the same data; poses and transforms come back as ROS has them; a
 //! publisher that waits for a subscriber is woken; what is no message of the robot changes nothing and is counted.
 
+mod encrypted;
 mod run;
 
 use map::pose2::Pose2;
@@ -18,7 +19,9 @@ use tests::{
     documents::root,
     eventually,
     robots::{call, teach},
-    ros::{COMPRESSED_IMAGE, DETECTIONS, IMAGE, ODOMETRY, POSE, RosRobot, Speech, TF_MESSAGE},
+    ros::{
+        COMPRESSED_IMAGE, DETECTIONS, IMAGE, ODOMETRY, POSE, RosRobot, Speech, TF_MESSAGE, encrypted_router,
+    },
 };
 
 /// Frames with the landmark that are compared.
@@ -271,10 +274,16 @@ fn settings_of_the_guide_are_understood() {
         let raw = RawConfig::read(Some(&path)).expect("settings");
         robots += Config::try_from(raw).expect("valid settings").ros2.len();
     }
-    assert_eq!(robots, 2);
+    assert_eq!(robots, 3);
     let router = std::fs::read_to_string(root().join("client/ros2/router.json5")).expect("a file");
     let router = zenoh::Config::from_json5(&router).expect("settings of zenoh");
     assert!(router.get_json("connect/endpoints").expect("endpoints").contains("tcp/maps.example:7447"));
     let places = router.get_json("transport/link/tx/queue/size/interactive_high");
     assert_eq!(places.expect("room for the messages of a frame"), "8");
+    // The encrypted one is the same otherwise; tests connect with it.
+    let encrypted = encrypted_router("tls/127.0.0.1:1", "tcp/127.0.0.1:1", folder.path());
+    for key in ["mode", "connect/exit_on_failure", "transport/link/tx/queue/size/interactive_high"] {
+        assert_eq!(encrypted.get_json(key).expect(key), router.get_json(key).expect(key), "{key}");
+    }
+    assert_eq!(encrypted.get_json("transport/link/tls/enable_mtls").expect("a switch"), "true");
 }

@@ -5,14 +5,16 @@
 //! `attachment_helpers.cpp` beside it; `eclipse-zenoh/zenoh-plugin-ros2dds src/liveliness_mgt.rs`; hashes of rosbags'
 //! type stores.
 
-use crate::{SOON, eventually};
+use crate::{SOON, documents::root, eventually};
 use std::{
     collections::BTreeMap,
     net::TcpListener,
+    path::Path,
     sync::{Arc, Mutex},
 };
 use zenoh::{
-    Session, Wait, liveliness::LivelinessToken, pubsub::Subscriber, query::Queryable, sample::SampleKind,
+    Config, Session, Wait, liveliness::LivelinessToken, pubsub::Subscriber, query::Queryable,
+    sample::SampleKind,
 };
 
 /// A type with the hash of its definition.
@@ -90,11 +92,23 @@ pub struct RosRobot {
 impl RosRobot {
     /// Starts router and node, and connects the router to the server's endpoint.
     pub async fn start(server: &str, speech: Speech) -> Self {
-        let free = TcpListener::bind("127.0.0.1:0").expect("a free port");
-        let own = format!("tcp/{}", free.local_addr().expect("its address"));
-        drop(free);
-        let router = open("router", server, Some(&own)).await;
-        let node = open("client", &own, None).await;
+        let own = free_endpoint();
+        let router = open(settings("router", server, Some(&own))).await;
+        Self::behind(router, settings("client", &own, None), speech).await
+    }
+
+    /// The same on an encrypted endpoint, with the certificate in `folder` and the settings that the guide shows: those of
+    /// the router, and the namespace of the nodes.
+    pub async fn start_encrypted(server: &str, speech: Speech, folder: &Path, namespace: &str) -> Self {
+        let own = free_endpoint();
+        let router = open(encrypted_router(server, &own, folder)).await;
+        let mut node = settings("client", &own, None);
+        node.insert_json5("namespace", &format!("\"{namespace}\"")).expect("a namespace");
+        Self::behind(router, node, speech).await
+    }
+
+    async fn behind(router: Session, node: Config, speech: Speech) -> Self {
+        let node = open(node).await;
         let graph: Arc<Mutex<BTreeMap<String, bool>>> = Arc::default();
         let noted = graph.clone();
         let tokens = match speech {
@@ -224,10 +238,16 @@ impl RosRobot {
     }
 }
 
-/// A session with the settings of `client/ros2/router.json5`.
-async fn open(mode: &str, connect: &str, listen: Option<&str>) -> Session {
+/// A plain endpoint where nobody listens.
+pub fn free_endpoint() -> String {
+    let free = TcpListener::bind("127.0.0.1:0").expect("a free port");
+    format!("tcp/{}", free.local_addr().expect("its address"))
+}
+
+/// The settings of `client/ros2/router.json5`.
+fn settings(mode: &str, connect: &str, listen: Option<&str>) -> Config {
     let listen = listen.map_or(String::new(), |endpoint| format!("\"{endpoint}\""));
-    let config = zenoh::Config::from_json5(&format!(
+    let config = Config::from_json5(&format!(
         r#"{{
             mode: "{mode}",
             connect: {{ endpoints: ["{connect}"] }},
@@ -236,6 +256,24 @@ async fn open(mode: &str, connect: &str, listen: Option<&str>) -> Session {
             transport: {{ link: {{ tx: {{ queue: {{ size: {{ interactive_high: 8 }} }} }} }} }},
         }}"#
     ));
-    let opened = tokio::time::timeout(SOON, zenoh::open(config.expect("settings of zenoh"))).await;
+    config.expect("settings of zenoh")
+}
+
+/// `client/ros2/router_tls.json5` as a person changes it: the address of the server, and where the robot's files are. Besides,
+/// the router listens where nobody else does.
+pub fn encrypted_router(server: &str, listen: &str, folder: &Path) -> Config {
+    let path = root().join("client/ros2/router_tls.json5");
+    let shown = std::fs::read_to_string(path).expect("the settings of the guide");
+    let changed = shown.replace("tls/maps.example:7447", server);
+    let changed = changed.replace("/etc/waymark/r1", folder.to_str().expect("a path"));
+    assert!(!changed.contains("maps.example") && !changed.contains("/etc/"), "{changed}");
+    let mut config = Config::from_json5(&changed).expect("settings of zenoh");
+    config.insert_json5("listen/endpoints", &format!("[\"{listen}\"]")).expect("an endpoint");
+    config.insert_json5("scouting/multicast/enabled", "false").expect("a switch");
+    config
+}
+
+async fn open(config: Config) -> Session {
+    let opened = tokio::time::timeout(SOON, zenoh::open(config)).await;
     opened.expect("in time").expect("an open session")
 }

@@ -25,7 +25,7 @@ pub use outbox::Outbox;
 pub(crate) use ping::Pinger;
 
 use crate::{
-    config::Config,
+    config::{Config, Middleware, Ros2Robot},
     fleet::{Duty, Fleet},
     identity::certificates::{CertificateRegistry, Certificates, LinkCertificates},
     store::now_ms,
@@ -197,6 +197,7 @@ impl Bus {
         let gate = match encrypted.zip(link) {
             None => None,
             Some((certificates, (link_endpoint, link))) => {
+                warn_of_ros2(&config.ros2);
                 let settings = GateSettings {
                     endpoint: endpoint.clone(),
                     link_endpoint,
@@ -272,6 +273,19 @@ async fn close(session: &zenoh::Session) {
 fn begin_changes(to: &Receivers, outbox: &Outbox) -> JoinHandle<()> {
     let pulse = to.vitals.begin("the task that forwards map changes");
     tokio::spawn(forward_map_changes(to.clone(), outbox.clone(), pulse))
+}
+
+/// Robots of ROS that access control does not let through.
+fn warn_of_ros2(robots: &[Ros2Robot]) {
+    for Ros2Robot { robot, middleware, .. } in robots.iter().filter(|robot| robot.own_prefix().is_none()) {
+        let follows = "with a certificate it is never heard: give it a `key_prefix`";
+        tracing::warn!(%robot, ?middleware, follows, "ros2_robot_without_prefix");
+    }
+    for Ros2Robot { robot, .. } in robots.iter().filter(|robot| robot.middleware == Middleware::BridgeDds) {
+        let follows =
+            "with a certificate it is never heard: its bridge declares its graph outside of its prefix";
+        tracing::warn!(%robot, follows, "ros2_bridge_in_plain_text_only");
+    }
 }
 
 fn plain(config: &Config, listen: Vec<String>) -> RouterSettings<'_> {

@@ -7,20 +7,27 @@ use ros2::messages::{
     CameraInfo, CompressedImage, Header, Image, LaserScan, Message, Odometry, Pose, PoseWithCovariance,
     Quaternion, TFMessage, Time, Transform, TransformStamped, Vector3,
 };
-use server::config::{Limits, RawConfig, RawRos2, RawRos2Robot};
+use server::config::{Limits, RawConfig, RawRos2, RawRos2Robot, RawTls};
 use sim::{
     building::Building,
     corridor::CorridorParams,
     robot::{RobotParams, SensorReadings},
 };
 use std::{
+    path::PathBuf,
     sync::{Arc, Mutex},
     time::{Duration, SystemTime, UNIX_EPOCH},
 };
+use tempfile::TempDir;
 use tests::{
-    Inside, eventually,
+    Inside, SOON,
+    command::waymark,
+    eventually,
     robots::{MAP, jpeg, put_walls},
-    ros::{CAMERA_INFO, COMPRESSED_IMAGE, IMAGE, LASER_SCAN, ODOMETRY, RosRobot, Speech, TF_MESSAGE, Type},
+    ros::{
+        CAMERA_INFO, COMPRESSED_IMAGE, IMAGE, LASER_SCAN, ODOMETRY, RosRobot, Speech, TF_MESSAGE, Type,
+        free_endpoint,
+    },
 };
 use zenoh::{Session, qos::CongestionControl};
 
@@ -55,10 +62,9 @@ pub(super) struct Native {
 }
 
 impl Native {
-    pub(super) async fn connect(inside: &Inside) -> Self {
+    pub(super) async fn connect(endpoint: &str) -> Self {
         let config = format!(
-            r#"{{ mode: "client", connect: {{ endpoints: ["{}"] }}, scouting: {{ multicast: {{ enabled: false }} }} }}"#,
-            inside.server.zenoh_endpoint
+            r#"{{ mode: "client", connect: {{ endpoints: ["{endpoint}"] }}, scouting: {{ multicast: {{ enabled: false }} }} }}"#
         );
         let session = zenoh::open(zenoh::Config::from_json5(&config).expect("settings")).await.expect("open");
         let seen = Published::default();
@@ -187,6 +193,15 @@ pub(super) fn scan(ns: i64, readings: &SensorReadings) -> LaserScan<'static> {
     }
 }
 
+/// Enrols a robot, as a person does. Where its files are.
+pub(super) fn enrol(inside: &Inside, robot: &str, folders: &TempDir) -> PathBuf {
+    let folder = folders.path().join(robot);
+    let out = folder.to_str().expect("a path");
+    let run = waymark(["robot", "enrol", robot, "--out", out, "--server", &inside.url()], SOON);
+    assert_eq!(run.status, 0, "{run:?}");
+    folder
+}
+
 /// A server with a taught corridor, a robot of ROS and a native one.
 pub(super) struct Run {
     pub(super) inside: Inside,
@@ -195,6 +210,8 @@ pub(super) struct Run {
     pub(super) ros: RosRobot,
     /// What was sent, by capture time.
     pub(super) odometry: Vec<(i64, Pose2)>,
+    /// Certificates of robots, where the endpoint is encrypted.
+    pub(super) certificates: Option<TempDir>,
 }
 
 const TOPICS: [(&str, Type); 5] = [
@@ -207,8 +224,26 @@ const TOPICS: [(&str, Type); 5] = [
 
 impl Run {
     pub(super) async fn start(speech: Speech, change: impl FnOnce(&mut RawRos2Robot)) -> Self {
+        Self::start_on(speech, None, change).await
+    }
+
+    /// The same with the encrypted endpoint. The robot of ROS has a certificate and this namespace; the native one comes from
+    /// the server's own machine.
+    pub(super) async fn start_encrypted(
+        domain: u32,
+        namespace: &str,
+        change: impl FnOnce(&mut RawRos2Robot),
+    ) -> Self {
+        Self::start_on(Speech::Rmw(domain), Some(namespace), change).await
+    }
+
+    async fn start_on(
+        speech: Speech,
+        encrypted: Option<&str>,
+        change: impl FnOnce(&mut RawRos2Robot),
+    ) -> Self {
         let (bridge, domain, key_prefix) = match speech {
-            Speech::Rmw(domain) => (false, domain, String::new()),
+            Speech::Rmw(domain) => (false, domain, encrypted.unwrap_or_default().to_owned()),
             Speech::Bridge(namespace) => (true, 0, namespace.to_owned()),
         };
         let mut robot =
@@ -217,7 +252,13 @@ impl Run {
         let ros2 = RawRos2 { robot: vec![robot] };
         // Busy machines take longer than half a second for a frame.
         let limits = Limits { frame_deadline_ms: 60_000, ..Limits::default() };
-        let inside = Inside::start_with(RawConfig { ros2, limits, ..RawConfig::default() }).await;
+        let local = encrypted.map(|_| free_endpoint());
+        let tls = RawTls {
+            enabled: encrypted.is_some(),
+            local_zenoh: local.clone().unwrap_or_default(),
+            ..RawTls::default()
+        };
+        let inside = Inside::start_with(RawConfig { ros2, limits, tls, ..RawConfig::default() }).await;
         let params = CorridorParams { posters: 1, column: false, ..CorridorParams::default() };
         let building = Arc::new(Building::corridor_with(&params, 3));
         inside.maps().create_map(&client::api::NewMap::new(MAP)).await.expect("map");
@@ -225,9 +266,17 @@ impl Run {
         for robot in ["r1", "native"] {
             inside.maps().put_robot(robot, MAP).await.expect("robot");
         }
-        let native = Native::connect(&inside).await;
-        let ros = RosRobot::start(&inside.server.zenoh_endpoint, speech).await;
-        Self { inside, building, native, ros, odometry: Vec::new() }
+        let endpoint = &inside.server.zenoh_endpoint;
+        let native = Native::connect(local.as_ref().unwrap_or(endpoint)).await;
+        let certificates = encrypted.map(|_| TempDir::new().expect("a folder"));
+        let ros = match encrypted.zip(certificates.as_ref()) {
+            None => RosRobot::start(endpoint, speech).await,
+            Some((namespace, folder)) => {
+                let folder = enrol(&inside, "r1", folder);
+                RosRobot::start_encrypted(endpoint, speech, &folder, namespace).await
+            }
+        };
+        Self { inside, building, native, ros, odometry: Vec::new(), certificates }
     }
 
     /// Announces what a robot with camera and laser publishes, and waits until the images are subscribed to.
