@@ -28,7 +28,9 @@ pub const INBOX: usize = 64;
 const HELLO_WAIT: Duration = Duration::from_millis(500);
 /// Time between two questions for it.
 const HELLO_EVERY: Duration = Duration::from_millis(50);
-/// A session that was not greeted for so long is opened anew.
+/// A session that was not greeted for so long is opened anew; each later one is given twice the time of the one before.
+const FIRST_GREETED: Duration = Duration::from_millis(500);
+/// The most that is given to one session.
 const GREETED: Duration = Duration::from_secs(2);
 
 /// Behaviour when the link is full.
@@ -80,33 +82,35 @@ impl RobotOptions {
 /// Opens an encrypted session and waits until the server answers a hello: with a certificate that gives no access, everything
 /// is dropped without a word.
 ///
-/// A session that is not greeted within [`GREETED`] is opened anew. One that meets the server's gate in the moment in which that
-/// closes, to open again with other rights, may keep a link to what was closed, or none at all, for ever: zenoh connects again
-/// only after a link that it has seen to begin and to end.
+/// A session that is not greeted is opened anew. One that meets the server's gate in the moment in which that closes, to open
+/// again with other rights, may keep a link to what was closed, or none at all, for ever: zenoh connects again only after a
+/// link that it has seen to begin and to end. The first sessions are given up early, so that there is time for several: rights
+/// may change more than once in a row. That the robot is not admitted is said only if the last session was linked or something
+/// still listens: nobody does while the gate is closed.
 async fn admitted(keys: &Keys, robot: &Name, options: &RobotOptions) -> Result<zenoh::Session, ClientError> {
     let (key, until) = (keys.build(&Key::Hello(robot.clone())), Instant::now() + options.timeout);
     let endpoint = || options.endpoint.clone();
     let silent = || ClientError::NotAdmitted { robot: robot.to_string(), endpoint: endpoint() };
-    let (mut left, mut was_linked) = (options.timeout, false);
+    let (mut left, mut was_linked, mut patience) = (options.timeout, false, FIRST_GREETED);
     loop {
         let session = match transport::open(&RobotOptions { timeout: left, ..options.clone() }).await {
             Ok(session) => session,
             // The server was there and silent: that says more than that the rest of the time was too short for one more link.
-            Err(ClientError::Unreachable { .. } | ClientError::TlsRefused { .. }) if was_linked => {
-                return Err(silent());
-            }
+            Err(ClientError::TlsRefused { .. }) if was_linked => return Err(silent()),
             Err(error) => return Err(error),
         };
-        if is_greeted(&session, &key, until.min(Instant::now() + GREETED)).await? {
+        if is_greeted(&session, &key, until.min(Instant::now() + patience)).await? {
             return Ok(session);
         }
-        was_linked |= session.info().routers_zid().await.next().is_some();
+        let is_linked = session.info().routers_zid().await.next().is_some();
+        was_linked |= is_linked;
         session.close().await.map_err(fault("close the session"))?;
+        patience = GREETED.min(2 * patience);
         left = until.saturating_duration_since(Instant::now());
         if left < HELLO_WAIT {
             let detail = "the connection was closed, and there is no other".to_owned();
             let lost = || ClientError::Unreachable { endpoint: endpoint(), detail };
-            return Err(if was_linked { silent() } else { lost() });
+            return Err(if is_linked { silent() } else { lost() });
         }
     }
 }
@@ -119,6 +123,10 @@ async fn is_greeted(session: &zenoh::Session, key: &str, until: Instant) -> Resu
             return Ok(true);
         }
         tokio::time::sleep(HELLO_EVERY).await;
+        if session.info().routers_zid().await.next().is_none() {
+            // Closed, to open again: another session finds it sooner.
+            return Ok(false);
+        }
     }
     Ok(false)
 }

@@ -23,8 +23,8 @@ use tokio::{sync::watch, task::JoinHandle, time::Instant};
 
 /// Changes so close together are one.
 const GATHER: Duration = Duration::from_millis(20);
-/// How often certificates that have expired are looked for.
-const LOOK_EVERY: Duration = Duration::from_mins(1);
+/// How often certificates that have expired are looked for, and whether messages still pass to the server's own router.
+const LOOK_EVERY: Duration = Duration::from_secs(10);
 /// Time between two attempts to open.
 const RETRY: Duration = Duration::from_millis(200);
 /// Longest wait until the two routers know of each other.
@@ -140,6 +140,17 @@ impl Gate {
     }
 }
 
+/// Why a gate looks at what it rests on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Why {
+    /// Robots may do something else.
+    Rights,
+    /// The server shows another certificate.
+    Certificate,
+    /// Time has passed.
+    Interval,
+}
+
 async fn keep(
     settings: GateSettings,
     mut policy: Policy,
@@ -149,16 +160,25 @@ async fn keep(
     pulse: Pulse,
 ) {
     loop {
-        let is_other_certificate = tokio::select! {
+        let why = tokio::select! {
             _ = stopping.wait_for(|stop| *stop) => break,
-            Ok(()) = changes.changed() => false,
-            Ok(()) = shown.changed() => true,
-            () = tokio::time::sleep(LOOK_EVERY) => false,
+            Ok(()) = changes.changed() => Why::Rights,
+            Ok(()) = shown.changed() => Why::Certificate,
+            () = tokio::time::sleep(LOOK_EVERY) => Why::Interval,
         };
         tokio::time::sleep(GATHER).await;
+        // A robot would be linked, and told that it is not admitted.
+        let is_cut_off = why == Why::Interval
+            && tokio::select! {
+                _ = stopping.wait_for(|stop| *stop) => break,
+                is_joined = settings.join(&session) => !is_joined,
+            };
+        if is_cut_off {
+            tracing::error!(endpoint = settings.endpoint, follows = "it opens again", "gate_cut_off");
+        }
         let change = *changes.borrow_and_update();
         let wanted = settings.policy();
-        if wanted == policy && !is_other_certificate {
+        if wanted == policy && why != Why::Certificate && !is_cut_off {
             settings.registry.set_applied(change);
             continue;
         }

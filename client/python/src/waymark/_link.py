@@ -46,8 +46,8 @@ _DROP_US = 50_000
 # Longest wait for one hello of the server, and time between two questions for it, in seconds.
 _HELLO_WAIT_S = 0.5
 _HELLO_EVERY_S = 0.05
-# A session that was not greeted for so long is opened anew, in seconds.
-_GREETED_S = 2.0
+# A session that was not greeted for so long is opened anew, in seconds: the first, and the most for later ones.
+_GREETED_S = (0.5, 2.0)
 # Longest wait for the present versions of maps, in seconds.
 _VERSION_WAIT_S = 10.0
 # Longest wait for a connection that only shows whether something listens, in seconds.
@@ -176,11 +176,13 @@ class Link:
     def _greet(self, file: RobotFile, delivery: Delivery, timeout_s: float) -> None:
         """Waits for the server's answer: with a certificate that gives no access, everything is dropped silently.
 
-        A session that is not greeted for two seconds is opened anew: one that met the server's listener as that closed
-        to open again may keep a dead link, or none, for ever."""
+        A session that is not greeted is opened anew: one that met the server's listener as that closed to open again
+        may keep a dead link, or none, for ever. The first are given up early: it may open again more than once."""
         until = time.monotonic() + timeout_s
+        patience, most = _GREETED_S
         while True:
-            end = min(until, time.monotonic() + _GREETED_S)
+            end = min(until, time.monotonic() + patience)
+            patience = min(2 * patience, most)
             while time.monotonic() < end:
                 for answer in self._session.get(f"{self._own}/rpc/hello", timeout=_HELLO_WAIT_S):
                     if answer.ok is not None:
