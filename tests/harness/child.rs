@@ -36,6 +36,8 @@ impl Child {
         let mut command = Command::new(program());
         command
             .envs(settings.iter().copied())
+            // Read by the tests, and no setting.
+            .env_remove("WAYMARK_KILLS")
             .env("WAYMARK_LOG", "warn")
             .args(["serve", "--http", "127.0.0.1:0", "--zenoh", zenoh, "--data"])
             .arg(data);

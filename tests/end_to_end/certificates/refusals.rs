@@ -4,8 +4,14 @@ use super::{Fleet, read, session};
 use client::{Capture, ClientError, RobotClient, RobotOptions};
 use protos::v1;
 use rcgen::{CertificateParams, DnType, Issuer, KeyPair, date_time_ymd};
+use server::config::{RawConfig, RawTls};
 use std::{fs, path::Path, process::Stdio, time::Duration};
-use tests::{Child, SOON};
+use tempfile::TempDir;
+use tests::{Child, Inside, SOON};
+use tokio::{
+    io::copy_bidirectional,
+    net::{TcpListener, TcpStream},
+};
 use vision::frame::GrayImage;
 
 fn picture() -> Capture {
@@ -80,6 +86,48 @@ async fn without_a_valid_certificate_there_is_no_session_and_the_sdk_says_why() 
     let answer = r1.recognise("front", picture(), SOON).await.expect("the others go on");
     assert_eq!(answer.status(), v1::Status::NoMatch);
     fleet.inside.server.stop().await;
+}
+
+/// Everything that is sent to an address that is not in the server's certificate goes to the server.
+async fn relay(server: &str) -> String {
+    let listener = TcpListener::bind("127.0.0.2:0").await.expect("a port");
+    let at = listener.local_addr().expect("its address");
+    let server = server.trim_start_matches("tls/").to_owned();
+    tokio::spawn(async move {
+        while let Ok((mut robot, _)) = listener.accept().await {
+            let server = server.clone();
+            tokio::spawn(async move {
+                let mut upstream = TcpStream::connect(server).await.expect("the server");
+                copy_bidirectional(&mut robot, &mut upstream).await
+            });
+        }
+    });
+    format!("tls/{at}")
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_robot_believes_the_names_in_the_servers_certificate_alone() {
+    let fleet = Fleet::start().await;
+    let good = fleet.options("r1");
+    RobotClient::connect(&good).await.expect("connected").close().await.expect("closed");
+    let other = soon(RobotOptions { endpoint: relay(&good.endpoint).await, ..good.clone() });
+    let error = RobotClient::connect(&other).await.err();
+    assert!(
+        matches!(error, Some(ClientError::TlsRefused { .. })),
+        "an address that it does not name: {error:?}"
+    );
+    assert!(session(&other.endpoint, good.tls.as_ref()).await.is_err());
+    // Nothing but the name is wrong with that way: a server whose certificate has it is believed there.
+    let names = RawTls { enabled: true, names: vec!["127.0.0.2".into()], ..RawTls::default() };
+    let named = Inside::start_with(RawConfig { tls: names, ..RawConfig::default() }).await;
+    let named = Fleet { inside: named, local: String::new(), folders: TempDir::new().expect("a folder") };
+    named.add("r1", "hall").await;
+    let options = named.options("r1");
+    let options = RobotOptions { endpoint: relay(&named.inside.server.zenoh_endpoint).await, ..options };
+    RobotClient::connect(&options).await.expect("connected by its name");
+    for fleet in [fleet, named] {
+        fleet.inside.server.stop().await;
+    }
 }
 
 /// Whole lines of a private key, PEM.
