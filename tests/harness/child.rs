@@ -8,6 +8,9 @@ use std::{
     sync::OnceLock,
 };
 
+/// Variables that tests read, and that are no settings.
+const OF_TESTS: [&str; 5] = ["WAYMARK_KILLS", "WAYMARK_LONG", "WAYMARK_RUNS", "WAYMARK_SEED", "WAYMARK_SEEDS"];
+
 /// A running `waymark serve`. Killed when dropped.
 #[derive(Debug)]
 pub struct Child {
@@ -36,11 +39,12 @@ impl Child {
         let mut command = Command::new(program());
         command
             .envs(settings.iter().copied())
-            // Read by the tests, and no setting.
-            .env_remove("WAYMARK_KILLS")
             .env("WAYMARK_LOG", "warn")
             .args(["serve", "--http", "127.0.0.1:0", "--zenoh", zenoh, "--data"])
             .arg(data);
+        for name in OF_TESTS {
+            command.env_remove(name);
+        }
         command
     }
 
