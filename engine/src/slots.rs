@@ -1,7 +1,7 @@
 //! One slot per robot and camera: one frame in work, one waiting, the newest wins. In: frames in any order and at any
-//! rate. Out: work, in turns of the robots and then of the cameras of each, so that no robot starves another. Every frame ends in exactly one of
-//! processed, superseded, expired, rejected, and the counts say so at every moment. Knows no vision and no transport;
-//! time is passed in.
+//! rate. Out: work, in turns of the robots and then of the cameras of each, so that no robot starves another. Every frame ends
+//! in exactly one of processed, superseded, expired, rejected, and the counts say so at every moment. Knows no vision and no
+//! transport; time is passed in.
 
 mod missed;
 mod turns;
@@ -10,7 +10,7 @@ pub use missed::MissedFrames;
 
 use protos::{Code, Name, Rejection};
 use std::{
-    collections::{BTreeMap, VecDeque},
+    collections::{BTreeMap, BTreeSet, VecDeque},
     sync::{Condvar, Mutex, MutexGuard, PoisonError},
     time::{Duration, Instant},
 };

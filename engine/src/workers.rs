@@ -11,6 +11,7 @@ use super::{
     frame_analysis::{StageTimes, analyse_checked},
     frame_context::FrameContext,
     frame_tap::{AnalysedFrame, FrameTap},
+    frame_times::FrameTimes,
     guided::{GuidedResult, recognise_guided},
     intake::{FrameJob, unknown_map},
     kept_frames::KeptFrames,
@@ -23,8 +24,6 @@ use super::{
     snapshot::{MapSnapshot, Snapshots},
     vitals::Vitals,
 };
-use crate::frame_tap::{AnalysedFrame, FrameTap};
-use crate::frame_times::FrameTimes;
 use map::pose2::Pose2Covariance;
 use protos::{CheckedFrame, Code, Name, Rejection, v1};
 use std::{cell::Cell, sync::Arc, time::Instant};

@@ -481,11 +481,14 @@ pub struct Answer {
     /// gate_camera_height (below the floor or more than 5 m above it), gate_inconsistent, degenerate.
     #[prost(string, tag = "21")]
     pub camera_pose_refusal: ::prost::alloc::string::String,
+    /// The server that answers, over zenoh; empty over HTTP.
+    #[prost(string, tag = "22")]
+    pub server: ::prost::alloc::string::String,
 }
 /// robot/{robot}/odometry : odom_from_robot
 #[derive(::serde::Serialize, ::serde::Deserialize)]
 #[serde(default)]
-#[derive(Clone, Copy, PartialEq, ::prost::Message)]
+#[derive(Clone, PartialEq, ::prost::Message)]
 pub struct Odometry {
     #[prost(uint64, tag = "1")]
     pub epoch: u64,
@@ -495,6 +498,10 @@ pub struct Odometry {
     pub captured_ns: i64,
     #[prost(message, optional, tag = "4")]
     pub odom_from_robot: ::core::option::Option<Pose2>,
+    /// The map that the robot is on, where several servers share a router: the one that serves it takes the message. Empty:
+    /// the server where the robot is registered.
+    #[prost(string, tag = "5")]
+    pub map: ::prost::alloc::string::String,
 }
 /// robot/{robot}/scan : one planar laser scan
 #[derive(::serde::Serialize, ::serde::Deserialize)]
@@ -520,6 +527,9 @@ pub struct Scan {
     /// Metres; at or beyond max_range_m there was no return.
     #[prost(float, repeated, tag = "9")]
     pub ranges_m: ::prost::alloc::vec::Vec<f32>,
+    /// As that of odometry. A scan is matched with the walls of the robot's own map alone: with another map it is refused.
+    #[prost(string, tag = "10")]
+    pub map: ::prost::alloc::string::String,
 }
 /// robot/{robot}/pose : the fused pose
 #[derive(::serde::Serialize, ::serde::Deserialize)]
@@ -554,6 +564,9 @@ pub struct RobotPose {
     #[prost(enumeration = "PoseTrust", tag = "9")]
     #[serde(with = "crate::json::pose_trust")]
     pub trust: i32,
+    /// The server that fused it.
+    #[prost(string, tag = "10")]
+    pub server: ::prost::alloc::string::String,
 }
 /// map/{map}/changed
 #[derive(::serde::Serialize, ::serde::Deserialize)]
@@ -564,6 +577,9 @@ pub struct MapChanged {
     pub map: ::prost::alloc::string::String,
     #[prost(uint64, tag = "2")]
     pub version: u64,
+    /// The server that serves the map.
+    #[prost(string, tag = "3")]
+    pub server: ::prost::alloc::string::String,
 }
 /// robot/{robot}/rpc/gaze, a query: where to look
 #[derive(Clone, PartialEq, ::prost::Message)]
@@ -601,6 +617,9 @@ pub struct GazeRequest {
     pub looked_at: ::prost::alloc::string::String,
     #[prost(bool, tag = "13")]
     pub recognised: bool,
+    /// The map that the robot is on, as that of odometry.
+    #[prost(string, tag = "14")]
+    pub map: ::prost::alloc::string::String,
 }
 /// The reply.
 #[derive(Clone, PartialEq, ::prost::Message)]
@@ -632,6 +651,9 @@ pub struct GazeAdvice {
     pub range_m: f64,
     #[prost(double, tag = "13")]
     pub incidence_rad: f64,
+    /// The server that answers; also with a rejection.
+    #[prost(string, tag = "14")]
+    pub server: ::prost::alloc::string::String,
 }
 /// robot/{robot}/rpc/localise, a query: where the robot is by what it senses at one place, without its history. Changes no
 /// fused pose. At least a frame or a scan is needed.
@@ -688,6 +710,9 @@ pub struct LocaliseReply {
     /// The answer to the frame.
     #[prost(message, optional, tag = "8")]
     pub answer: ::core::option::Option<Answer>,
+    /// The server that answers; also with a rejection.
+    #[prost(string, tag = "9")]
+    pub server: ::prost::alloc::string::String,
 }
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, ::prost::Enumeration)]
 #[repr(i32)]

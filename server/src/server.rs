@@ -120,16 +120,11 @@ impl Server {
         let (live, slots) = (engine.live.clone(), engine.slots.clone());
         // Whoever owns the router decides who is a robot.
         let of_robots = certificates.as_ref().filter(|_| config.router.is_none());
-        let registry = of_robots.map(|_| store.certificates().clone());
-        let to = receivers(&config, &engine, registry)?;
+        let to = receivers(&config, &engine, of_robots.map(|_| store.certificates().clone()))?;
         let (server, fleet) = (to.server.clone(), to.fleet.clone());
         let mut bus = Bus::open(&config, to.clone(), certificates.clone()).await?;
         let outbox = bus.outbox().clone();
-        let ros2 = match bus.session() {
-            Some(session) => Ros2::open(session, &config.ros2, (&to, &outbox)).await?,
-            None => Ros2::default(),
-        };
-        let ros2 = Arc::new(ros2);
+        let ros2 = Arc::new(open_ros2(&bus, &config, &to).await?);
         let publisher = Arc::new(ros2.publisher(outbox.clone()));
         vitals.probe("the outbox", move || outbox.is_running());
         let workers = Workers::start(&engine, config.workers, &publisher).map_err(StartError::Threads)?;
@@ -174,11 +169,19 @@ impl Server {
             ros2,
             sessions,
             local_token,
-            tls_name,
+            tls_name: tls_name(&config, http_addr),
             stop,
             vitals,
             tasks,
         })
+    }
+}
+
+/// Robots of ROS 2; there are none where the server joins a router.
+async fn open_ros2(bus: &Bus, config: &Config, to: &Receivers) -> Result<Ros2, BusError> {
+    match bus.session() {
+        Some(session) => Ros2::open(session, &config.ros2, (to, bus.outbox())).await,
+        None => Ok(Ros2::default()),
     }
 }
 

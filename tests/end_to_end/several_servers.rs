@@ -155,7 +155,7 @@ async fn every_frame_is_answered_once_while_servers_come_and_go() {
     let back = tokio::time::timeout(SOON, events.recv()).await.expect("told").expect("an event");
     assert!(matches!(back, ServerEvent::Back { server, .. } if server.as_str() == "b"));
     heard.more("r2", "b", "").await;
-    senders.each_ref().map(JoinHandle::abort);
+    senders.iter().for_each(JoinHandle::abort);
     println!("answers of r2 by server and code: {:?}", heard.tally("r2"));
     drop((a, b));
     router.stop().await;
@@ -191,7 +191,7 @@ async fn a_map_of_two_servers_is_served_by_the_first_until_it_is_gone() {
     let b = start(data_b.path(), &router, "b");
     heard.more("r2", "b", "map_contested").await;
     heard.more("r1", "a", "").await;
-    senders.each_ref().map(JoinHandle::abort);
+    senders.iter().for_each(JoinHandle::abort);
     heard.tally("r1");
     drop((a, b));
     router.stop().await;
@@ -226,7 +226,7 @@ async fn a_restart_of_the_router_is_survived() {
         );
     }
     assert_eq!(a.maps().landmarks("hall").await.expect("landmarks").len(), 5);
-    senders.each_ref().map(JoinHandle::abort);
+    senders.iter().for_each(JoinHandle::abort);
     heard.tally("r1");
     drop((a, b));
     router.stop().await;

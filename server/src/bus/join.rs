@@ -13,7 +13,7 @@ use crate::{config::JoinedRouter, fleet::Fleet};
 use engine::{decode::ImageLimits, vitals::Pulse};
 use protos::{Key, Keys, ServerToken};
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, btree_map::Entry},
     fs,
     path::Path,
     sync::{Arc, OnceLock},
@@ -196,10 +196,11 @@ async fn keep(
             }
         }
         for token in wanted {
-            if !shown.contains_key(&token) {
+            if let Entry::Vacant(place) = shown.entry(token) {
+                let token = place.key();
                 let key = settings.keys.build(&Key::Server(to.0.server.clone(), token.clone()));
                 let made = session.liveliness().declare_token(key).await;
-                shown.insert(token, made.map_err(declared("announce the server"))?);
+                place.insert(made.map_err(declared("announce the server"))?);
             }
         }
         tokio::select! {

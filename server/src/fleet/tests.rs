@@ -30,7 +30,9 @@ impl Site {
     fn add(&self, server: &str, map: &str, robots: &[&str]) {
         let snapshots = self.snapshots(server);
         snapshots.publish(Arc::new(engine::snapshot::MapSnapshot::empty(map, 1)));
-        robots.iter().for_each(|robot| snapshots.set_robot(robot, Some(map)));
+        for robot in robots {
+            snapshots.set_robot(robot, Some(map));
+        }
     }
 
     /// Server `i` is connected, or not.
