@@ -124,12 +124,11 @@ fn attacks(kind: &Kind) -> Vec<Value> {
     }
 }
 
+/// Gets a changed message, the path of what was changed, and its value.
+type Send<'a> = dyn FnMut(DynamicMessage, &[String], Option<&Value>) + 'a;
+
 /// Changes every number below `path`; `send` gets the changed part and gives what the whole is refused with.
-fn walk(
-    part: &DynamicMessage,
-    path: &[String],
-    send: &mut dyn FnMut(DynamicMessage, &[String], Option<&Value>),
-) {
+fn walk(part: &DynamicMessage, path: &[String], send: &mut Send<'_>) {
     for field in part.descriptor().fields() {
         let below: Vec<String> = path.iter().cloned().chain([field.name().to_owned()]).collect();
         if let Kind::Message(inner) = field.kind() {
@@ -158,7 +157,7 @@ fn inside(
     part: &DynamicMessage,
     (field, inner): (&FieldDescriptor, &MessageDescriptor),
     below: &[String],
-    send: &mut dyn FnMut(DynamicMessage, &[String], Option<&Value>),
+    send: &mut Send<'_>,
 ) {
     let mut list = part.get_field(field).as_list().map(<[Value]>::to_vec).unwrap_or_default();
     let present = if field.is_list() { list.pop() } else { Some(part.get_field(field).into_owned()) };

@@ -38,7 +38,7 @@ use std::{
     path::{Path, PathBuf},
     sync::Arc,
 };
-use vision::{model::MAX_LANDMARKS, params::Params};
+use vision::params::Params;
 
 /// Variables that begin with `WAYMARK_` but are read by the command line, not by the settings.
 const NOT_SETTINGS: [&str; 7] = ["config", "server", "map", "log", "log_format", "token", "robot_file"];
@@ -222,36 +222,7 @@ impl TryFrom<RawConfig> for Config {
         if raw.workers > MAX_WORKERS {
             return Err(invalid("workers", format!("{} is more than {MAX_WORKERS}", raw.workers)));
         }
-        for (field, value) in raw.limits.counts() {
-            if value == 0 {
-                return Err(invalid(field, "must be at least 1".into()));
-            }
-        }
-        if !(1..=100).contains(&raw.limits.disk_percent) {
-            let reason = format!("{} is not 1 to 100", raw.limits.disk_percent);
-            return Err(invalid("limits.disk_percent", reason));
-        }
-        for (field, value) in [
-            ("limits.frame_pixels", raw.limits.frame_pixels),
-            ("limits.upload_pixels", raw.limits.upload_pixels),
-        ] {
-            if value > vision::frame::MAX_AREA_PX {
-                return Err(invalid(
-                    field,
-                    format!("{value} is more than {} px", vision::frame::MAX_AREA_PX),
-                ));
-            }
-        }
-        if raw.limits.waiting_frame_bytes < raw.limits.frame_bytes {
-            let reason = format!(
-                "less than limits.frame_bytes = {}: no such frame would be taken",
-                raw.limits.frame_bytes
-            );
-            return Err(invalid("limits.waiting_frame_bytes", reason));
-        }
-        if raw.limits.landmarks > MAX_LANDMARKS {
-            return Err(invalid("limits.landmarks", format!("more than {MAX_LANDMARKS}")));
-        }
+        raw.limits.check()?;
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         Ok(Self {
             data: raw.data,

@@ -16,7 +16,7 @@ use crate::{
     jobs::Jobs,
     publication::Catalogue,
     recording_answers::store_answers,
-    ros2::Ros2,
+    ros2::{Ros2, Ros2Publisher},
     running::{RunningServer, Tasks},
     serving::{Listeners, Serving},
     store::{
@@ -99,7 +99,6 @@ impl Server {
     /// Starts a server. When this returns, it answers.
     pub async fn start(config: Config) -> Result<RunningServer, StartError> {
         let config = Arc::new(config);
-        crate::metrics::process::started();
         config.log_memory_ceiling();
         let (store, writer) = Catalogue::open(&config).await?;
         let (stop, stopping) = watch::channel(false);
@@ -117,17 +116,12 @@ impl Server {
         let recorders = recorders(&config, &store, (found, recorded, &engine.live), &stopping);
         let disk = watch_disk(&store, &local_token, &engine, &stopping);
         let pictures = tokio::spawn(pictures::check_all((*store).clone(), stopping.clone()));
-        let (live, slots) = (engine.live.clone(), engine.slots.clone());
         // Whoever owns the router decides who is a robot.
         let of_robots = certificates.as_ref().filter(|_| config.router.is_none());
         let to = receivers(&config, &engine, of_robots.map(|_| store.certificates().clone()))?;
         let (server, fleet) = (to.server.clone(), to.fleet.clone());
-        let mut bus = Bus::open(&config, to.clone(), certificates.clone()).await?;
-        let outbox = bus.outbox().clone();
-        let ros2 = Arc::new(open_ros2(&bus, &config, &to).await?);
-        let publisher = Arc::new(ros2.publisher(outbox.clone()));
-        vitals.probe("the outbox", move || outbox.is_running());
-        let workers = Workers::start(&engine, config.workers, &publisher).map_err(StartError::Threads)?;
+        let Robots { mut bus, ros2, publisher, workers } =
+            Robots::connect(&config, &engine, to, certificates.clone()).await?;
         let (backups, backups_task) = Backups::start(&config, told(&store), stopping.clone());
         let services = Services {
             jobs: teaching.jobs,
@@ -145,7 +139,6 @@ impl Server {
         let app = Arc::new(App::new(config.clone(), store, services, &engine, stopping.clone()));
         let serving = Serving::start(listeners, &app, probed, &stopping);
         let zenoh_endpoint = bus.endpoint().to_owned();
-        let tls_name = tls_name(&config, http_addr);
         let tasks = Tasks {
             workers,
             bus,
@@ -164,8 +157,8 @@ impl Server {
             zenoh_endpoint,
             server,
             snapshots,
-            live,
-            slots,
+            live: engine.live,
+            slots: engine.slots,
             ros2,
             sessions,
             local_token,
@@ -177,11 +170,33 @@ impl Server {
     }
 }
 
-/// Robots of ROS 2; there are none where the server joins a router.
-async fn open_ros2(bus: &Bus, config: &Config, to: &Receivers) -> Result<Ros2, BusError> {
-    match bus.session() {
-        Some(session) => Ros2::open(session, &config.ros2, (to, bus.outbox())).await,
-        None => Ok(Ros2::default()),
+/// What robots are heard and answered by.
+struct Robots {
+    bus: Bus,
+    ros2: Arc<Ros2>,
+    publisher: Arc<Ros2Publisher>,
+    workers: Workers,
+}
+
+impl Robots {
+    /// Robots are heard and answered from now on. There are none of ROS 2 where the server joins a router.
+    async fn connect(
+        config: &Config,
+        engine: &Engine,
+        to: Receivers,
+        certificates: Option<Arc<Certificates>>,
+    ) -> Result<Self, StartError> {
+        let bus = Bus::open(config, to.clone(), certificates).await?;
+        let outbox = bus.outbox().clone();
+        let ros2 = match bus.session() {
+            Some(session) => Ros2::open(session, &config.ros2, (&to, &outbox)).await?,
+            None => Ros2::default(),
+        };
+        let ros2 = Arc::new(ros2);
+        let publisher = Arc::new(ros2.publisher(outbox.clone()));
+        engine.vitals.probe("the outbox", move || outbox.is_running());
+        let workers = Workers::start(engine, config.workers, &publisher).map_err(StartError::Threads)?;
+        Ok(Self { bus, ros2, publisher, workers })
     }
 }
 

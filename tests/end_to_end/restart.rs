@@ -169,7 +169,7 @@ fn expected(asked: &[Asked]) -> BTreeMap<&str, (bool, u64, u64)> {
         match what {
             What::Landmark => *is_made = made.is_some(),
             What::View { .. } => {
-                (*views, *made_views) = (*views + 1, *made_views + u64::from(made.is_some()))
+                (*views, *made_views) = (*views + 1, *made_views + u64::from(made.is_some()));
             }
             What::Lesson => {}
         }

@@ -9,7 +9,8 @@ use std::{
 };
 
 /// Variables that tests read, and that are no settings.
-const OF_TESTS: [&str; 5] = ["WAYMARK_KILLS", "WAYMARK_LONG", "WAYMARK_RUNS", "WAYMARK_SEED", "WAYMARK_SEEDS"];
+const OF_TESTS: [&str; 5] =
+    ["WAYMARK_KILLS", "WAYMARK_LONG", "WAYMARK_RUNS", "WAYMARK_SEED", "WAYMARK_SEEDS"];
 
 /// A running `waymark serve`. Killed when dropped.
 #[derive(Debug)]

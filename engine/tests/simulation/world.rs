@@ -114,7 +114,7 @@ impl World {
         robots.iter().for_each(|robot| snapshots.set_robot(robot.name.as_str(), Some("hall")));
         let motion = Arc::new(MotionTracker::new(snapshots.clone(), Arc::default()));
         let intake = Intake {
-            slots: Arc::new(Slots::new(16)),
+            slots: Arc::new(Slots::new(16, 64 << 20)),
             snapshots,
             motion,
             frame_bytes: 1000,

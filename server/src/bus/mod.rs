@@ -50,6 +50,7 @@ use std::{
     time::Instant,
 };
 use tokio::{sync::broadcast::error::RecvError, task::JoinHandle};
+use zenoh::query::Queryable;
 
 /// Why the bus did not open.
 #[derive(Debug, thiserror::Error)]

@@ -341,7 +341,7 @@ async fn an_outbox_whose_thread_is_held_stalls() {
     };
     let keys = Keys::new(&Name::new("test").unwrap());
     let planted =
-        running.bus.session().declare_subscriber(keys.all_poses()).callback(blocking).await.unwrap();
+        running.bus.session().unwrap().declare_subscriber(keys.all_poses()).callback(blocking).await.unwrap();
     let (outbox, hearts) = (running.bus.outbox().clone(), running.engine.vitals.clone());
     outbox.heart().beat();
     let beats_again = || {

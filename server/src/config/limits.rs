@@ -1,7 +1,9 @@
 //! Every bound of the server, with its default.
 
+use super::{ConfigError, invalid};
 use engine::decode::ImageLimits;
 use serde::{Deserialize, Serialize};
+use vision::model::MAX_LANDMARKS;
 
 /// Every bound of the server, each with its unit. A value beyond a bound is refused, never cut.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -150,8 +152,40 @@ impl Default for Limits {
 }
 
 impl Limits {
+    /// Refuses bounds that cannot be, by name.
+    pub(super) fn check(&self) -> Result<(), ConfigError> {
+        for (field, value) in self.counts() {
+            if value == 0 {
+                return Err(invalid(field, "must be at least 1".into()));
+            }
+        }
+        if !(1..=100).contains(&self.disk_percent) {
+            let reason = format!("{} is not 1 to 100", self.disk_percent);
+            return Err(invalid("limits.disk_percent", reason));
+        }
+        for (field, value) in
+            [("limits.frame_pixels", self.frame_pixels), ("limits.upload_pixels", self.upload_pixels)]
+        {
+            if value > vision::frame::MAX_AREA_PX {
+                return Err(invalid(
+                    field,
+                    format!("{value} is more than {} px", vision::frame::MAX_AREA_PX),
+                ));
+            }
+        }
+        if self.waiting_frame_bytes < self.frame_bytes {
+            let reason =
+                format!("less than limits.frame_bytes = {}: no such frame would be taken", self.frame_bytes);
+            return Err(invalid("limits.waiting_frame_bytes", reason));
+        }
+        if self.landmarks > MAX_LANDMARKS {
+            return Err(invalid("limits.landmarks", format!("more than {MAX_LANDMARKS}")));
+        }
+        Ok(())
+    }
+
     /// Name and value of every bound that must not be 0.
-    pub(super) fn counts(&self) -> [(&'static str, usize); 38] {
+    fn counts(&self) -> [(&'static str, usize); 38] {
         [
             ("limits.frame_bytes", self.frame_bytes),
             ("limits.frame_pixels", self.frame_pixels),

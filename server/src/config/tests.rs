@@ -1,6 +1,7 @@
 //! Which settings are read, from where, and which are refused.
 
 use super::*;
+use vision::model::MAX_LANDMARKS;
 use std::collections::BTreeSet;
 
 /// Paths of all keys, such as `limits.maps`. `algorithm` is one key: the method's pages list its parameters.

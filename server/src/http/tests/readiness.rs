@@ -94,7 +94,7 @@ async fn only_a_token_for_all_maps_is_told_of_backups_and_parts() {
     let (status, made) = read(service.ask(request("POST", "/api/v1/backups", "")).await).await;
     assert_eq!(status, 202, "{made}");
     let name = made["name"].as_str().unwrap().to_owned();
-    let until = Instant::now() + Duration::from_secs(60);
+    let until = Instant::now() + Duration::from_mins(1);
     while service.get("/readyz").await.1["backup"]["newest"].is_null() {
         assert!(Instant::now() < until, "the backup does not end");
         tokio::time::sleep(Duration::from_millis(20)).await;

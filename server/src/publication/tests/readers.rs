@@ -90,7 +90,9 @@ fn read(snapshots: &Snapshots, file: &Path, landmark: LandmarkId, to: &Read) {
         std::thread::yield_now();
     }
     let mut all = to.answers.lock().unwrap();
-    own.into_iter().for_each(|(version, values)| all.entry(version).or_default().extend(values));
+    for (version, values) in own {
+        all.entry(version).or_default().extend(values);
+    }
 }
 
 #[tokio::test(flavor = "multi_thread")]

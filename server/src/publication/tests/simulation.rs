@@ -96,7 +96,7 @@ impl World {
                 self.restart().await;
             }
         }
-        self.check().await;
+        self.check();
     }
 
     /// A client creates a landmark under its key, perhaps once more.
@@ -194,7 +194,7 @@ impl World {
     }
 
     /// What was acknowledged is in the snapshot in use and on the disk; nothing is there that was not asked for.
-    async fn check(&mut self) {
+    fn check(&mut self) {
         let map = self.store.snapshots().get("a").unwrap();
         assert!(map.version >= self.version, "version {} after {}", map.version, self.version);
         self.version = map.version;
@@ -267,7 +267,7 @@ async fn run(seed: u64) {
         world.step().await;
     }
     world.restart().await;
-    world.check().await;
+    world.check();
 }
 
 fn number(name: &str) -> Option<u64> {
