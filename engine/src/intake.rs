@@ -1,9 +1,10 @@
 //! The intake of frames. In: bytes of a robot on the key of a camera. Out: the frame in its slot, or a refusal as the answer
 //! to publish at once. It checks everything but the pixels, and never waits: it runs on the transport's threads.
 
-use super::slots::{SlotKey, Slots};
+use super::slots::{Held, SlotKey, Slots};
 use super::{
     motion::MotionTracker,
+    quotas::Kind,
     snapshot::{MapSnapshot, Snapshots},
 };
 use protos::{
@@ -35,6 +36,15 @@ pub struct FrameJob {
     /// Present if the capture time does not fit the robot's other messages and must not be used: what the robot's clock showed
     /// at receipt, ns.
     pub stamp_instead_ns: Option<i64>,
+    /// Bytes of its message.
+    pub message_bytes: usize,
+}
+
+impl Held for FrameJob {
+    /// The image is a part of the message, which is held as a whole.
+    fn held_bytes(&self) -> usize {
+        self.message_bytes
+    }
 }
 
 /// Takes frames in.
@@ -95,11 +105,13 @@ impl Intake {
             let detail = format!("{} bytes are more than {}", message.len(), self.frame_bytes);
             return Err(Rejection::new(Code::TooLarge, M::FIELD, detail));
         }
+        let message_bytes = message.len();
         let frame = M::decode(message).map_err(|e| {
             Rejection::new(Code::BadMessage, M::FIELD, format!("no {} message: {e}", M::NAME))
         })?;
         (echo.epoch, echo.seq, echo.captured_ns) = frame.numbers();
         let robot_map = self.robot_map(&key.robot)?;
+        self.motion.quotas().take(&key.robot, Kind::Frame, message_bytes, received)?;
         let frame: CheckedFrame = frame.try_into()?;
         self.motion.epochs().admit(&key.robot, frame.epoch, received)?;
         let map = frame.map.as_ref().map_or_else(|| robot_map.clone(), ToString::to_string);
@@ -109,7 +121,15 @@ impl Intake {
         let stamp = self.motion.frame_stamp((&key.robot, &key.camera), &map, &frame, received);
         let stamp_instead_ns = stamp.err();
         let clock_suspect = clock_suspect(frame.captured_ns) || stamp_instead_ns.is_some();
-        Ok(FrameJob { frame, map, received, deadline: received + wait, clock_suspect, stamp_instead_ns })
+        Ok(FrameJob {
+            frame,
+            map,
+            received,
+            deadline: received + wait,
+            clock_suspect,
+            stamp_instead_ns,
+            message_bytes,
+        })
     }
 
     /// The map of a robot, by its registration.
@@ -206,7 +226,7 @@ mod tests {
         snapshots.publish(Arc::new(crate::snapshot::MapSnapshot::empty("hall", 3)));
         snapshots.set_robot("r1", Some("hall"));
         snapshots.set_robot("lost", Some("gone"));
-        let slots = Arc::new(Slots::new(4));
+        let slots = Arc::new(Slots::new(4, 1 << 20));
         let motion = Arc::new(MotionTracker::new(snapshots.clone(), Arc::default()));
         let deadline = Duration::from_millis(500);
         Intake { slots, snapshots, motion, frame_bytes: 1000, deadline, linked_maps_only: false }

@@ -7,7 +7,9 @@
 pub mod snapshot;
 pub mod decode;
 pub mod slots;
+pub mod quotas;
 pub mod panics;
+pub mod threads;
 pub mod intake;
 pub mod guided;
 pub mod landmark_checks;

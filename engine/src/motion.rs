@@ -30,7 +30,12 @@ pub use timebase::{
 };
 
 use super::{
-    epochs::Epochs, limits::MAX_ROBOTS, live::LiveHub, mapping::MappingSessions, snapshot::Snapshots,
+    epochs::Epochs,
+    limits::MAX_ROBOTS,
+    live::LiveHub,
+    mapping::MappingSessions,
+    quotas::{Kind, Quotas},
+    snapshot::Snapshots,
 };
 use map::{
     fuse::{FixOutcome, FixRole, FusedPose},
@@ -84,6 +89,7 @@ pub struct MotionTracker {
     snapshots: Arc<Snapshots>,
     live: Arc<LiveHub>,
     epochs: Epochs,
+    quotas: Quotas,
     state: Mutex<State>,
     scans: Scans,
     mappings: MappingSessions,
@@ -98,11 +104,23 @@ impl MotionTracker {
             snapshots,
             live,
             epochs: Epochs::default(),
+            quotas: Quotas::default(),
             state: Mutex::default(),
             scans: Scans::default(),
             mappings: MappingSessions::default(),
             recording_robots: Mutex::default(),
         }
+    }
+
+    /// The same with bounds of what a robot may send.
+    #[must_use]
+    pub fn with_quotas(self, quotas: Quotas) -> Self {
+        Self { quotas, ..self }
+    }
+
+    /// What each robot may send.
+    pub fn quotas(&self) -> &Quotas {
+        &self.quotas
     }
 
     /// The live epoch of each robot.
@@ -133,6 +151,7 @@ impl MotionTracker {
         message: Bytes,
         received: Instant,
     ) -> Result<(String, CheckedOdometry, Arc<Mutex<RobotState>>), Rejection> {
+        self.check_quota(robot, Kind::Odometry, &message, received)?;
         let (map, odometry) = messages::odometry(&self.snapshots, robot, message)?;
         self.epochs.admit(robot, odometry.epoch, received)?;
         let shared = self.lock().robot(robot)?;
@@ -176,6 +195,7 @@ impl MotionTracker {
         message: Bytes,
         received: Instant,
     ) -> Result<Option<ScanJob>, Rejection> {
+        self.check_quota(robot, Kind::Scan, &message, received)?;
         let (map, checked) = messages::scan(&self.snapshots, robot, message)?;
         self.epochs.admit(robot, checked.epoch, received)?;
         let shared = self.lock().robot(robot)?;
@@ -189,6 +209,12 @@ impl MotionTracker {
         state.switch_epoch_or_map(epoch, &job.map, &self.snapshots);
         state.check_stamp(&Stream::Scan, captured_ns, Some(job.odom_from_robot), received)?;
         Ok(Some(job))
+    }
+
+    /// Counts a message of a registered robot.
+    fn check_quota(&self, robot: &Name, kind: Kind, message: &Bytes, now: Instant) -> Result<(), Rejection> {
+        let is_known = self.snapshots.robot_map(robot.as_str()).is_some();
+        if is_known { self.quotas.take(robot, kind, message.len(), now) } else { Ok(()) }
     }
 
     /// The scans that wait for the laser thread.

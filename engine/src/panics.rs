@@ -1,6 +1,7 @@
 //! Caught panics, counted by the edge that caught them. An edge is where work of one kind begins: a frame, a write, a
 //! message, a request. A panic ends that piece of work; the process and all other work go on.
 
+use crate::threads::Lost;
 use std::{
     any::Any,
     fmt::Display,
@@ -106,6 +107,26 @@ impl Panics {
                 Ended("it panicked; see the server's log")
             }
             Err(_cancelled) => Ended("it was given up: the server stops"),
+        })
+    }
+
+    /// The same of work on a thread of its own.
+    pub fn ended<T>(
+        &self,
+        edge: Edge,
+        what: impl Display,
+        follows: &str,
+        done: Result<T, Lost>,
+    ) -> Result<T, Ended> {
+        done.map_err(|lost| match lost {
+            Lost::Panicked(cause) => {
+                self.caught(edge, cause.as_ref(), what, follows);
+                Ended("it panicked; see the server's log")
+            }
+            Lost::NoThread(error) => {
+                tracing::error!(edge = edge.name(), %error, %what, follows, "no_thread");
+                Ended("the system gave no thread for it")
+            }
         })
     }
 

@@ -103,7 +103,7 @@ pub fn engine(maps: &[Arc<MapSnapshot>]) -> Engine {
     snapshots.set_robot("r1", Some(&maps[0].name));
     let live = Arc::new(LiveHub::default());
     Engine {
-        slots: Arc::new(Slots::new(8)),
+        slots: Arc::new(Slots::new(8, 256 << 20)),
         motion: Arc::new(MotionTracker::new(snapshots.clone(), live.clone())),
         snapshots,
         live,

@@ -1,15 +1,23 @@
-//! One slot per robot and camera: one frame in work, one waiting, the newest wins. In: frames in any order and at any
-//! rate. Out: work, round robin over the slots, so that no robot starves another. Every frame ends in exactly one of
-//! processed, superseded, expired, rejected, and the counts say so at every moment. Knows no vision and no transport;
-//! time is passed in.
+//! One slot per robot and camera: one frame in work, one waiting, the newest wins. In: frames in any order and at any rate.
+//! Out: work, in turns of the robots and of the cameras of each. Every frame ends in exactly one of processed, superseded,
+//! expired, rejected, and the counts say so at every moment. Knows no vision and no transport; time is passed in.
+
+mod turns;
 
 use crate::limits::MAX_ROBOTS;
 use protos::{Code, Name, Rejection};
 use std::{
-    collections::{BTreeMap, VecDeque},
+    collections::{BTreeMap, BTreeSet, VecDeque},
     sync::{Condvar, Mutex, MutexGuard, PoisonError},
     time::{Duration, Instant},
 };
+use turns::Turns;
+
+/// Work that takes memory while it waits.
+pub trait Held {
+    /// What it takes, bytes.
+    fn held_bytes(&self) -> usize;
+}
 
 /// Cameras of one robot.
 pub const MAX_CAMERAS_PER_ROBOT: usize = 8;
@@ -113,23 +121,36 @@ impl SequenceTracker {
 #[derive(Debug)]
 struct Slot<T> {
     waiting: Option<T>,
+    /// Bytes of the frame in work.
+    work_bytes: usize,
     in_work: bool,
     queued: bool,
     order: SequenceTracker,
     touched: Instant,
+    /// Number of its last turn.
+    last_turn: u64,
 }
 
 impl<T> Slot<T> {
     fn new(now: Instant) -> Self {
-        Self { waiting: None, in_work: false, queued: false, order: SequenceTracker::default(), touched: now }
+        Self {
+            waiting: None,
+            work_bytes: 0,
+            in_work: false,
+            queued: false,
+            order: SequenceTracker::default(),
+            touched: now,
+            last_turn: 0,
+        }
     }
 }
 
 #[derive(Debug)]
 struct State<T> {
     slots: BTreeMap<SlotKey, Slot<T>>,
-    /// Slots with a waiting frame and none in work, in turn.
-    ready: VecDeque<SlotKey>,
+    ready: Turns,
+    /// Bytes of all frames that wait or are in work.
+    held_bytes: usize,
     counts: FrameCounts,
     missed: MissedFrames,
     closed: bool,
@@ -161,23 +182,25 @@ pub struct Slots<T> {
     state: Mutex<State<T>>,
     ready: Condvar,
     limit: usize,
+    max_bytes: usize,
 }
 
-impl<T> Slots<T> {
-    /// At most `max_slots` cameras over all robots.
-    pub fn new(max_slots: usize) -> Self {
+impl<T: Held> Slots<T> {
+    /// At most `max_slots` cameras over all robots, whose frames that wait or are in work take at most `max_bytes`.
+    pub fn new(max_slots: usize, max_bytes: usize) -> Self {
         let state = State {
             slots: BTreeMap::new(),
-            ready: VecDeque::new(),
+            ready: Turns::default(),
+            held_bytes: 0,
             counts: FrameCounts::default(),
             missed: MissedFrames::default(),
             closed: false,
         };
-        Self { state: Mutex::new(state), ready: Condvar::new(), limit: max_slots }
+        Self { state: Mutex::new(state), ready: Condvar::new(), limit: max_slots, max_bytes }
     }
 
     /// Puts a frame in its slot; the one that waited there is superseded. Never waits for work. Errors: the frame is not newer
-    /// than the last of its camera, or there are too many cameras.
+    /// than the last of its camera, there are too many cameras, or the frames of all take too much memory.
     pub fn offer(&self, key: SlotKey, order: (u64, u64), job: T, now: Instant) -> Result<(), Rejection> {
         let mut guard = self.lock();
         let state = &mut *guard;
@@ -199,6 +222,14 @@ impl<T> Slots<T> {
             state.missed.add(&key.robot, gap);
         }
         slot.touched = now;
+        let replaced = slot.waiting.as_ref().map_or(0, Held::held_bytes);
+        let held = state.held_bytes - replaced + job.held_bytes();
+        if held > self.max_bytes {
+            let most = self.max_bytes;
+            let detail = format!("frames that wait take more than {most} bytes (limits.waiting_frame_bytes)");
+            return state.refuse(Rejection::new(Code::Overloaded, "frame", detail));
+        }
+        state.held_bytes = held;
         if slot.waiting.replace(job).is_some() {
             state.counts.superseded += 1;
         } else {
@@ -206,7 +237,7 @@ impl<T> Slots<T> {
         }
         if !slot.in_work && !slot.queued {
             slot.queued = true;
-            state.ready.push_back(key);
+            state.ready.push(key, slot.last_turn);
             self.ready.notify_one();
         }
         Ok(())
@@ -245,6 +276,7 @@ impl<T> Slots<T> {
         let state = &mut *guard;
         let Some(slot) = state.slots.get_mut(key).filter(|slot| slot.in_work) else { return };
         slot.in_work = false;
+        state.held_bytes -= std::mem::take(&mut slot.work_bytes);
         state.counts.in_work -= 1;
         match outcome {
             FrameOutcome::Processed => state.counts.processed += 1,
@@ -253,7 +285,7 @@ impl<T> Slots<T> {
         }
         if slot.waiting.is_some() && !slot.queued {
             slot.queued = true;
-            state.ready.push_back(key.clone());
+            state.ready.push(key.clone(), slot.last_turn);
             self.ready.notify_one();
         }
     }
@@ -281,13 +313,19 @@ impl<T> Slots<T> {
         self.lock().slots.len()
     }
 
+    /// Bytes of the frames that wait or are in work.
+    pub fn held_bytes(&self) -> usize {
+        self.lock().held_bytes
+    }
+
     /// Ends the wait of every worker; frames that wait are counted as expired.
     pub fn close(&self) {
         let mut guard = self.lock();
         let state = &mut *guard;
         state.closed = true;
         for slot in state.slots.values_mut() {
-            if slot.waiting.take().is_some() {
+            if let Some(job) = slot.waiting.take() {
+                state.held_bytes -= job.held_bytes();
                 state.counts.waiting -= 1;
                 state.counts.expired += 1;
             }
@@ -303,18 +341,18 @@ impl<T> Slots<T> {
     }
 }
 
-impl<T> State<T> {
+impl<T: Held> State<T> {
     fn refuse(&mut self, refusal: Rejection) -> Result<(), Rejection> {
         *self.counts.rejected.entry(refusal.code).or_default() += 1;
         Err(refusal)
     }
 
     fn next(&mut self) -> Option<(SlotKey, T)> {
-        while let Some(key) = self.ready.pop_front() {
+        while let Some((key, turn)) = self.ready.pop() {
             let Some(slot) = self.slots.get_mut(&key) else { continue };
-            slot.queued = false;
+            (slot.queued, slot.last_turn) = (false, turn);
             if let Some(job) = slot.waiting.take() {
-                slot.in_work = true;
+                (slot.in_work, slot.work_bytes) = (true, job.held_bytes());
                 self.counts.waiting -= 1;
                 self.counts.in_work += 1;
                 return Some((key, job));
@@ -332,6 +370,8 @@ impl<T> State<T> {
             self.slots.retain(|_, s| {
                 s.in_work || s.waiting.is_some() || now.saturating_duration_since(s.touched) < IDLE_SLOT
             });
+            let robots: BTreeSet<&Name> = self.slots.keys().map(|key| &key.robot).collect();
+            self.ready.of_robots.retain(|robot, _| robots.contains(robot));
         }
         if of_robot(&self.slots) >= MAX_CAMERAS_PER_ROBOT {
             let idle = |s: &Slot<T>| {

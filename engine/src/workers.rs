@@ -10,6 +10,7 @@ use super::{
     findings::{FindingSender, LandmarkFinding},
     frame_analysis::{StageTimes, analyse_checked},
     frame_context::FrameContext,
+    frame_tap::{AnalysedFrame, FrameTap},
     guided::{GuidedResult, recognise_guided},
     intake::{FrameJob, unknown_map},
     kept_frames::KeptFrames,
@@ -20,10 +21,9 @@ use super::{
     relocalise::{RelocalisationInput, RelocalisationUpdate, Relocalisers, hypothesis_wire},
     slots::{FrameOutcome, SlotKey, Slots},
     snapshot::{MapSnapshot, Snapshots},
+    vitals::Vitals,
 };
-use crate::frame_tap::{AnalysedFrame, FrameTap};
 use crate::frame_times::FrameTimes;
-use crate::vitals::Vitals;
 use map::pose2::Pose2Covariance;
 use protos::{CheckedFrame, Code, Name, Rejection, v1};
 use std::{cell::Cell, sync::Arc, time::Instant};

@@ -40,13 +40,17 @@ pub enum Code {
     Expired,
     /// More cameras, robots, elements or questions at a time than the server serves.
     TooMany,
+    /// More messages or bytes a second than one robot may send; the detail names the limit and how long to wait.
+    RateLimited,
+    /// The frames of all robots that wait take more memory than the server gives them.
+    Overloaded,
     /// The server failed on this input; reported, counted, and the server goes on.
     Internal,
 }
 
 impl Code {
     /// All codes.
-    pub const ALL: [Code; 18] = [
+    pub const ALL: [Code; 20] = [
         Code::BadMessage,
         Code::BadName,
         Code::Missing,
@@ -64,6 +68,8 @@ impl Code {
         Code::ClockBehind,
         Code::Expired,
         Code::TooMany,
+        Code::RateLimited,
+        Code::Overloaded,
         Code::Internal,
     ];
 
@@ -87,6 +93,8 @@ impl Code {
             Code::ClockBehind => "clock_behind",
             Code::Expired => "expired",
             Code::TooMany => "too_many",
+            Code::RateLimited => "rate_limited",
+            Code::Overloaded => "overloaded",
             Code::Internal => "internal",
         }
     }

@@ -7,12 +7,14 @@
 mod addresses;
 mod backup;
 mod limits;
+mod memory;
 mod ros2;
 mod tls;
 
 pub use backup::BackupSettings;
 pub(crate) use backup::MAX_KEPT;
 pub use limits::Limits;
+pub use memory::MemoryShare;
 pub use ros2::{
     MAX_DOMAIN, MAX_KEY_PREFIX_BYTES, MAX_ROS2_ROBOTS, MAX_TRANSFORM_TOLERANCE_S, Middleware, PoseSource,
     RawRos2, RawRos2Camera, RawRos2Robot, Ros2Outputs, Ros2Robot,
@@ -226,6 +228,13 @@ impl TryFrom<RawConfig> for Config {
                     format!("{value} is more than {} px", vision::frame::MAX_AREA_PX),
                 ));
             }
+        }
+        if raw.limits.waiting_frame_bytes < raw.limits.frame_bytes {
+            let reason = format!(
+                "less than limits.frame_bytes = {}: no such frame would be taken",
+                raw.limits.frame_bytes
+            );
+            return Err(invalid("limits.waiting_frame_bytes", reason));
         }
         if raw.limits.landmarks > MAX_LANDMARKS {
             return Err(invalid("limits.landmarks", format!("more than {MAX_LANDMARKS}")));

@@ -29,6 +29,7 @@ use engine::{
     live::LiveHub,
     motion::MotionTracker,
     panics::Panics,
+    quotas::{Quotas, Rates},
     slots::Slots,
     snapshot::Snapshots,
     vitals::{Pulse, Vitals},
@@ -90,6 +91,7 @@ impl Server {
     pub async fn start(config: Config) -> Result<RunningServer, StartError> {
         let config = Arc::new(config);
         crate::metrics::process::started();
+        config.log_memory_ceiling();
         let (store, writer) = Catalogue::open(&config).await?;
         let (stop, stopping) = watch::channel(false);
         let certificates = open_certificates(&config, &stopping)?;
@@ -257,8 +259,8 @@ fn engine(
     let (records, recorded) = answer_records();
     let live = Arc::new(LiveHub::default());
     let engine = Engine {
-        slots: Arc::new(Slots::new(config.limits.cameras)),
-        motion: Arc::new(MotionTracker::new(snapshots.clone(), live.clone())),
+        slots: Arc::new(Slots::new(config.limits.cameras, config.limits.waiting_frame_bytes)),
+        motion: Arc::new(MotionTracker::new(snapshots.clone(), live.clone()).with_quotas(quotas(config))),
         snapshots,
         live,
         limits: ImageLimits { bytes: config.limits.frame_bytes, pixels: config.limits.frame_pixels },
@@ -272,6 +274,16 @@ fn engine(
         search_every_frame: config.search_every_frame,
     };
     (engine, recorded)
+}
+
+/// What each robot may send.
+fn quotas(config: &Config) -> Quotas {
+    Quotas::new(Rates {
+        frames_per_s: config.limits.robot_frames_per_s,
+        odometry_per_s: config.limits.robot_odometry_per_s,
+        scans_per_s: config.limits.robot_scans_per_s,
+        bytes_per_s: config.limits.robot_bytes_per_s,
+    })
 }
 
 /// Stores findings about landmarks, until the last worker has stopped.

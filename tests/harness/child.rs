@@ -66,6 +66,11 @@ impl Child {
         MapClient::new(&self.url).expect("a client")
     }
 
+    /// Its number at the system.
+    pub fn id(&self) -> u32 {
+        self.process.id()
+    }
+
     /// SIGKILL: no destructor, no last write.
     pub fn kill(mut self) {
         self.process.kill().expect("kill");

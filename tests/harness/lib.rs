@@ -2,6 +2,7 @@
 //! test process, pictures to send. The claims are in `end_to_end/`, one a file.
 
 pub mod bag;
+pub mod bombs;
 mod child;
 pub mod command;
 pub mod documents;
@@ -52,6 +53,7 @@ impl Inside {
         let data = TempDir::new().expect("a temporary directory");
         let protocol = if settings.tls.enabled { "tls" } else { "tcp" };
         let raw = RawConfig {
+            limits: in_quick_motion(&settings.limits),
             data: data.path().to_owned(),
             http: "127.0.0.1:0".into(),
             zenoh: format!("{protocol}/127.0.0.1:0"),
@@ -77,6 +79,20 @@ impl Inside {
     /// A client of this server.
     pub fn maps(&self) -> MapClient {
         MapClient::new(&self.url()).expect("a client")
+    }
+}
+
+/// Robots of tests send the readings of minutes within seconds: limits that are left at their defaults do not hold them up.
+fn in_quick_motion(limits: &Limits) -> Limits {
+    let default = Limits::default();
+    let raised = |of: fn(&Limits) -> u32| if of(limits) == of(&default) { 1_000_000 } else { of(limits) };
+    Limits {
+        robot_frames_per_s: raised(|l| l.robot_frames_per_s),
+        robot_odometry_per_s: raised(|l| l.robot_odometry_per_s),
+        robot_scans_per_s: raised(|l| l.robot_scans_per_s),
+        token_requests_per_s: raised(|l| l.token_requests_per_s),
+        address_requests_per_s: raised(|l| l.address_requests_per_s),
+        ..limits.clone()
     }
 }
 

@@ -7,6 +7,7 @@ use super::{
 use crate::{
     panics::{Edge, Panics},
     scan_job::ScanJob,
+    threads::{self, Class},
 };
 use map::{
     pose2::{Pose2, Pose2Covariance},
@@ -93,7 +94,7 @@ impl Session {
                 fail(&shared, "the server failed on these scans; see its log");
             }
         };
-        let thread = std::thread::Builder::new().name("mapping".into()).spawn(work);
+        let thread = threads::spawn(Class::Background, "mapping", work);
         thread.inspect_err(|error| tracing::error!(%error, "mapping_thread_failed")).ok()?;
         Some(Self { robot: head.robot, epoch, commands: Some(commands), progress })
     }

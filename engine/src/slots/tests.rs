@@ -1,6 +1,16 @@
 use super::*;
 use proptest::prelude::*;
 
+/// Bytes of all frames that wait or are in work.
+const BYTES: usize = 100_000;
+
+/// In these tests a frame is a number, and takes as many bytes.
+impl Held for u64 {
+    fn held_bytes(&self) -> usize {
+        *self as usize
+    }
+}
+
 fn key(robot: &str, camera: &str) -> SlotKey {
     SlotKey { robot: Name::new(robot).unwrap(), camera: Name::new(camera).unwrap() }
 }
@@ -11,7 +21,7 @@ fn whole(counts: &FrameCounts) {
 
 #[test]
 fn one_in_work_one_waiting_newest_wins() {
-    let slots = Slots::new(4);
+    let slots = Slots::new(4, BYTES);
     let (k, now) = (key("r1", "front"), Instant::now());
     slots.offer(k.clone(), (1, 1), 1, now).unwrap();
     assert_eq!(slots.try_take(), Some((k.clone(), 1)));
@@ -31,7 +41,7 @@ fn one_in_work_one_waiting_newest_wins() {
 
 #[test]
 fn old_numbers_are_refused_in_each_epoch() {
-    let slots = Slots::new(4);
+    let slots = Slots::new(4, BYTES);
     let (k, now) = (key("r1", "front"), Instant::now());
     let offer = |epoch, seq| slots.offer(k.clone(), (epoch, seq), 0, now).map_err(|r| (r.code, r.field));
     assert_eq!(offer(7, 10), Ok(()));
@@ -61,7 +71,7 @@ fn epochs_are_remembered_up_to_the_bound() {
 /// Cameras with invented names must not keep the robot's own one out.
 #[test]
 fn the_camera_with_the_oldest_frame_is_replaced() {
-    let slots = Slots::new(100);
+    let slots = Slots::new(100, BYTES);
     let start = Instant::now();
     let offer = |camera: &str, seq, now| slots.offer(key("r1", camera), (1, seq), 0, now).map_err(|r| r.code);
     for c in 0..MAX_CAMERAS_PER_ROBOT {
@@ -93,7 +103,7 @@ fn the_camera_with_the_oldest_frame_is_replaced() {
 
 #[test]
 fn slots_take_turns() {
-    let slots = Slots::new(4);
+    let slots = Slots::new(4, BYTES);
     let now = Instant::now();
     let (fast, slow) = (key("fast", "a"), key("slow", "a"));
     let mut turns = Vec::new();
@@ -109,9 +119,59 @@ fn slots_take_turns() {
     whole(&slots.counts());
 }
 
+/// A robot with all its cameras at 200 Hz has the share of one robot.
+#[test]
+fn a_robot_with_many_cameras_has_one_share() {
+    let slots = Slots::new(64, BYTES);
+    let now = Instant::now();
+    let greedy: Vec<_> = (0..MAX_CAMERAS_PER_ROBOT).map(|c| key("greedy", &format!("c{c}"))).collect();
+    let quiet: Vec<_> = (0..4).map(|r| key(&format!("quiet-{r}"), "front")).collect();
+    let mut work: BTreeMap<Name, usize> = BTreeMap::new();
+    let mut cameras: BTreeMap<Name, usize> = BTreeMap::new();
+    for seq in 1..=1000 {
+        for k in greedy.iter().chain(&quiet) {
+            slots.offer(k.clone(), (1, seq), 1, now).unwrap();
+        }
+        // Two workers.
+        let taken: Vec<_> = (0..2).filter_map(|_| slots.try_take()).collect();
+        for (k, _) in taken {
+            slots.finish(&k, FrameOutcome::Processed);
+            *cameras.entry(k.camera).or_default() += usize::from(k.robot.as_str() == "greedy");
+            *work.entry(k.robot).or_default() += 1;
+        }
+    }
+    let fair = 2000 / 5;
+    assert_eq!(work.values().sum::<usize>(), 2000);
+    assert!(work.values().all(|taken| taken.abs_diff(fair) <= 2), "{work:?}");
+    let of_camera = fair / MAX_CAMERAS_PER_ROBOT;
+    let greedy: Vec<_> = greedy.iter().map(|k| cameras[&k.camera]).collect();
+    assert!(greedy.iter().all(|taken| taken.abs_diff(of_camera) <= 2), "{greedy:?}");
+    whole(&slots.counts());
+}
+
+#[test]
+fn frames_beyond_the_memory_for_them_are_refused() {
+    let slots = Slots::new(64, 1_000);
+    let now = Instant::now();
+    let offer = |camera: &str, seq, bytes: u64| {
+        slots.offer(key("r1", camera), (1, seq), bytes, now).map_err(|r| (r.code, r.field))
+    };
+    let refused = Err((Code::Overloaded, "frame".to_owned()));
+    assert_eq!((offer("a", 1, 600), offer("b", 1, 400), slots.held_bytes()), (Ok(()), Ok(()), 1_000));
+    assert_eq!(offer("c", 1, 1), refused);
+    assert_eq!((offer("a", 2, 500), slots.held_bytes()), (Ok(()), 900), "the replaced one counts no more");
+    let (k, _) = slots.try_take().unwrap();
+    assert_eq!((slots.held_bytes(), offer("c", 2, 101)), (900, refused), "what is in work counts");
+    slots.finish(&k, FrameOutcome::Processed);
+    assert_eq!((slots.held_bytes(), offer("c", 3, 600)), (400, Ok(())));
+    slots.close();
+    assert_eq!(slots.held_bytes(), 0);
+    whole(&slots.counts());
+}
+
 #[test]
 fn cameras_at_the_bounds() {
-    let slots = Slots::new(MAX_CAMERAS_PER_ROBOT + 1);
+    let slots = Slots::new(MAX_CAMERAS_PER_ROBOT + 1, BYTES);
     let now = Instant::now();
     for c in 0..MAX_CAMERAS_PER_ROBOT {
         slots.offer(key("r1", &format!("c{c}")), (1, 1), 0, now).unwrap();
@@ -131,7 +191,7 @@ fn cameras_at_the_bounds() {
 
 #[test]
 fn closing_wakes_workers_and_counts_what_waited() {
-    let slots = std::sync::Arc::new(Slots::new(2));
+    let slots = std::sync::Arc::new(Slots::new(2, BYTES));
     let waiting = std::thread::spawn({
         let slots = slots.clone();
         move || slots.take()
@@ -141,7 +201,7 @@ fn closing_wakes_workers_and_counts_what_waited() {
     assert_eq!(waiting.join().unwrap(), None);
     assert_eq!(slots.offer(key("r1", "a"), (1, 1), 0, Instant::now()).unwrap_err().code, Code::Expired);
 
-    let slots = Slots::new(2);
+    let slots = Slots::new(2, BYTES);
     slots.offer(key("r1", "a"), (1, 1), 0, Instant::now()).unwrap();
     slots.close();
     assert_eq!((slots.counts().expired, slots.take()), (1, None));
@@ -173,7 +233,7 @@ proptest! {
     /// and what is taken is the newest of its camera.
     #[test]
     fn every_frame_ends_exactly_once(steps in steps()) {
-        let slots = Slots::new(3);
+        let slots = Slots::new(3, BYTES);
         let now = Instant::now();
         let mut held: Vec<(SlotKey, FrameOutcome)> = Vec::new();
         let mut newest: BTreeMap<SlotKey, u64> = BTreeMap::new();
@@ -201,6 +261,7 @@ proptest! {
             prop_assert_eq!(counts.missing(), 0);
             prop_assert_eq!(counts.in_work, held.len() as u64);
             prop_assert!(counts.waiting <= 3);
+            prop_assert!(slots.held_bytes() <= BYTES && (counts.waiting + counts.in_work > 0 || slots.held_bytes() == 0));
         }
     }
 }

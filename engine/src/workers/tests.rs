@@ -246,6 +246,7 @@ impl RestingRobot {
             deadline: now + Duration::from_mins(10),
             clock_suspect: false,
             stamp_instead_ns: None,
+            message_bytes: 0,
         };
         let sent = Sent::default();
         assert_eq!(self.engine.answer_frame(&key(0), &job, &sent), FrameOutcome::Processed);

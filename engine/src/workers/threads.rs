@@ -7,6 +7,7 @@ use crate::{
     motion::MotionTracker,
     panics::Edge,
     slots::{FrameOutcome, SlotKey, Slots},
+    threads::{self, Class},
 };
 use std::{sync::Arc, thread::JoinHandle, time::Instant};
 
@@ -21,28 +22,28 @@ pub struct Workers {
 impl Workers {
     /// Starts `count` threads for frames, at least one, and one for laser scans.
     pub fn start(engine: &Engine, count: usize, publish: &Arc<impl Publish>) -> std::io::Result<Self> {
-        let mut threads = Vec::with_capacity(count + 1);
+        let mut running = Vec::with_capacity(count + 1);
         for i in 0..count.max(1) {
             let (engine, publish) = (engine.clone(), publish.clone());
             let name = format!("vision-{i}");
             let pulse = engine.vitals.begin(format!("the worker thread {name}"));
             let heart = engine.vitals.hearts().begin(format!("the worker thread {name}"));
-            threads.push(std::thread::Builder::new().name(name).spawn(move || {
+            running.push(threads::spawn(Class::Answers, name, move || {
                 // Dropped with the thread, however that ends.
                 let _pulse = pulse;
                 while let Some((key, job)) = engine.slots.take() {
                     heart.beat();
                     let outcome = engine.answer_in_span(&key, &job, publish.as_ref());
+                    threads::note_frame(Instant::now());
                     engine.slots.finish(&key, outcome);
                     heart.rest();
                 }
             })?);
         }
         let (laser, publish) = (engine.clone(), publish.clone());
-        let named = std::thread::Builder::new().name("laser".to_owned());
         let pulse = engine.vitals.begin("the laser thread");
         let heart = engine.vitals.hearts().begin("the laser thread");
-        threads.push(named.spawn(move || {
+        running.push(threads::spawn(Class::Answers, "laser", move || {
             let _pulse = pulse;
             while let Some((robot, job)) = laser.motion.scans().take() {
                 heart.beat();
@@ -55,7 +56,7 @@ impl Workers {
                 heart.rest();
             }
         })?);
-        Ok(Self { slots: engine.slots.clone(), motion: engine.motion.clone(), threads })
+        Ok(Self { slots: engine.slots.clone(), motion: engine.motion.clone(), threads: running })
     }
 
     /// Returns when every frame in work is answered. Waits: not for an async thread.

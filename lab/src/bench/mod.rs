@@ -7,6 +7,7 @@ pub(crate) use peers::Python;
 mod detect;
 mod edits;
 mod encrypted;
+mod load;
 mod recognise;
 
 /// `waymark-lab bench`.
@@ -48,6 +49,15 @@ enum What {
     /// Server, robot and peers run in this program with certificates of one authority. Each frame is sent in turn with
     /// an echo of the same bytes; times are of the clock, from send to answer. The client of HTTP shares the cores.
     Encrypted(encrypted::Args),
+    /// A server under the load of many robots, in a process of its own, while it learns.
+    ///
+    /// `waymark serve` is started with encryption and taught a corridor; a second process plays the robots, each with
+    /// a certificate, and sends rendered frames at intended times. A second map is learnt all the time. With
+    /// `--factor 5` half of the robots send so much that all together send five times as much as usual.
+    Load(load::Args),
+    /// Plays the robots of `load`.
+    #[command(name = load::GENERATOR, hide = true)]
+    LoadGenerator(load::GeneratorArgs),
 }
 
 pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
@@ -57,5 +67,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
         Some(What::Recognise(args)) => recognise::run(args),
         Some(What::Edits(args)) => edits::run(args),
         Some(What::Encrypted(args)) => encrypted::run(args),
+        Some(What::Load(args)) => load::run(args),
+        Some(What::LoadGenerator(args)) => load::generate(args),
     }
 }

@@ -11,6 +11,7 @@ use engine::{
     localise::{LocaliseFrame, LocaliseInput, localise},
     panics::Edge,
     snapshot::MapSnapshot,
+    threads::{self, Class},
 };
 use protos::{
     Code, Key, Keys, Name, Rejection,
@@ -86,8 +87,8 @@ impl Localiser {
                 reply(&job.robot, &job.query, done.unwrap_or_else(failed));
             }
         };
-        let named = std::thread::Builder::new().name("localise".to_owned());
-        let thread = named.spawn(work).map_err(|source| BusError::Thread { name: "localise", source })?;
+        let thread = threads::spawn(Class::Requests, "localise", work)
+            .map_err(|source| BusError::Thread { name: "localise", source })?;
         let receive = {
             let (keys, to) = (keys.clone(), to.clone());
             move |query: Query| {

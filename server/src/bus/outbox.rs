@@ -9,6 +9,7 @@ use engine::{
     heartbeats::Heartbeat,
     panics::{Edge, Panics},
     slots::SlotKey,
+    threads::{self, Class},
     workers::Publish,
 };
 use protos::{Key, Keys, Name, prost::Message, v1};
@@ -65,10 +66,9 @@ impl Outbox {
         let (queue, messages) = sync_channel(QUEUE);
         let (heart, waiting) = (to.vitals.hearts().begin("the outbox"), Arc::<AtomicU64>::default());
         let counted = (heart.clone(), waiting.clone());
-        let thread = std::thread::Builder::new()
-            .name("outbox".into())
-            .spawn(move || deliver(&session, &messages, &panics, &counted))
-            .map_err(|source| BusError::Thread { name: "outbox", source })?;
+        let thread =
+            threads::spawn(Class::Answers, "outbox", move || deliver(&session, &messages, &panics, &counted))
+                .map_err(|source| BusError::Thread { name: "outbox", source })?;
         Ok(Self {
             keys,
             to: to.clone(),

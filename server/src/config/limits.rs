@@ -1,4 +1,4 @@
-//! Bounds of the server, with their defaults.
+//! Every bound of the server.
 
 use engine::decode::ImageLimits;
 use serde::{Deserialize, Serialize};
@@ -8,11 +8,20 @@ use serde::{Deserialize, Serialize};
 #[serde(default, deny_unknown_fields)]
 pub struct Limits {
     /// Largest message from a robot, in bytes. Up to 60 000 bytes fit one zenoh batch and are not fragmented. Raw colour of
-    /// 640 x 480 takes 921 600, of 1280 x 1024 (the default's largest) 3 932 160. Each camera may have one frame waiting, so
-    /// `cameras` times this bounds their memory.
+    /// 640 x 480 takes 921 600, of 1280 x 1024 (the default's largest) 3 932 160.
     pub frame_bytes: usize,
     /// Largest frame, in pixels.
     pub frame_pixels: usize,
+    /// Bytes of all frames that wait or are in work; a frame beyond them is refused.
+    pub waiting_frame_bytes: usize,
+    /// Frames and quads a second of one robot, over all its cameras.
+    pub robot_frames_per_s: u32,
+    /// Odometry messages a second of one robot.
+    pub robot_odometry_per_s: u32,
+    /// Laser scans a second of one robot.
+    pub robot_scans_per_s: u32,
+    /// Bytes a second of one robot, over all its messages.
+    pub robot_bytes_per_s: usize,
     /// Largest uploaded image, in bytes.
     pub upload_bytes: usize,
     /// Largest bundle of a map that is taken, in bytes.
@@ -37,6 +46,12 @@ pub struct Limits {
     pub cameras: usize,
     /// HTTP connections at a time.
     pub connections: usize,
+    /// The same from one address: of a proxy, all of its clients.
+    pub connections_per_address: usize,
+    /// Requests a second of one token over HTTP. The local token is not bound by it.
+    pub token_requests_per_s: u32,
+    /// Requests a second without a valid token, of one address.
+    pub address_requests_per_s: u32,
     /// Live event streams (SSE) at a time.
     pub streams: usize,
     /// Seconds until the head of a request must be there.
@@ -82,6 +97,11 @@ impl Default for Limits {
         Self {
             frame_bytes: 4 << 20,
             frame_pixels: 2_304_000,
+            waiting_frame_bytes: 256 << 20,
+            robot_frames_per_s: 120,
+            robot_odometry_per_s: 500,
+            robot_scans_per_s: 100,
+            robot_bytes_per_s: 32 << 20,
             upload_bytes: 16 << 20,
             bundle_bytes: 1 << 30,
             upload_pixels: vision::frame::MAX_AREA_PX,
@@ -94,6 +114,9 @@ impl Default for Limits {
             robots: 1_000,
             cameras: 2_000,
             connections: 256,
+            connections_per_address: 128,
+            token_requests_per_s: 200,
+            address_requests_per_s: 50,
             streams: 64,
             header_timeout_s: 5,
             request_timeout_s: 30,
@@ -118,10 +141,15 @@ impl Default for Limits {
 
 impl Limits {
     /// Name and value of every bound that must not be 0.
-    pub(super) fn counts(&self) -> [(&'static str, usize); 30] {
+    pub(super) fn counts(&self) -> [(&'static str, usize); 38] {
         [
             ("limits.frame_bytes", self.frame_bytes),
             ("limits.frame_pixels", self.frame_pixels),
+            ("limits.waiting_frame_bytes", self.waiting_frame_bytes),
+            ("limits.robot_frames_per_s", self.robot_frames_per_s as usize),
+            ("limits.robot_odometry_per_s", self.robot_odometry_per_s as usize),
+            ("limits.robot_scans_per_s", self.robot_scans_per_s as usize),
+            ("limits.robot_bytes_per_s", self.robot_bytes_per_s),
             ("limits.upload_bytes", self.upload_bytes),
             ("limits.bundle_bytes", self.bundle_bytes),
             ("limits.bundle_timeout_s", self.bundle_timeout_s as usize),
@@ -135,6 +163,9 @@ impl Limits {
             ("limits.robots", self.robots),
             ("limits.cameras", self.cameras),
             ("limits.connections", self.connections),
+            ("limits.connections_per_address", self.connections_per_address),
+            ("limits.token_requests_per_s", self.token_requests_per_s as usize),
+            ("limits.address_requests_per_s", self.address_requests_per_s as usize),
             ("limits.header_timeout_s", self.header_timeout_s as usize),
             ("limits.request_timeout_s", self.request_timeout_s as usize),
             ("limits.write_timeout_s", self.write_timeout_s as usize),

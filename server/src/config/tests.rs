@@ -168,6 +168,8 @@ fn bad_settings_are_named() {
         (RawConfig { workers: MAX_WORKERS + 1, ..RawConfig::default() }, "workers"),
         (limits(|l| l.landmarks = MAX_LANDMARKS + 1), "limits.landmarks"),
         (limits(|l| l.views = 0), "limits.views"),
+        (limits(|l| l.robot_bytes_per_s = 0), "limits.robot_bytes_per_s"),
+        (limits(|l| l.waiting_frame_bytes = l.frame_bytes - 1), "limits.waiting_frame_bytes"),
         (limits(|l| l.upload_pixels = vision::frame::MAX_AREA_PX + 1), "limits.upload_pixels"),
     ] {
         match Config::try_from(raw) {

@@ -23,7 +23,11 @@ use crate::{
         views::NewView,
     },
 };
-use engine::{panics::Edge, picture};
+use engine::{
+    panics::Edge,
+    picture,
+    threads::{self, Class},
+};
 use frame_tap::{ActiveGatherings, lock};
 use map::tracks::{GatherParams, StoredTrack, TrackOutcome, ViewTracker};
 use protos::{
@@ -226,9 +230,9 @@ impl Gatherer {
     async fn run(self: Arc<Self>, mut frames: Receiver<OfferedFrame>) {
         while let Some(frame) = frames.recv().await {
             let (gathering, params) = (frame.gathering.clone(), self.params.clone());
-            let views = tokio::task::spawn_blocking(move || new_views(&frame, &params)).await;
+            let views = threads::run(Class::Background, move || new_views(&frame, &params)).await;
             let (panics, what) = (self.store.vitals().panics(), "a frame of a robot that gathers");
-            let Ok(views) = panics.joined(Edge::Gathering, what, "it gives no views", views) else {
+            let Ok(views) = panics.ended(Edge::Gathering, what, "it gives no views", views) else {
                 continue;
             };
             for (track, view) in views {

@@ -89,8 +89,14 @@ impl IntoResponse for ApiError {
         let (status, revision) = (self.status, self.revision.clone());
         let body = serde_json::to_vec(&self.problem()).unwrap_or_default();
         let mut response = (status, [(header::CONTENT_TYPE, PROBLEM_JSON)], body).into_response();
-        if status == StatusCode::SERVICE_UNAVAILABLE {
-            response.headers_mut().insert(header::RETRY_AFTER, HeaderValue::from_static("2"));
+        let retry_after_s = match status {
+            StatusCode::SERVICE_UNAVAILABLE => Some("2"),
+            // Of a rate of at least 1 request a second.
+            StatusCode::TOO_MANY_REQUESTS => Some("1"),
+            _ => None,
+        };
+        if let Some(seconds) = retry_after_s {
+            response.headers_mut().insert(header::RETRY_AFTER, HeaderValue::from_static(seconds));
         }
         response.headers_mut().extend(revision.and_then(|is| etag(&is)).map(|tag| (header::ETAG, tag)));
         response

@@ -1,4 +1,4 @@
-//! Around every request: an id, a log line, a deadline, a place for a large body, safe headers, and a refusal of what other web pages send.
+//! Around every request: an id, a log line, a bound of how often is asked, a deadline, a place for a large body, safe headers, and a refusal of what other web pages send.
 //!
 //! A browser reaches the server on behalf of any page it shows; so a request must name this server as its host and, if it
 //! changes anything, come from its own pages or from no page at all. Who asks is the matter of `authorise`.
@@ -8,6 +8,7 @@ use super::{
     error::ApiError,
     peer::Peer,
     request_id::{REQUEST_ID, RequestId},
+    request_rates::asking,
     reused_answers,
 };
 use crate::config::Limits;
@@ -48,7 +49,9 @@ pub(super) async fn guard(State(app): State<AppState>, mut request: Request, nex
     let is_encrypted = request.extensions().get::<Peer>().is_some_and(|peer| peer.is_encrypted);
     let is_loopback = app.config.tls.is_some() || app.config.http_addr.ip().to_canonical().is_loopback();
     let loopback = is_loopback && !is_encrypted;
-    let mut response = match check_origin(request.method(), request.headers(), loopback) {
+    let may_ask = asking(&app, &request, started).map_or(Ok(()), |who| app.rates.take(who, started));
+    let checked = check_origin(request.method(), request.headers(), loopback).and(may_ask);
+    let mut response = match checked {
         Err(error) => error.into_response(),
         Ok(()) => match reused_answers::kept(&app, &request) {
             Some(response) => response,

@@ -1,4 +1,4 @@
-//! The accept loop: bounded connections, a deadline for the handshake, for the head of a request and for the reading of an
+//! The accept loop: bounded connections, of which one address has its part, a deadline for the handshake, for the head of a request and for the reading of an
 //! answer, a graceful end. axum's own `serve` installs no timer, so hyper's deadline would not work there.
 
 use super::{
@@ -12,7 +12,14 @@ use hyper_util::{
     rt::{TokioIo, TokioTimer},
     server::graceful::{GracefulShutdown, Watcher},
 };
-use std::{io, net::SocketAddr, pin::Pin, sync::Arc, time::Duration};
+use std::{
+    collections::BTreeMap,
+    io,
+    net::{IpAddr, SocketAddr},
+    pin::Pin,
+    sync::{Arc, Mutex, PoisonError},
+    time::Duration,
+};
 use tokio::{
     io::{AsyncRead, AsyncWrite},
     net::{TcpListener, TcpStream},
@@ -28,6 +35,41 @@ const HEAD_MAX: usize = 32 << 10;
 const STOP_GRACE: Duration = Duration::from_secs(5);
 /// Pause after a failed accept: usually too many open files.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
+
+/// Open connections by address. An address without any is forgotten, so there are no more than connections.
+#[derive(Debug, Default)]
+struct Addresses(Mutex<BTreeMap<IpAddr, usize>>);
+
+/// One connection of an address.
+struct OfAddress {
+    all: Arc<Addresses>,
+    ip: IpAddr,
+}
+
+impl Addresses {
+    /// One more of an address; `None` if it has as many as it may have.
+    fn take(self: &Arc<Self>, ip: IpAddr, most: usize) -> Option<OfAddress> {
+        let mut open = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let count = open.entry(ip).or_default();
+        if *count >= most {
+            return None;
+        }
+        *count += 1;
+        Some(OfAddress { all: self.clone(), ip })
+    }
+}
+
+impl Drop for OfAddress {
+    fn drop(&mut self) {
+        let mut open = self.all.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(count) = open.get_mut(&self.ip) {
+            *count -= 1;
+            if *count == 0 {
+                open.remove(&self.ip);
+            }
+        }
+    }
+}
 
 /// How connections are served.
 #[derive(Clone)]
@@ -50,6 +92,7 @@ pub(crate) async fn serve(
     mut stopping: watch::Receiver<bool>,
 ) {
     let places = Arc::new(Semaphore::new(limits.connections));
+    let addresses = Arc::<Addresses>::default();
     let graceful = GracefulShutdown::new();
     let header_timeout = Duration::from_secs(limits.header_timeout_s);
     let mut http = http1::Builder::new();
@@ -68,12 +111,17 @@ pub(crate) async fn serve(
             accepted = accept(&listener, &places) => accepted,
         };
         let Some((stream, peer, place)) = accepted else { continue };
+        let ip = peer.ip().to_canonical();
+        let Some(of_address) = addresses.take(ip, limits.connections_per_address) else {
+            tracing::debug!(%ip, most = limits.connections_per_address, "connection_closed_too_many_of_address");
+            continue;
+        };
         let (serving, watcher) = (serving.clone(), graceful.watcher());
         tokio::spawn(async move {
             if let Err(error) = serving.connection(stream, peer, watcher).await {
                 tracing::debug!(error, "connection");
             }
-            drop(place);
+            drop((of_address, place));
         });
     }
     drop(listener);
@@ -196,6 +244,19 @@ mod tests {
         let head = format!("GET {path} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n");
         stream.write_all(head.as_bytes()).await.unwrap();
         stream
+    }
+
+    #[test]
+    fn connections_of_an_address_at_the_bound() {
+        let all = Arc::<Addresses>::default();
+        let ip = |last| IpAddr::from([192, 0, 2, last]);
+        let held: Vec<_> = (0..3).map(|_| all.take(ip(1), 3)).collect();
+        assert!(held.iter().all(Option::is_some));
+        assert!(all.take(ip(1), 3).is_none());
+        assert!(all.take(ip(2), 3).is_some(), "another address has its own");
+        drop(held);
+        assert!(all.0.lock().unwrap().is_empty());
+        assert!(all.take(ip(1), 3).is_some());
     }
 
     #[tokio::test]

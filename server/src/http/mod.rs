@@ -42,6 +42,7 @@ mod refused_views;
 mod reference_runs;
 mod relocalisation;
 mod request_id;
+mod request_rates;
 mod replay;
 mod reused_answers;
 mod revision;
@@ -80,8 +81,16 @@ use crate::{
 use authorise::Asker;
 use axum::http::StatusCode;
 use engine::{
-    frame_times::FrameTimes, intake::FrameJob, kept_frames::KeptFrames, live::LiveHub, motion::MotionTracker,
-    panics::Edge, relocalise::Relocalisers, slots::Slots, workers::Engine,
+    frame_times::FrameTimes,
+    intake::FrameJob,
+    kept_frames::KeptFrames,
+    live::LiveHub,
+    motion::MotionTracker,
+    panics::Edge,
+    relocalise::Relocalisers,
+    slots::Slots,
+    threads::{self, Class},
+    workers::Engine,
 };
 use error::ApiError;
 use reused_answers::ReusedAnswers;
@@ -134,6 +143,8 @@ pub(crate) struct App {
     pub(crate) enrolment: Option<Enrolment>,
     /// Becomes true when the server stops; ends event streams.
     pub(crate) stopping: watch::Receiver<bool>,
+    /// How often each token and address may ask.
+    rates: request_rates::RequestRates,
     /// Answers to reads of maps.
     reused: ReusedAnswers,
     /// Places for vision work asked for over HTTP: as many as there are vision threads.
@@ -173,6 +184,7 @@ impl App {
         let vision = Arc::new(Semaphore::new(config.workers));
         let streams = Arc::new(Semaphore::new(config.limits.streams));
         let uploads = Semaphore::new(config.limits.uploads);
+        let rates = request_rates::RequestRates::new(&config.limits);
         let (live, motion) = (engine.live.clone(), engine.motion.clone());
         let (slots, frame_times) = (engine.slots.clone(), engine.times.clone());
         let (searches, kept_frames) = (engine.relocalisers.clone(), engine.kept_frames.clone());
@@ -195,6 +207,7 @@ impl App {
             backups,
             enrolment,
             stopping,
+            rates,
             reused: ReusedAnswers::default(),
             vision,
             streams,
@@ -203,21 +216,21 @@ impl App {
         }
     }
 
-    /// Runs vision work off the runtime, a bounded number at a time.
+    /// Runs vision work off the runtime, a bounded number at a time, after that of robots.
     async fn on_vision_thread<T: Send + 'static>(
         self: Arc<Self>,
         work: impl FnOnce(&Self) -> T + Send + 'static,
     ) -> Result<T, ApiError> {
         let vitals = self.store.vitals().clone();
         let place = self.vision.clone().acquire_owned().await.map_err(|e| ApiError::internal(&e))?;
-        let done = tokio::task::spawn_blocking(move || {
+        let done = threads::run(Class::Requests, move || {
             let result = work(&self);
             // Not before the work is done: a client that hangs up does not make room for another.
             drop(place);
             result
         });
         let follows = "the request is refused as internal";
-        let done = vitals.panics().joined(Edge::Request, "vision work of a request", follows, done.await);
+        let done = vitals.panics().ended(Edge::Request, "vision work of a request", follows, done.await);
         done.map_err(|e| ApiError::internal(&e))
     }
 

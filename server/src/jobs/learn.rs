@@ -29,7 +29,11 @@ use crate::{
         views::{self, QuadCrop, TrainingViewRow},
     },
 };
-use engine::{panics::Edge, snapshot::MapSnapshot};
+use engine::{
+    panics::Edge,
+    snapshot::MapSnapshot,
+    threads::{self, Class},
+};
 use std::{
     collections::{BTreeMap, BTreeSet},
     sync::Arc,
@@ -95,9 +99,9 @@ pub(super) async fn run(
         move || compute(&material, &reporter)
     };
     let panics = store.vitals().panics();
-    let learnt = tokio::task::spawn_blocking(work).await;
+    let learnt = threads::run(Class::Background, work).await;
     let learnt = panics
-        .joined(Edge::Job, format_args!("job {}", row.id), "it ends as failed", learnt)
+        .ended(Edge::Job, format_args!("job {}", row.id), "it ends as failed", learnt)
         .map_err(|e| JobError::Failed(format!("the lesson broke off: {e}")))??;
     reporter.report(0.99, "storing");
     match commit(store, map, row.id, learnt, &names, started).await {

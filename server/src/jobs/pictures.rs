@@ -6,7 +6,7 @@ use crate::{
     publication::Catalogue,
     store::{pictures as stored, views::TrainingViewRow},
 };
-use engine::{decode::ImageLimits, picture};
+use engine::{decode::ImageLimits, picture, threads::wait_for};
 use vision::{
     frame::GrayImage,
     points::taught::{MAX_POINT_VIEWS, TaughtPoint, view_points},
@@ -27,9 +27,11 @@ impl Pictures {
 
     /// The picture of a view; `None`, with a log entry, if it cannot be read.
     pub(super) fn of(&self, view: &TrainingViewRow) -> Option<GrayImage> {
-        let image = self.runtime.block_on(stored::read(&self.store, &view.image_sha256));
+        let (store, sha256) = ((*self.store).clone(), view.image_sha256);
+        let read = wait_for(&self.runtime, async move { stored::read(&store, &sha256).await });
+        let image = read.ok_or_else(|| "the server stops".to_owned());
         let decoded = image
-            .map_err(|e| e.to_string())
+            .and_then(|read| read.map_err(|e| e.to_string()))
             .and_then(|bytes| picture::decode(&bytes, self.upload).map_err(|e| e.to_string()));
         let skipped = |reason: &String| {
             let follows = "no views are generated and no points taken from it";

@@ -23,7 +23,11 @@ use crate::{
         views::{self, TrainingViewRow},
     },
 };
-use engine::{panics::Edge, snapshot::MapSnapshot};
+use engine::{
+    panics::Edge,
+    snapshot::MapSnapshot,
+    threads::{self, Class},
+};
 use serde_json::{Value, json};
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -127,9 +131,9 @@ pub(super) async fn run(
         }
     };
     let panics = store.vitals().panics();
-    let made = tokio::task::spawn_blocking(work).await;
+    let made = threads::run(Class::Background, work).await;
     let made = panics
-        .joined(Edge::Job, format_args!("job {}", row.id), "it ends as failed", made)
+        .ended(Edge::Job, format_args!("job {}", row.id), "it ends as failed", made)
         .map_err(|e| JobError::Failed(format!("taking points broke off: {e}")))??;
     let (mut models, mut failed) = (Vec::new(), Vec::new());
     for made in made {

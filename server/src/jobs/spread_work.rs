@@ -1,13 +1,21 @@
 //! Work on many items over several threads, with progress, until the job is done or cancelled.
 
 use super::{JobError, ProgressReporter};
-use std::sync::{
-    Mutex, PoisonError,
-    atomic::{AtomicUsize, Ordering},
+use engine::threads::{beside_robots, robots_are_served};
+use std::{
+    sync::{
+        Mutex, PoisonError,
+        atomic::{AtomicUsize, Ordering},
+    },
+    time::{Duration, Instant},
 };
 
+/// A thread that leaves its place to robots looks so often whether they still need it.
+const STANDING_BACK: Duration = Duration::from_millis(100);
+
 /// `work` on every item, over `threads` threads, results in the order of the items. Progress goes from and to the
-/// given shares.
+/// given shares. For a thread of the class `Background`, whose priority the threads inherit. While robots are served, half of
+/// them stand back between two items.
 pub(super) fn each_of<T: Sync, R: Send>(
     items: &[T],
     threads: usize,
@@ -18,9 +26,18 @@ pub(super) fn each_of<T: Sync, R: Send>(
     let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
     let results = Mutex::new(Vec::with_capacity(items.len()));
     std::thread::scope(|scope| {
-        for _ in 0..threads.min(items.len()) {
-            scope.spawn(|| {
+        for thread in 0..threads.min(items.len()) {
+            let (next, done, results, work) = (&next, &done, &results, &work);
+            scope.spawn(move || {
+                let may_stand_back = thread >= beside_robots(threads);
                 while !reporter.is_cancelled() {
+                    if may_stand_back && robots_are_served(Instant::now()) {
+                        if next.load(Ordering::Relaxed) >= items.len() {
+                            return;
+                        }
+                        std::thread::sleep(STANDING_BACK);
+                        continue;
+                    }
                     let index = next.fetch_add(1, Ordering::Relaxed);
                     let Some(item) = items.get(index) else { return };
                     let result = work(item);

@@ -11,6 +11,7 @@ use crate::store::{
 use engine::{
     panics::Edge,
     snapshot::{LookAlikeClasses, MapSnapshot, Snapshots, look_alike_classes},
+    threads::{self, Class},
     vitals::Vitals,
 };
 use std::{collections::BTreeMap, sync::Arc};
@@ -91,8 +92,8 @@ async fn with_areas(
         planting::planted(&first.name, "visibility areas");
         areas::known(&first, before.as_deref())
     };
-    let made = tokio::task::spawn_blocking(work).await;
-    let (mut known, missing) = panics.joined(Edge::Publication, what, follows, made).ok()?;
+    let made = threads::run(Class::Background, work).await;
+    let (mut known, missing) = panics.ended(Edge::Publication, what, follows, made).ok()?;
     if missing.is_empty() {
         return Some((known, Vec::new()));
     }
@@ -104,8 +105,8 @@ async fn with_areas(
         planting::computed(&map.name, computed.len());
         (known, computed)
     };
-    let made = tokio::task::spawn_blocking(work).await;
-    panics.joined(Edge::Publication, what, follows, made).ok()
+    let made = threads::run(Class::Background, work).await;
+    panics.ended(Edge::Publication, what, follows, made).ok()
 }
 
 /// `map` with one more kind of derived data, and areas that are to be stored. The next version tries again what fails. Until then, areas that fail are left
@@ -131,9 +132,9 @@ async fn derived(
         planting::planted(&map.name, "look-alike classes");
         look_alikes(&map, before.as_deref())
     };
-    let made = tokio::task::spawn_blocking(work).await;
+    let made = threads::run(Class::Background, work).await;
     let follows = "robots relocalise by unique landmarks only, and a pose names none";
-    let made = panics.joined(Edge::Publication, "look-alike classes", follows, made);
+    let made = panics.ended(Edge::Publication, "look-alike classes", follows, made);
     if let Ok(classes) = made {
         next.look_alikes = classes;
         next.pending.look_alikes = false;

@@ -16,7 +16,11 @@ use crate::{
     config::Ros2Robot,
 };
 use counts::Counters;
-use engine::{slots::SlotKey, workers::Publish};
+use engine::{
+    slots::SlotKey,
+    threads::{self, Class},
+    workers::Publish,
+};
 use graph::Graph;
 use inbox::{Dropped, Event, Inbox};
 use outputs::Outputs;
@@ -169,9 +173,7 @@ async fn start(
     };
     thread.declare(declare);
     let pulse = to.vitals.begin(format!("the thread of robot {} of ROS", settings.robot));
-    let spawned = std::thread::Builder::new()
-        .name(format!("ros2-{index}"))
-        .spawn(move || thread.run(pulse))
+    let spawned = threads::spawn(Class::Answers, format!("ros2-{index}"), move || thread.run(pulse))
         .map_err(|source| BusError::Thread { name: "ros2", source })?;
     let listener = Listener { session, wire: &wire, to, inbox: &inbox, counts: &counts };
     let mut subscribers = vec![listener.tokens().await?];

@@ -12,7 +12,10 @@ use super::{
     views::{self, NewView, QuadCrop, UploadOutcome, ViewRow},
     walls,
 };
-use engine::panics::Edge;
+use engine::{
+    panics::Edge,
+    threads::{self, Class},
+};
 use map::segments::LaserSegment;
 use sqlx::{Row, SqliteExecutor};
 use std::sync::Arc;
@@ -83,8 +86,8 @@ pub(super) async fn computed<T: Send + 'static>(
     what: &'static str,
     work: impl FnOnce() -> T + Send + 'static,
 ) -> Result<T, StoreError> {
-    let done = tokio::task::spawn_blocking(work).await;
-    let done = store.vitals().panics().joined(Edge::Write, what, "nothing is written", done);
+    let done = threads::run(Class::Requests, work).await;
+    let done = store.vitals().panics().ended(Edge::Write, what, "nothing is written", done);
     done.map_err(|_ended| StoreError::Panicked)
 }
 

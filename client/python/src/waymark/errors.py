@@ -23,6 +23,8 @@ ADVICE: dict[str, str] = {
     "clock_ahead": "stamp all messages of a robot by one clock, at capture",
     "clock_behind": "stamp all messages of a robot by one clock, at capture",
     "too_large": "send a JPEG (`Image.jpeg`), or raise the server's `limits.frame_bytes`",
+    "rate_limited": "send less often, or raise the server's limits",
+    "overloaded": "send smaller frames, less often",
     "too_many": "stop a robot or a camera that is not needed, or raise the server's limits",
     "unreachable": "is `waymark serve` running, is this its endpoint?",
     "untrusted": "give `MapClient` the `authority` that signs it, and a name that is in it",
