@@ -208,11 +208,8 @@ impl<T: Held> Slots<T> {
         let replaced = slot.waiting.as_ref().map_or(0, Held::held_bytes);
         let held = state.held_bytes - replaced + job.held_bytes();
         if held > self.max_bytes {
-            let detail = format!(
-                "the frames of all robots that wait take more than {} bytes (limits.waiting_frame_bytes): send less often, or \
-                 smaller frames",
-                self.max_bytes
-            );
+            let most = self.max_bytes;
+            let detail = format!("frames that wait take more than {most} bytes (limits.waiting_frame_bytes)");
             return state.refuse(Rejection::new(Code::Overloaded, "frame", detail));
         }
         state.held_bytes = held;

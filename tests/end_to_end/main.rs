@@ -28,6 +28,7 @@ mod imports;
 mod io_errors;
 mod laser;
 mod lists;
+mod load;
 mod log_events;
 mod load;
 mod live_mapping;

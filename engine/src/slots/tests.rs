@@ -268,7 +268,7 @@ proptest! {
 
 #[test]
 fn numbers_that_are_left_out_are_counted_in_their_epoch_and_by_robot() {
-    let slots = Slots::new(4);
+    let slots = Slots::new(4, BYTES);
     let now = Instant::now();
     for (epoch, seq) in [(1, 5), (1, 6), (1, 9), (2, 40), (2, 41), (1, 12)] {
         slots.offer(key("r1", "front"), (epoch, seq), 0, now).unwrap();
@@ -286,7 +286,7 @@ fn numbers_that_are_left_out_are_counted_in_their_epoch_and_by_robot() {
 
 #[test]
 fn the_oldest_wait_is_that_of_a_frame_that_waits_now() {
-    let slots = Slots::new(4);
+    let slots = Slots::new(4, BYTES);
     let now = Instant::now();
     let at = |ms| now + Duration::from_millis(ms);
     assert_eq!(slots.oldest_wait(at(9)), None);
