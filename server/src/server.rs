@@ -99,7 +99,6 @@ impl Server {
     /// Starts a server. When this returns, it answers.
     pub async fn start(config: Config) -> Result<RunningServer, StartError> {
         let config = Arc::new(config);
-        crate::metrics::process::started();
         config.log_memory_ceiling();
         let (store, writer) = Catalogue::open(&config).await?;
         let (stop, stopping) = watch::channel(false);

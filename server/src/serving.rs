@@ -35,6 +35,7 @@ impl Listeners {
         config: &Config,
         certificates: Option<&Arc<Certificates>>,
     ) -> Result<Self, StartError> {
+        crate::metrics::process::started();
         let tls = certificates.map(|all| http::encryption::acceptor(all.current())).transpose();
         let tls = tls.map_err(|e| StartError::Certificates(e.to_string()))?;
         let (http, http_addr) = bind(config.http_addr).await?;

@@ -30,7 +30,6 @@ mod laser;
 mod lists;
 mod load;
 mod log_events;
-mod load;
 mod live_mapping;
 mod localise;
 mod look_alikes;

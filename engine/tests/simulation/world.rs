@@ -111,7 +111,9 @@ impl World {
         let robots: Vec<_> = (0..ROBOTS).map(|n| Robot::new(n, &mut random)).collect();
         let snapshots = Arc::new(Snapshots::default());
         snapshots.publish(map(1));
-        robots.iter().for_each(|robot| snapshots.set_robot(robot.name.as_str(), Some("hall")));
+        for robot in &robots {
+            snapshots.set_robot(robot.name.as_str(), Some("hall"));
+        }
         let motion = Arc::new(MotionTracker::new(snapshots.clone(), Arc::default()));
         let intake = Intake {
             slots: Arc::new(Slots::new(16, 64 << 20)),

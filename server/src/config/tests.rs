@@ -1,8 +1,8 @@
 //! Which settings are read, from where, and which are refused.
 
 use super::*;
-use vision::model::MAX_LANDMARKS;
 use std::collections::BTreeSet;
+use vision::model::MAX_LANDMARKS;
 
 /// Paths of all keys, such as `limits.maps`. `algorithm` is one key: the method's pages list its parameters.
 fn keys(settings: &serde_json::Value, prefix: &str) -> BTreeSet<String> {
