@@ -1,4 +1,5 @@
 use super::*;
+use crate::limits::MAX_ROBOTS;
 use proptest::prelude::*;
 
 /// Bytes of all frames that wait or are in work.
