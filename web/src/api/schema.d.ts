@@ -1332,8 +1332,11 @@ export interface paths {
             cookie?: never;
         };
         /**
-         * Every part of the server runs and goes on, and the database answers. 503 with the `part` that has ended or stands still:
-         *     the process is about to end with an error, too, unless the part goes on again.
+         * Every part of the server runs and goes on, and the database answers. 503: a part has ended or stands still, and the
+         *     process is about to end with an error, too, unless the part goes on again.
+         * @description Open to everybody, so that monitors need no token: without a valid one the answer has status and counts. A token or a
+         *     session adds the names of what its maps contain; one for all maps the parts, the reason of a failed backup and the name
+         *     of the newest.
          */
         get: operations["readyz"];
         put?: never;
@@ -1631,6 +1634,26 @@ export interface paths {
          *     first, at most 2000 of each; empty for a robot that has not moved since the server started.
          */
         get: operations["trajectories"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/servers": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * This server and those that share its router, with their maps, and what more than one of them has. A server that is its own
+         *     router is alone.
+         */
+        get: operations["servers"];
         put?: never;
         post?: never;
         delete?: never;
@@ -4370,18 +4393,27 @@ export interface components {
         };
         /** @description How far the server can do its work. */
         Readiness: {
-            /** @description The newest backup, and why the last attempt failed. */
+            /** @description The newest backup, and why the last attempt failed. A token for all maps is told the name and the reason. */
             backup?: components["schemas"]["BackupHealth"];
+            /** @description How many there are of what is wrong, for whoever asks. */
+            counts?: components["schemas"]["ReadinessCounts"];
             /**
-             * @description Views, tracks and underlays whose stored picture is damaged, at most 100. The picture is not used; the same
-             *     photograph, uploaded again, mends it.
+             * @description Views, tracks and underlays whose stored picture is damaged, at most 100, of maps of the token that asks: none
+             *     without one. The picture is not used; the same photograph, uploaded again, mends it.
              */
             damaged_pictures?: string[];
             /**
              * @description Maps whose stored version cannot be made ready, with the reason: an earlier version is used, or none since the
-             *     server started. A later change of the map tries again.
+             *     server started. A later change of the map tries again. Only maps of the token that asks: none without one.
              */
             maps_not_in_use: {
+                [key: string]: string;
+            };
+            /**
+             * @description Maps that another server has, too, with the reason: robots are refused on them here. Only maps of the token that
+             *     asks.
+             */
+            maps_not_served?: {
                 [key: string]: string;
             };
             /**
@@ -4391,16 +4423,37 @@ export interface components {
             panics: {
                 [key: string]: number;
             };
-            /** @description For how many seconds each part that has work, or is probed, has not gone on. Beyond a few the server is not ready. */
+            /**
+             * @description For how many seconds each part that has work, or is probed, has not gone on. Beyond a few the server is not ready.
+             *     Empty for whoever does not see all maps.
+             */
             parts_still_s?: {
                 [key: string]: number;
             };
             /**
-             * @description `ready`, or `degraded`: everything runs, but something is named in `maps_not_in_use`, `damaged_pictures` or
-             *     `storage.refused`, or the last scheduled backup failed.
+             * @description Why the server has no part in the router that it is to join: no connection, or a name that another server has. Told
+             *     to whoever sees all maps.
+             */
+            router?: string | null;
+            /**
+             * @description `ready`, or `degraded`: everything runs, but one of `counts` is not 0, the disk has no room, the server has no part in
+             *     its router, another server has one of its maps, or the last scheduled backup failed.
              */
             status: string;
             storage?: components["schemas"]["StorageHealth"] | null;
+        };
+        /** @description How many things are wrong, named or not. */
+        ReadinessCounts: {
+            /**
+             * Format: int64
+             * @description Views, tracks and underlays whose stored picture is damaged.
+             */
+            damaged_pictures: number;
+            /**
+             * Format: int64
+             * @description Maps whose stored version is not in use.
+             */
+            maps_not_in_use: number;
         };
         /** @description A recording as it stands. */
         RecordingStatusBody: {
@@ -4794,6 +4847,25 @@ export interface components {
                 [key: string]: number;
             };
         };
+        /** @description A map of a server. */
+        ServedMap: {
+            /** @description Whether robots are answered on it. */
+            is_served: boolean;
+            /** @description Its name. */
+            name: string;
+        };
+        /** @description A server. */
+        ServerBody: {
+            /** @description Its maps, without drafts, by name. */
+            maps: components["schemas"]["ServedMap"][];
+            /** @description Its name. */
+            name: string;
+            /**
+             * Format: int64
+             * @description How many robots are registered with it.
+             */
+            robots: number;
+        };
         /** @description A numbered event. */
         ServerEvent: components["schemas"]["ServerEventBody"] & {
             /**
@@ -4883,6 +4955,30 @@ export interface components {
         } | {
             /** @enum {string} */
             kind: "tokens_changed";
+        };
+        /** @description This server and those that it shares a router with. */
+        Servers: {
+            /** @description Maps that several servers have, with the servers: at most one of them serves it. */
+            contested_maps: {
+                [key: string]: string[];
+            };
+            /** @description Robots that are registered with several servers: their messages must name the map. */
+            contested_robots: {
+                [key: string]: string[];
+            };
+            /**
+             * Format: int64
+             * @description Announcements that were not taken because they were too many.
+             */
+            ignored: number;
+            /** @description There is a connection to the router. */
+            is_connected: boolean;
+            /** @description Endpoints of the router that it joins; empty: it is the router itself. */
+            router: string[];
+            /** @description Name of this server. */
+            server: string;
+            /** @description All servers that live, this one among them, by name. */
+            servers: components["schemas"]["ServerBody"][];
         };
         /** @description Width and height of a landmark. */
         Size: {
@@ -5286,6 +5382,8 @@ export interface components {
             name: string;
             /** @description Of the protocol over zenoh. */
             protocol: string;
+            /** @description Name of this server among those of a router. */
+            server?: string;
             /** @description Of the program. */
             version: string;
         };
@@ -5551,6 +5649,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -5619,6 +5726,15 @@ export interface operations {
             };
             /** @description timeout; `may_be_done: true` if it is a change that had begun */
             408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -5703,6 +5819,15 @@ export interface operations {
             };
             /** @description timeout; `may_be_done: true` if it is a change that had begun */
             408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -5805,6 +5930,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -5885,6 +6019,15 @@ export interface operations {
             };
             /** @description invalid_value */
             422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -5979,6 +6122,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -6045,6 +6197,15 @@ export interface operations {
             };
             /** @description in_use: another one is being made */
             409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -6136,6 +6297,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -6202,6 +6372,15 @@ export interface operations {
             };
             /** @description timeout; `may_be_done: true` if it is a change that had begun */
             408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -6286,6 +6465,15 @@ export interface operations {
             };
             /** @description timeout; `may_be_done: true` if it is a change that had begun */
             408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -6424,6 +6612,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -6537,6 +6734,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -6585,6 +6791,15 @@ export interface operations {
             };
             /** @description timeout; `may_be_done: true` if it is a change that had begun */
             408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -6683,6 +6898,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -6758,6 +6982,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -6826,6 +7059,15 @@ export interface operations {
             };
             /** @description timeout; `may_be_done: true` if it is a change that had begun */
             408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -6917,6 +7159,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -7001,6 +7252,15 @@ export interface operations {
             };
             /** @description out_of_range, invalid_value */
             422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -7141,6 +7401,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -7220,6 +7489,15 @@ export interface operations {
             };
             /** @description timeout; `may_be_done: true` if it is a change that had begun */
             408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -7337,6 +7615,15 @@ export interface operations {
             };
             /** @description precondition_required */
             428: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -7512,6 +7799,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -7666,6 +7962,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -7811,6 +8116,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -7897,6 +8211,15 @@ export interface operations {
             };
             /** @description too_many: bytes of one map, or files of a bundle */
             409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -8002,6 +8325,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -8071,6 +8403,15 @@ export interface operations {
             };
             /** @description timeout; `may_be_done: true` if it is a change that had begun */
             408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -8193,6 +8534,15 @@ export interface operations {
             };
             /** @description precondition_required */
             428: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -8343,6 +8693,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -8485,6 +8844,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -8596,6 +8964,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -8664,6 +9041,15 @@ export interface operations {
             };
             /** @description timeout; `may_be_done: true` if it is a change that had begun */
             408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -8805,6 +9191,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -8902,6 +9297,15 @@ export interface operations {
             };
             /** @description invalid_value */
             422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -9019,6 +9423,15 @@ export interface operations {
             };
             /** @description out_of_range, invalid_value */
             422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -9148,6 +9561,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -9250,6 +9672,15 @@ export interface operations {
             };
             /** @description out_of_range, invalid_value */
             422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -9368,6 +9799,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -9459,6 +9899,15 @@ export interface operations {
             };
             /** @description out_of_range, invalid_value */
             422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -9601,6 +10050,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -9679,6 +10137,15 @@ export interface operations {
             };
             /** @description timeout; `may_be_done: true` if it is a change that had begun */
             408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -9765,6 +10232,15 @@ export interface operations {
             };
             /** @description invalid_value */
             422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -9931,6 +10407,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -10028,6 +10513,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -10106,6 +10600,15 @@ export interface operations {
             };
             /** @description timeout; `may_be_done: true` if it is a change that had begun */
             408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -10200,6 +10703,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -10287,6 +10799,15 @@ export interface operations {
             };
             /** @description timeout; `may_be_done: true` if it is a change that had begun */
             408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -10443,6 +10964,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -10553,6 +11083,15 @@ export interface operations {
             };
             /** @description out_of_range, invalid_value */
             422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -10704,6 +11243,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -10784,6 +11332,15 @@ export interface operations {
             };
             /** @description timeout; `may_be_done: true` if it is a change that had begun */
             408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -10893,6 +11450,15 @@ export interface operations {
             };
             /** @description precondition_required */
             428: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -11078,6 +11644,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -11163,6 +11738,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -11232,6 +11816,15 @@ export interface operations {
             };
             /** @description timeout; `may_be_done: true` if it is a change that had begun */
             408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -11315,6 +11908,15 @@ export interface operations {
             };
             /** @description timeout; `may_be_done: true` if it is a change that had begun */
             408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -11450,6 +12052,15 @@ export interface operations {
             };
             /** @description invalid_value, idempotency_key_reused */
             422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -11624,6 +12235,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -11709,6 +12329,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -11778,6 +12407,15 @@ export interface operations {
             };
             /** @description timeout; `may_be_done: true` if it is a change that had begun */
             408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -11862,6 +12500,15 @@ export interface operations {
             };
             /** @description timeout; `may_be_done: true` if it is a change that had begun */
             408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -11969,6 +12616,15 @@ export interface operations {
             };
             /** @description out_of_range, invalid_value */
             422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -12123,6 +12779,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -12212,6 +12877,15 @@ export interface operations {
             };
             /** @description invalid_value */
             422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -12312,6 +12986,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -12389,6 +13072,15 @@ export interface operations {
             };
             /** @description timeout; `may_be_done: true` if it is a change that had begun */
             408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -12521,6 +13213,15 @@ export interface operations {
             };
             /** @description out_of_range */
             422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -12665,6 +13366,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -12742,6 +13452,15 @@ export interface operations {
             };
             /** @description timeout; `may_be_done: true` if it is a change that had begun */
             408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -12875,6 +13594,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -12952,6 +13680,15 @@ export interface operations {
             };
             /** @description timeout; `may_be_done: true` if it is a change that had begun */
             408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -13096,6 +13833,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -13183,6 +13929,15 @@ export interface operations {
             };
             /** @description invalid_value */
             422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -13286,6 +14041,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -13365,6 +14129,15 @@ export interface operations {
             };
             /** @description timeout; `may_be_done: true` if it is a change that had begun */
             408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -13543,6 +14316,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -13645,6 +14427,15 @@ export interface operations {
             };
             /** @description out_of_range */
             422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -13777,6 +14568,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -13854,6 +14654,15 @@ export interface operations {
             };
             /** @description timeout; `may_be_done: true` if it is a change that had begun */
             408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -13940,6 +14749,15 @@ export interface operations {
             };
             /** @description invalid_value */
             422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -14113,6 +14931,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -14233,6 +15060,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -14303,6 +15139,15 @@ export interface operations {
             };
             /** @description timeout; `may_be_done: true` if it is a change that had begun */
             408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -14462,6 +15307,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -14579,6 +15433,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -14670,6 +15533,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -14740,6 +15612,15 @@ export interface operations {
             };
             /** @description timeout; `may_be_done: true` if it is a change that had begun */
             408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -14898,6 +15779,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -15034,6 +15924,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -15113,6 +16012,15 @@ export interface operations {
             };
             /** @description timeout; `may_be_done: true` if it is a change that had begun */
             408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -15294,6 +16202,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -15368,6 +16285,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -15416,6 +16342,15 @@ export interface operations {
             };
             /** @description timeout; `may_be_done: true` if it is a change that had begun */
             408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -15514,6 +16449,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -15582,6 +16526,15 @@ export interface operations {
             };
             /** @description timeout; `may_be_done: true` if it is a change that had begun */
             408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -15717,6 +16670,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -15792,6 +16754,15 @@ export interface operations {
             };
             /** @description timeout; `may_be_done: true` if it is a change that had begun */
             408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -15883,6 +16854,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -15953,6 +16933,15 @@ export interface operations {
             };
             /** @description timeout; `may_be_done: true` if it is a change that had begun */
             408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -16260,6 +17249,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -16338,6 +17336,15 @@ export interface operations {
             };
             /** @description timeout; `may_be_done: true` if it is a change that had begun */
             408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -16436,6 +17443,15 @@ export interface operations {
             };
             /** @description out_of_range, invalid_value */
             422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -16576,6 +17592,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -16652,6 +17677,15 @@ export interface operations {
             };
             /** @description timeout; `may_be_done: true` if it is a change that had begun */
             408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -16736,6 +17770,15 @@ export interface operations {
             };
             /** @description timeout; `may_be_done: true` if it is a change that had begun */
             408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -16876,6 +17919,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -16953,6 +18005,15 @@ export interface operations {
             };
             /** @description timeout; `may_be_done: true` if it is a change that had begun */
             408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -17044,6 +18105,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -17119,6 +18189,15 @@ export interface operations {
             };
             /** @description timeout; `may_be_done: true` if it is a change that had begun */
             408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -17300,6 +18379,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -17384,6 +18472,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -17452,6 +18549,15 @@ export interface operations {
             };
             /** @description timeout; `may_be_done: true` if it is a change that had begun */
             408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -17535,6 +18641,88 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description internal; not_published, with `may_be_done: true` */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description busy, storage_failed */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    servers: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Servers"];
+                };
+            };
+            /** @description unauthenticated: the role viewer is needed */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description host_not_allowed, origin_not_allowed; forbidden: less than the role viewer, for all maps; page_header_missing */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description timeout; `may_be_done: true` if it is a change that had begun */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -17592,6 +18780,15 @@ export interface operations {
             };
             /** @description timeout; `may_be_done: true` if it is a change that had begun */
             408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -17688,6 +18885,15 @@ export interface operations {
             };
             /** @description out_of_range, invalid_value */
             422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -17827,6 +19033,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -17909,6 +19124,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -17982,6 +19206,15 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            /** @description rate_limited; `Retry-After` */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description internal; not_published, with `may_be_done: true` */
             500: {
                 headers: {
@@ -18030,6 +19263,15 @@ export interface operations {
             };
             /** @description timeout; `may_be_done: true` if it is a change that had begun */
             408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -18094,6 +19336,15 @@ export interface operations {
             };
             /** @description timeout; `may_be_done: true` if it is a change that had begun */
             408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description rate_limited; `Retry-After` */
+            429: {
                 headers: {
                     [name: string]: unknown;
                 };
