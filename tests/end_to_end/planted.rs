@@ -21,7 +21,7 @@ fn every_planted_fault_still_applies() {
         let text = fs::read_to_string(&path).expect("UTF-8");
         let first = text.lines().next().unwrap_or_default();
         assert!(
-            first.starts_with("# test: ") || first.starts_with("Must fail: "),
+            first.starts_with("# test: "),
             "{}: the first line is `# test: COMMAND`",
             path.display()
         );

@@ -11,7 +11,7 @@ use engine::{
     slots::{FrameOutcome, SlotKey, Slots},
     snapshot::{MapSnapshot, Snapshots},
 };
-use protos::{Code, Name};
+use protos::{Code, Name, v1};
 use std::{
     collections::{BTreeMap, BTreeSet},
     sync::{Arc, LazyLock},
@@ -73,6 +73,13 @@ struct Lives {
 }
 
 impl Lives {
+    /// The epoch that alone is heard.
+    fn live(&self, now: Instant) -> Option<u64> {
+        let (epoch, at) = self.current?;
+        let is_recent = now.saturating_duration_since(at) < MESSAGE_LIVE;
+        (is_recent || self.tokens.contains(&epoch)).then_some(epoch)
+    }
+
     /// Another epoch than this one may be live.
     fn is_contested(&self, epoch: u64, now: Instant) -> bool {
         let recent = |at: Instant| now.saturating_duration_since(at) < MESSAGE_LIVE;
@@ -199,9 +206,12 @@ impl World {
     fn token(&mut self, robot: &Name, epoch: u64, appeared: bool) {
         self.tell(|| format!("token of {robot} {epoch:x} {}", if appeared { "appears" } else { "goes" }));
         self.intake.motion.epochs().token(robot, (Some(epoch), appeared), self.now, |_| true);
-        let lives = self.lives.get_mut(robot).expect("a robot of this world");
+        let (now, lives) = (self.now, self.lives.get_mut(robot).expect("a robot of this world"));
         if appeared {
             lives.tokens.insert(epoch);
+            if lives.live(now).is_none() {
+                lives.current = Some((epoch, now));
+            }
         } else {
             lives.tokens.remove(&epoch);
             if lives.current.is_some_and(|(current, _)| current == epoch) {
@@ -223,11 +233,8 @@ impl World {
             Ok(()) => {
                 assert!(last.is_none_or(|last| id.seq > last), "{id:?} is not newer than {last:?}");
                 assert!(!self.ended.contains(&id), "{id:?} is accepted again after it has ended");
-                if let Some((current, at)) = lives.current {
-                    let was_live =
-                        now.saturating_duration_since(at) < MESSAGE_LIVE || lives.tokens.contains(&current);
-                    assert!(current == id.epoch || !was_live, "{id:?}: epoch {current:x} is live");
-                }
+                let live = lives.live(now);
+                assert!(live.is_none_or(|live| live == id.epoch), "{id:?}: epoch {live:x?} is live");
                 lives.current = Some((id.epoch, now));
                 self.accepted.insert((key.clone(), id.epoch), id.seq);
                 let deadline = now + Duration::from_millis(deadline_ms);
@@ -238,7 +245,11 @@ impl World {
             }
             Err(answer) => {
                 self.refused += 1;
-                let code = answer.rejection.map(|refusal| refusal.code).unwrap_or_default();
+                let v1::Rejection { code, field, .. } = answer.rejection.expect("a reason");
+                if field == "seq" {
+                    // Its epoch was admitted before its number was refused.
+                    lives.current = Some((id.epoch, now));
+                }
                 let is = |is: Code| code == is.as_str();
                 self.seen.not_newer += u64::from(is(Code::NotNewer));
                 self.seen.conflicts += u64::from(is(Code::EpochConflict));
