@@ -189,3 +189,8 @@ pub enum ClientError {
         error: std::io::Error,
     },
 }
+
+/// What zenoh says when it cannot do something.
+pub(crate) fn fault(action: &'static str) -> impl Fn(zenoh::Error) -> ClientError + Copy {
+    move |error| ClientError::Transport { action, detail: error.to_string() }
+}

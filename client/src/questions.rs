@@ -1,9 +1,6 @@
 //! What a robot asks the server: where to look, where it is, which version a map has.
 
-use crate::{
-    Capture, ClientError, RobotClient,
-    robot::{fault, name},
-};
+use crate::{Capture, ClientError, RobotClient, error::fault, robot::name};
 use protos::{Key, api::LocaliseResult, convert::localise::localise_result, prost::Message, v1};
 use std::time::Duration;
 use tokio::sync::watch;

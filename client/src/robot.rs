@@ -3,6 +3,7 @@
 
 use crate::{
     Capture, ClientError, RobotTls,
+    error::fault,
     servers::{ServerEvent, Servers},
     transport,
 };
@@ -367,10 +368,6 @@ impl RobotClient {
 
 pub(crate) fn name(field: &'static str, text: &str) -> Result<Name, ClientError> {
     Name::new(text).map_err(|error| ClientError::Name { field, text: text.to_owned(), error })
-}
-
-pub(crate) fn fault(action: &'static str) -> impl Fn(zenoh::Error) -> ClientError + Copy {
-    move |error| ClientError::Transport { action, detail: error.to_string() }
 }
 
 /// A random epoch: a fresh hasher of the standard library is keyed by the system's randomness. 53 bits, so that JSON

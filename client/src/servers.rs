@@ -3,7 +3,7 @@
 //!
 //! A server that is its own router announces nothing; then nothing here changes what a client does.
 
-use crate::{ClientError, robot::fault};
+use crate::error::{ClientError, fault};
 use protos::{Key, Keys, Name, ServerToken, v1};
 use std::{
     collections::{BTreeMap, BTreeSet},

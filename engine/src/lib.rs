@@ -8,6 +8,7 @@ pub mod snapshot;
 pub mod decode;
 pub mod slots;
 pub mod quotas;
+mod panic_text;
 pub mod panics;
 pub mod threads;
 pub mod intake;

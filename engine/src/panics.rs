@@ -1,7 +1,7 @@
 //! Caught panics, counted by the edge that caught them. An edge is where work of one kind begins: a frame, a write, a
 //! message, a request. A panic ends that piece of work; the process and all other work go on.
 
-use crate::threads::Lost;
+use crate::{panic_text::panic_text, threads::Lost};
 use std::{
     any::Any,
     fmt::Display,
@@ -76,7 +76,7 @@ impl Panics {
     /// Counts and logs a caught panic. `what` names the work, `follows` says what becomes of it.
     pub fn caught(&self, edge: Edge, cause: &(dyn Any + Send), what: impl Display, follows: &str) {
         self.0[edge as usize].fetch_add(1, Ordering::Relaxed);
-        tracing::error!(edge = edge.name(), panic = text(cause), %what, follows, "panic_caught");
+        tracing::error!(edge = edge.name(), panic = panic_text(cause), %what, follows, "panic_caught");
     }
 
     /// Runs `work`. After a panic, which is counted and logged, the result is `None`.
@@ -145,12 +145,6 @@ impl Panics {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct Ended(&'static str);
-
-/// The message of a panic.
-pub fn text(cause: &(dyn Any + Send)) -> &str {
-    let literal = cause.downcast_ref::<&'static str>().copied();
-    literal.or_else(|| cause.downcast_ref::<String>().map(String::as_str)).unwrap_or("no message")
-}
 
 #[cfg(test)]
 mod tests {

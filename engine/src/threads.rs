@@ -11,7 +11,7 @@
 //! runtime, so that no thread of a pool is begun by a thread of low priority. Elsewhere than on Linux all classes have one
 //! priority.
 
-use crate::panics::text;
+use crate::panic_text::panic_text;
 use std::{
     any::Any,
     io,
@@ -71,7 +71,7 @@ pub enum Lost {
 impl std::fmt::Display for Lost {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Self::Panicked(cause) => write!(f, "it panicked: {}", text(cause.as_ref())),
+            Self::Panicked(cause) => write!(f, "it panicked: {}", panic_text(cause.as_ref())),
             Self::NoThread(error) => write!(f, "no thread for it: {error}"),
         }
     }

@@ -24,8 +24,10 @@ pub mod gather;
 pub mod calibrating;
 mod http;
 mod running;
+mod start_error;
 mod serving;
 mod server;
 
 pub use running::RunningServer;
-pub use server::{Server, StartError};
+pub use server::Server;
+pub use start_error::StartError;

@@ -2,7 +2,7 @@
 
 use crate::{
     backup::Backups,
-    bus::{Bus, BusError, Receivers},
+    bus::{Bus, Receivers},
     config::{Config, JoinedRouter, Tls},
     events::{EventLog, watch_changes::watch_changes},
     fleet::{Fleet, server_name},
@@ -19,8 +19,9 @@ use crate::{
     ros2::{Ros2, Ros2Publisher},
     running::{RunningServer, Tasks},
     serving::{Listeners, Serving},
+    start_error::StartError,
     store::{
-        OpenError, StoreError,
+        StoreError,
         actor::Actor,
         disk_guard::{self, DiskGuard},
         landmarks, now_ms, pictures,
@@ -47,49 +48,6 @@ use tokio::{
     sync::{mpsc::Receiver, watch},
     task::JoinHandle,
 };
-
-/// Why the server did not start.
-#[derive(Debug, thiserror::Error)]
-pub enum StartError {
-    /// The database does not open.
-    #[error("{0}")]
-    Store(String),
-    /// Robots cannot connect.
-    #[error(transparent)]
-    Bus(#[from] BusError),
-    /// There is no certificate.
-    #[error("no certificate for encryption: {0}")]
-    Certificates(String),
-    /// The server has no name.
-    #[error("{0}")]
-    Name(String),
-    /// There is no token for this machine.
-    #[error("{0}")]
-    LocalToken(String),
-    /// The system gives no threads.
-    #[error("no threads for the workers: {0}")]
-    Threads(#[source] std::io::Error),
-    /// The address cannot be listened on.
-    #[error("cannot listen on {addr}: {source}")]
-    Http {
-        /// The address asked for.
-        addr: SocketAddr,
-        /// What the system says.
-        source: std::io::Error,
-    },
-}
-
-impl From<OpenError> for StartError {
-    fn from(error: OpenError) -> Self {
-        let mut text = error.to_string();
-        let mut cause = std::error::Error::source(&error);
-        while let Some(error) = cause {
-            text = format!("{text}: {error}");
-            cause = error.source();
-        }
-        Self::Store(text)
-    }
-}
 
 /// Starts servers.
 #[derive(Debug)]

@@ -6,7 +6,7 @@ use crate::{
     http::{self, App},
     identity::certificates::Certificates,
     live_probes::LiveProbes,
-    server::StartError,
+    start_error::StartError,
     store::Store,
 };
 use axum::Router;

@@ -20,11 +20,7 @@ fn every_planted_fault_still_applies() {
         count += 1;
         let text = fs::read_to_string(&path).expect("UTF-8");
         let first = text.lines().next().unwrap_or_default();
-        assert!(
-            first.starts_with("# test: "),
-            "{}: the first line is `# test: COMMAND`",
-            path.display()
-        );
+        assert!(first.starts_with("# test: "), "{}: the first line is `# test: COMMAND`", path.display());
         let applied = Command::new("git").current_dir(root()).args(["apply", "--check"]).arg(&path).output();
         let applied = applied.expect("git");
         assert!(

@@ -47,7 +47,7 @@ fn whatever_the_network_does_frames_end_once_and_the_newest_wins() {
 /// The simulation is of use only if everything happens in it.
 #[test]
 fn every_outcome_happens_in_the_simulation() {
-    let mut seen = world::Seen::default();
+    let mut seen = world::Tally::default();
     for seed in 0..40 {
         let mut world = World::new(seed, false);
         (0..STEPS).for_each(|_| world.step());

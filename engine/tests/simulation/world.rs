@@ -38,7 +38,7 @@ struct InWork {
 
 /// How often each thing has happened.
 #[derive(Debug, Default, Clone, Copy)]
-pub(crate) struct Seen {
+pub(crate) struct Tally {
     processed: u64,
     superseded: u64,
     expired: u64,
@@ -48,7 +48,7 @@ pub(crate) struct Seen {
     old_answers: u64,
 }
 
-impl Seen {
+impl Tally {
     pub(crate) fn add(&mut self, other: Self) {
         self.processed += other.processed;
         self.superseded += other.superseded;
@@ -103,7 +103,7 @@ pub(crate) struct World {
     received: u64,
     refused: u64,
     version: u64,
-    seen: Seen,
+    seen: Tally,
     is_told: bool,
 }
 
@@ -145,12 +145,12 @@ impl World {
             received: 0,
             refused: 0,
             version: 1,
-            seen: Seen { versions: 1, ..Seen::default() },
+            seen: Tally { versions: 1, ..Tally::default() },
             is_told,
         }
     }
 
-    pub(crate) fn seen(&self) -> Seen {
+    pub(crate) fn seen(&self) -> Tally {
         self.seen
     }
 

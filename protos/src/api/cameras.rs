@@ -121,7 +121,7 @@ pub struct CalibrationConstraintsBody {
     pub radial: u8,
     /// The camera does not roll (C2).
     pub zero_roll: bool,
-    /// The camera is this high over the landmark's centre in all views, metres; negative below (C3).
+    /// The camera is this high over the landmark's centre in all views, metres; negative below, -100 to 100 (C3).
     pub height_m: Option<f64>,
     /// The ratio of the landmark's sides is not what its size says, and is found with the camera.
     pub unknown_aspect: bool,

@@ -9,6 +9,7 @@ use crate::store::{
     OpenError, StoreError,
     copies::{self, Contents, MapDigest},
     now_ms, open, restored,
+    schema::known_schema,
 };
 use std::{
     fs, io,
@@ -78,7 +79,7 @@ pub async fn verify(file: &Path) -> Result<Verified, RestoreError> {
         ArchiveError::Io(source) => at(source),
         other => damaged(other.to_string()),
     })?;
-    let (found, known) = (manifest.contents.schema, copies::known_schema());
+    let (found, known) = (manifest.contents.schema, known_schema());
     if found > known {
         return Err(RestoreError::Newer { found, known });
     }

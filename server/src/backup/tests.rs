@@ -5,6 +5,7 @@ use crate::{
         landmark_placement::tests::seen_from,
         landmarks::{self, LandmarkGeometry},
         maps, open,
+        schema::known_schema,
         teaching::{self, Teaching},
         views::NewView,
         walls,
@@ -167,7 +168,7 @@ async fn a_backup_of_a_newer_schema_is_refused() {
     let manifest = Manifest { created_ms: 0, program: "9.0.0".into(), database_sha256, contents, faults };
     archive::finish(&file, &manifest).unwrap();
     match verify(&file).await {
-        Err(RestoreError::Newer { found: 9999, known }) => assert_eq!(known, copies::known_schema()),
+        Err(RestoreError::Newer { found: 9999, known }) => assert_eq!(known, known_schema()),
         other => panic!("{other:?}"),
     }
 }

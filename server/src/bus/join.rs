@@ -7,7 +7,7 @@
 use super::{
     BusError, Outbox, Receivers, caught,
     receiving::Receiving,
-    router::{self, client_config},
+    router::{self, Credentials, client_config},
 };
 use crate::{config::JoinedRouter, fleet::Fleet};
 use engine::{decode::ImageLimits, vitals::Pulse};
@@ -34,14 +34,6 @@ const RETRY: (Duration, Duration) = (Duration::from_millis(250), Duration::from_
 const LOOK_EVERY: Duration = Duration::from_millis(100);
 /// How often a failed attempt is in the log.
 const TELL_EVERY: Duration = Duration::from_mins(1);
-
-/// PEM texts for encrypted endpoints.
-#[derive(Clone)]
-pub(super) struct Credentials {
-    pub(super) certificate: String,
-    pub(super) key: String,
-    pub(super) authority: String,
-}
 
 /// What a connection rests on.
 pub(super) struct JoinSettings {

@@ -1,6 +1,6 @@
 //! The embedded zenoh routers: settings and opening.
 
-use super::{BusError, join::Credentials};
+use super::BusError;
 use crate::identity::certificates::PemKey;
 use base64::{Engine as _, prelude::BASE64_STANDARD};
 use serde_json::{Value, json};
@@ -36,6 +36,14 @@ pub(super) struct RouterTls<'a> {
     pub(super) listener: (&'a str, &'a PemKey),
     /// What it shows where it connects.
     pub(super) client: Option<(&'a str, &'a PemKey)>,
+}
+
+/// PEM texts for encrypted endpoints.
+#[derive(Clone)]
+pub(super) struct Credentials {
+    pub(super) certificate: String,
+    pub(super) key: String,
+    pub(super) authority: String,
 }
 
 /// What a router is opened with.

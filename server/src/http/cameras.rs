@@ -22,6 +22,9 @@ use protos::{
 use utoipa_axum::{router::OpenApiRouter, routes};
 use vision::{camera_calibration::PlanarView, geometry::Corners, pose::LandmarkSize};
 
+/// Largest height of a camera above or below a landmark that can be said, metres.
+const MAX_HEIGHT_M: f64 = 100.0;
+
 pub(super) fn router() -> OpenApiRouter<AppState> {
     OpenApiRouter::new().routes(routes!(list)).routes(routes!(calibrate))
 }
@@ -87,6 +90,10 @@ async fn calibrate(
             "constraints.radial",
             "0 to 2 coefficients can be fitted",
         ));
+    }
+    if constraints.height_m.is_some_and(|height_m| height_m.is_nan() || height_m.abs() > MAX_HEIGHT_M) {
+        let detail = format!("a camera is at most {MAX_HEIGHT_M} m above or below a landmark");
+        return Err(ApiError::invalid("out_of_range", "constraints.height_m", detail));
     }
     let (views, image_px) = match uploaded_views {
         Some(given) => uploaded(&given)?,

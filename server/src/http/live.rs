@@ -71,7 +71,8 @@ async fn answer(
     State(app): State<AppState>,
     PathParams((robot, camera)): PathParams<(String, String)>,
 ) -> Result<Json<v1::Answer>, ApiError> {
-    Ok(Json(last(&app, robot, camera).await?.answer.as_ref().clone()))
+    let answer = last(&app, robot, camera).await?.answer.as_ref().clone();
+    Ok(Json(v1::Answer { server: app.server.to_string(), ..answer }))
 }
 
 /// Where a robot was lately, by source: fused poses, odometry alone, and the truth where a simulator tells it. Oldest

@@ -4,9 +4,10 @@
 //! A copy reads one snapshot of the write-ahead log: the writer goes on, and what it commits meanwhile is not in the copy.
 
 use super::{
-    StoreError, audit, migrations,
+    StoreError, audit,
     open::{FILE, read_options},
     pictures,
+    schema::schema,
     statements::statements,
 };
 use futures::TryStreamExt as _;
@@ -19,7 +20,6 @@ use sqlx::{
 use std::path::Path;
 
 statements! {
-    SCHEMA = "SELECT coalesce(max(version), 0) FROM _sqlx_migrations WHERE success";
     INTEGRITY = "PRAGMA integrity_check(20)";
     REFERENCES = "SELECT count(*) FROM pragma_foreign_key_check";
     MAPS = "SELECT id, name, version FROM maps ORDER BY name";
@@ -72,11 +72,6 @@ pub(crate) struct Contents {
     pub(crate) pictures: u64,
 }
 
-/// The newest schema that this program knows.
-pub(crate) fn known_schema() -> i64 {
-    migrations::migrator().iter().map(|step| step.version).max().unwrap_or_default()
-}
-
 /// Writes one committed state of the database in `data` to the new file `to`. Returns once it is on the disk.
 pub(crate) async fn copy(data: &Path, to: &Path) -> Result<(), StoreError> {
     let at = || StoreError::during("copy the database");
@@ -95,10 +90,6 @@ pub(crate) async fn open_live(file: &Path) -> Result<SqliteConnection, StoreErro
 /// Opens a file that nobody writes. Errors: it is no database.
 pub(crate) async fn open_file(file: &Path) -> Result<SqliteConnection, StoreError> {
     read_options(file).immutable(true).connect().await.map_err(StoreError::during("open the copy"))
-}
-
-pub(super) async fn schema(conn: &mut SqliteConnection) -> Result<i64, StoreError> {
-    sqlx::query_scalar(SCHEMA).fetch_one(conn).await.map_err(StoreError::during("read the schema"))
 }
 
 /// Reads the whole of a file: what it holds, and what is wrong with it, named. An error means that the reading broke off.

@@ -18,6 +18,7 @@ pub(crate) mod map_locations;
 pub(crate) mod landmarks;
 pub(crate) mod underlays;
 pub(crate) mod copies;
+pub(crate) mod schema;
 pub(crate) mod restored;
 pub(crate) mod pictures;
 pub(crate) mod views;

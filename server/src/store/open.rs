@@ -12,7 +12,7 @@ use std::{
 };
 
 use super::{
-    StoreError, copies, disk_guard, error::is_without_room, history, migrations, pictures, restored,
+    StoreError, disk_guard, error::is_without_room, history, migrations, pictures, restored, schema,
 };
 
 /// First version without the write-ahead-log corruption of 3.7.0 to 3.51.2 (sqlite.org/wal.html#walresetbug).
@@ -164,7 +164,7 @@ async fn open_read_only(data: &Path) -> Result<Opened, OpenError> {
     let mut writer = options.clone().connect().await.map_err(OpenError::Open)?;
     check_version(&mut writer).await?;
     check_integrity(&mut writer).await?;
-    if copies::schema(&mut writer).await.map_err(OpenError::Load)? != copies::known_schema() {
+    if schema::schema(&mut writer).await.map_err(OpenError::Load)? != schema::known_schema() {
         return Err(unreadable("another version of the server has written it: mount it writable"));
     }
     let reads = SqlitePoolOptions::new().max_connections(READERS).acquire_timeout(BUSY_TIMEOUT);

@@ -95,9 +95,15 @@ async fn rows(service: &Service) -> Vec<(String, i64)> {
     all
 }
 
-/// What may be said of a number at this place: a part of its path, or that it is part of.
-fn names(field: &str, at: &[String]) -> bool {
-    field == "body" || at.iter().any(|part| part.parse::<usize>().is_err() && field.contains(part.as_str()))
+/// Whether a refusal is about the number at this place: it names a part of its path, or the whole. Of two numbers that do
+/// not fit, either may be the field; views that fit no camera are what `not_determined` says.
+fn names(answer: &Value, at: &[String]) -> bool {
+    let said = |name: &str| answer[name].as_str().unwrap_or_default();
+    let names: Vec<&String> = at.iter().filter(|part| part.parse::<usize>().is_err()).collect();
+    let (field, detail) = (said("field"), said("detail"));
+    let is_of_fit =
+        said("code") == "not_determined" || names.last().is_some_and(|name| detail.contains(*name));
+    field == "body" || is_of_fit || names.iter().any(|part| field.contains(part.as_str()))
 }
 
 struct Tally {
@@ -139,7 +145,7 @@ async fn attack(document: &Value, (method, path): (&str, &str), body: &Value, ta
                 200..300 => {}
                 400..500 => {
                     tally.refused += 1;
-                    if !names(answer["field"].as_str().unwrap_or_default(), place) {
+                    if !names(&answer, place) {
                         tally.wrong.push(format!("another field: {what}"));
                     }
                     if now != before {
@@ -151,7 +157,9 @@ async fn attack(document: &Value, (method, path): (&str, &str), body: &Value, ta
             if service.store.vitals().panics().total() > 0 {
                 tally.wrong.push(format!("a panic: {what}"));
             }
-            if now != before || service.store.vitals().panics().total() > 0 {
+            // A map that is being made is in no row, and cannot be begun again.
+            let has_begun = status < 300 && path.ends_with("/mapping");
+            if now != before || has_begun || service.store.vitals().panics().total() > 0 {
                 (service, gathering) = prepared(&name).await;
                 before = rows(&service).await;
             }

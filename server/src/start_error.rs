@@ -1,0 +1,47 @@
+//! Why a server does not start.
+
+use crate::{bus::BusError, store::OpenError};
+use std::net::SocketAddr;
+
+/// Why the server did not start.
+#[derive(Debug, thiserror::Error)]
+pub enum StartError {
+    /// The database does not open.
+    #[error("{0}")]
+    Store(String),
+    /// Robots cannot connect.
+    #[error(transparent)]
+    Bus(#[from] BusError),
+    /// There is no certificate.
+    #[error("no certificate for encryption: {0}")]
+    Certificates(String),
+    /// The server has no name.
+    #[error("{0}")]
+    Name(String),
+    /// There is no token for this machine.
+    #[error("{0}")]
+    LocalToken(String),
+    /// The system gives no threads.
+    #[error("no threads for the workers: {0}")]
+    Threads(#[source] std::io::Error),
+    /// The address cannot be listened on.
+    #[error("cannot listen on {addr}: {source}")]
+    Http {
+        /// The address asked for.
+        addr: SocketAddr,
+        /// What the system says.
+        source: std::io::Error,
+    },
+}
+
+impl From<OpenError> for StartError {
+    fn from(error: OpenError) -> Self {
+        let mut text = error.to_string();
+        let mut cause = std::error::Error::source(&error);
+        while let Some(error) = cause {
+            text = format!("{text}: {error}");
+            cause = error.source();
+        }
+        Self::Store(text)
+    }
+}
