@@ -126,7 +126,11 @@ async fn readiness(maps: &MapClient) -> Readiness {
 
 /// Adds a landmark until the disk has room for it.
 async fn added(maps: &MapClient, name: &str) {
-    eventually("additions go on", || async { maps.add_landmark(MAP, name, None, None).await.ok() }).await;
+    let added = || async {
+        let added = maps.add_landmark(MAP, name, None, None).await;
+        added.inspect_err(|error| eprintln!("{name}: {error}")).ok()
+    };
+    eventually("additions go on", added).await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -137,6 +141,7 @@ async fn nearly_full() {
     let maps = server.maps();
     let frame = taught(&maps).await;
     added(&maps, "spare").await;
+    maps.create_map(&NewMap::new("yard")).await.expect("a map without robots");
     assert_eq!(readiness(&maps).await.storage.expect("the disk").refused, None);
     // 6 of 64 MB are less than a tenth.
     fill(disk.path(), 6 << 20);
@@ -158,8 +163,7 @@ async fn nearly_full() {
     let token = NewToken { name: "t".into(), role: Role::Viewer, maps: None, valid_s: None };
     let token = maps.create_token(&token).await.expect("a token");
     maps.revoke_token(token.token.id).await.expect("revoked");
-    maps.rename_map(MAP, "other").await.expect("renamed");
-    maps.rename_map("other", MAP).await.expect("renamed back");
+    maps.rename_map("yard", "garden").await.expect("renamed");
     maps.delete_landmark(MAP, "spare").await.expect("deleted");
     free(disk.path());
     added(&maps, "late").await;
@@ -186,6 +190,14 @@ async fn taught_to_the_end(maps: &MapClient, prefix: &str) -> (u16, String) {
     panic!("the disk is not full")
 }
 
+/// Refused for want of room, by SQLite or by the guard, whichever sees it first.
+fn assert_full((status, code): &(u16, String)) {
+    assert!(
+        *status == 507 && ["storage_full", "storage_nearly_full"].contains(&code.as_str()),
+        "{status} {code}"
+    );
+}
+
 /// Grey levels that cannot be packed.
 fn noise(seed: u64) -> Vec<u8> {
     let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
@@ -205,10 +217,11 @@ async fn full() {
     let server = Child::start_with(disk.path(), &NO_GUARD);
     let maps = server.maps();
     let frame = taught(&maps).await;
-    let full = (507, "storage_full".to_owned());
-    assert_eq!(taught_to_the_end(&maps, "a").await, full);
+    // What another program has, and gives back.
+    fill(disk.path(), 3 << 20);
+    assert_full(&taught_to_the_end(&maps, "a").await);
     fill(disk.path(), 0);
-    assert_eq!(taught_to_the_end(&maps, "b").await, full);
+    assert_full(&taught_to_the_end(&maps, "b").await);
     recognised(&server, &frame, FRAMES).await;
     let landmarks = maps.landmarks(MAP).await.expect("landmarks").len();
     free(disk.path());
@@ -225,7 +238,7 @@ async fn full() {
     assert!(fs::metadata(&index).map_or(0, |index| index.len()) < 32_768, "there was room for the index");
     assert_eq!(maps.landmarks(MAP).await.expect("landmarks").len(), landmarks + 1);
     recognised(&server, &frame, 20).await;
-    assert_eq!(taught_to_the_end(&maps, "c").await, full);
+    assert_full(&taught_to_the_end(&maps, "c").await);
     assert!(maps.readiness().await.is_ok(), "it is no failure");
     free(disk.path());
     added(&maps, "again").await;

@@ -25,7 +25,6 @@ mod hang_ups;
 mod history;
 mod http_contract;
 mod imports;
-mod io_errors;
 mod laser;
 mod lists;
 mod load;
