@@ -10,6 +10,8 @@ const TRAIL_POINTS = 600;
 const TRAIL_STEP_M = 0.05;
 /** Robots are drawn anew at most so often, ms: fifty of them send hundreds of poses a second. */
 const DRAWN_EVERY_MS = 100;
+/** Robots whose earlier tracks are read when a map is opened. */
+const TRACKED_ROBOTS = 50;
 /** A pose that is older is no pose, ms. */
 export const STALE_MS = 2000;
 
@@ -101,6 +103,20 @@ export class LiveMap {
       const robot = this.#of(name);
       robot.is_connected = alive;
       if (pose && !robot.pose) this.#pose({ robot: name, pose, covariance: pose.covariance, age_ms: pose.age_ms, trust: pose.trust });
+    }
+    this.#tell();
+    await Promise.all([...this.#heard.keys()].slice(0, TRACKED_ROBOTS).map((name) => this.#readTracks(name)));
+  }
+
+  /** Puts what was driven before the page was opened in front of what was heard since. */
+  async #readTracks(name: string): Promise<void> {
+    const before = await get<Record<"odometry" | "truth", SpotEvent["pose"][]>>(path`/robots/${name}/trajectories`).catch(() => undefined);
+    if (!before) return;
+    const robot = this.#of(name);
+    for (const track of ["odometry", "truth"] as const) {
+      const since = robot[track].map(([x_m, y_m]) => ({ x_m, y_m }));
+      robot[track] = [];
+      for (const pose of [...before[track], ...since]) extend(robot[track], pose);
     }
     this.#tell();
   }
