@@ -21,6 +21,8 @@ use zune_jpeg::{
 pub const MAX_JPEG_SCANS: usize = 64;
 /// Memory that a PNG may take for each pixel: 16-bit RGBA.
 const PNG_BYTES_PER_PX: usize = 8;
+/// Bytes before the first chunk of a PNG.
+const PNG_SIGNATURE_BYTES: usize = 8;
 /// Memory for a PNG's rows, palette and metadata besides its pixels.
 const PNG_SPARE_BYTES: usize = 4 << 20;
 
@@ -131,6 +133,7 @@ fn png(bytes: &[u8], claimed: Option<(usize, usize)>, limits: ImageLimits) -> Re
     let size = (width as usize, height as usize);
     check_claim(size, claimed)?;
     check_size(size, limits)?;
+    check_palette(bytes)?;
     let mut bounds = Limits::default();
     bounds.max_image_width = Some(MAX_SIDE_PX as u32);
     bounds.max_image_height = Some(MAX_SIDE_PX as u32);
@@ -142,6 +145,24 @@ fn png(bytes: &[u8], claimed: Option<(usize, usize)>, limits: ImageLimits) -> Re
     let mut raw = vec![0; size.0 * size.1 * usize::from(colours.bytes_per_pixel())];
     decoder.read_image(&mut raw).map_err(|e| bad("PNG", &e))?;
     gray(size, to_gray(&raw, colours)?)
+}
+
+/// The decoder panics on a palette that is no whole number of colours (png 0.18.1).
+fn check_palette(bytes: &[u8]) -> Result<(), Rejection> {
+    let mut at = PNG_SIGNATURE_BYTES;
+    while let Some(&[a, b, c, d, ref kind @ ..]) = bytes.get(at..at.saturating_add(8)) {
+        let length = u32::from_be_bytes([a, b, c, d]) as usize;
+        match kind {
+            b"PLTE" if !length.is_multiple_of(3) => {
+                return Err(bad("PNG", &format!("{length} bytes of palette are no whole colours")));
+            }
+            b"IDAT" => break,
+            _ => {}
+        }
+        // Length, name and checksum.
+        at = at.saturating_add(length).saturating_add(12);
+    }
+    Ok(())
 }
 
 /// Colours to grey; transparency is ignored.

@@ -178,3 +178,14 @@ fn damaged_bytes_never_panic() {
         }
     }
 }
+
+/// Found by fuzzing: the decoder of png 0.18.1 panics on it.
+#[test]
+fn a_palette_of_no_whole_colours_is_refused() {
+    let mut file =
+        b"\x89PNG\r\n\x1a\n\0\0\0\x0dIHDR\0\0\0\x08\0\0\0\x08\x08\x03\0\0\0\xf3\xd1\xb5\xb9".to_vec();
+    file.extend(b"\0\0\0\x0dPLTE\0\x01\x02\x03\x04\x05\x06\x07\x08\x09\x0a\x0b\xdc\x4c\x61\0\0");
+    let refusal = decode_upload(&file, ImageLimits { bytes: 1 << 16, pixels: 1 << 16 }).unwrap_err();
+    assert_eq!(refusal.code, Code::BadImage);
+    assert!(refusal.detail.contains("13 bytes of palette"), "{refusal:?}");
+}
