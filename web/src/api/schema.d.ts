@@ -1999,7 +1999,7 @@ export interface components {
         CalibrationConstraintsBody: {
             /**
              * Format: double
-             * @description The camera is this high over the landmark's centre in all views, metres; negative below (C3).
+             * @description The camera is this high over the landmark's centre in all views, metres; negative below, -100 to 100 (C3).
              * @default null
              */
             height_m: number | null;
