@@ -99,13 +99,14 @@ export class LiveMap {
 
   async #readRobots(map: string): Promise<void> {
     const { items } = await get<{ items: Robot[] }>("/robots", { limit: 500 }).catch(() => ({ items: [] as Robot[] }));
-    for (const { name, alive, pose } of items.filter((robot) => robot.map === map)) {
+    const here = items.filter((robot) => robot.map === map);
+    for (const { name, alive, pose } of here) {
       const robot = this.#of(name);
       robot.is_connected = alive;
       if (pose && !robot.pose) this.#pose({ robot: name, pose, covariance: pose.covariance, age_ms: pose.age_ms, trust: pose.trust });
     }
     this.#tell();
-    await Promise.all([...this.#heard.keys()].slice(0, TRACKED_ROBOTS).map((name) => this.#readTracks(name)));
+    await Promise.all(here.slice(0, TRACKED_ROBOTS).map(({ name }) => this.#readTracks(name)));
   }
 
   /** Puts what was driven before the page was opened in front of what was heard since. */
