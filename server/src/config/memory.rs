@@ -4,7 +4,7 @@
 use super::Config;
 use engine::live;
 
-/// The program itself: code, runtime, router, caches of the database. Measured without robots: 45 MB.
+/// The program itself: code, runtime, router, caches of the database.
 const PROGRAM_BYTES: usize = 96 << 20;
 /// What the analysis of a frame takes for each pixel: grey image, half-size image, edges, chains and features of quads.
 const ANALYSIS_BYTES_PER_PX: usize = 64;
