@@ -2,7 +2,7 @@
 //! server's own router, over a link of this process.
 //!
 //! Access control is read when a session opens. So when certificates, robots or their maps change what robots may, the gate
-//! closes and opens again: robots connect again by themselves, within about a second, and the server's own router, its
+//! closes and opens again: robots connect again by themselves, and the server's own router, its
 //! subscriptions and its other robots stay. What was revoked is refused in code meanwhile ([`super::Receivers::admits`]).
 
 use super::{
