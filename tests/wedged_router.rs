@@ -6,7 +6,7 @@ use std::{
     sync::{Arc, Condvar, Mutex, PoisonError},
     time::{Duration, Instant},
 };
-use tests::{Inside, SOON, eventually, plain_http};
+use tests::{Inside, SOON, eventually, http};
 
 /// More clients than zenoh has threads that receive.
 const CLIENTS: usize = 16;
@@ -43,7 +43,8 @@ fn settings(mode: &str, place: &str, endpoint: &str) -> zenoh::Config {
 async fn held_threads_of_zenoh_make_the_server_not_ready_and_end_it() {
     let limits = Limits { stalled_s: STALLED_S, ..Limits::default() };
     let inside = Inside::start_with(RawConfig { limits, ..RawConfig::default() }).await;
-    let (http, ready) = (plain_http().build().expect("a client"), format!("{}/readyz", inside.url()));
+    // Parts and their reasons are for tokens of all maps.
+    let (http, ready) = (http(&inside.url()).await, format!("{}/readyz", inside.url()));
     let asked = || async {
         let answer = http.get(&ready).send().await.ok()?;
         let status = answer.status().as_u16();
