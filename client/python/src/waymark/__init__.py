@@ -11,7 +11,8 @@ from waymark._async.client import AsyncMapClient
 from waymark._async.landmarks import AsyncJobEvents
 from waymark._async.maps import AsyncLiveEvents
 from waymark._http import Region, Revised
-from waymark._link import Delivery, Subscription
+from waymark._link import Subscription
+from waymark._session import Delivery
 from waymark._sync.client import MapClient
 from waymark._sync.landmarks import JobEvents
 from waymark._sync.maps import LiveEvents

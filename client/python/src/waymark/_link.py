@@ -7,22 +7,21 @@ Nothing here waits but `open`, the questions (`gaze`, `map_version`), and a put 
 from __future__ import annotations
 
 import itertools
-import json
 import logging
 import re
 import secrets
-import socket
 import threading
 import time
 import weakref
 from collections.abc import Callable
-from typing import Any, Generic, Literal, TypeVar
+from typing import Any, Generic, TypeVar
 
 import zenoh
 from google.protobuf.message import DecodeError, Message
 
 from waymark._messages import frame_message, localise_request, localise_result
 from waymark._servers import Servers
+from waymark._session import Delivery, open_session
 from waymark._values import fill, from_message
 from waymark.api.localise import LocaliseResult
 from waymark.errors import InvalidInput, NoAnswer, NotAdmitted, TlsRefused, Unexpected, Unreachable
@@ -34,15 +33,10 @@ from waymark.wire import Answer, CameraAnswer, GazeAdvice, GazeRequest, MapChang
 
 T = TypeVar("T")
 M = TypeVar("M", bound=Message)
-Delivery = Literal["latest", "every"]
 Listener = Callable[[T], None]
 
 # Answers and poses that wait for a slow reader; beyond, it misses the oldest.
 INBOX = 64
-# Largest message taken from the server, in bytes.
-_MAX_MESSAGE_BYTES = 4 << 20
-# What a droppable message waits for room on the link, in microseconds.
-_DROP_US = 50_000
 # Longest wait for one hello of the server, and time between two questions for it, in seconds.
 _HELLO_WAIT_S = 0.5
 _HELLO_EVERY_S = 0.05
@@ -50,8 +44,6 @@ _HELLO_EVERY_S = 0.05
 _GREETED_S = (0.5, 2.0)
 # Longest wait for the present versions of maps, in seconds.
 _VERSION_WAIT_S = 10.0
-# Longest wait for a connection that only shows whether something listens, in seconds.
-_PROBE_S = 0.5
 _NAME = re.compile(r"[a-z0-9_-]{1,64}")
 _log = logging.getLogger("waymark")
 
@@ -139,7 +131,7 @@ class Link:
         self.server_events: Listeners[ServerEvent] = Listeners()
         self.servers = Servers(self.server_events.call)
         servers = f"{prefix}/server"
-        self._session = _open(endpoint, delivery, timeout_s, file)
+        self._session = open_session(endpoint, delivery, timeout_s, file)
         if file is not None:
             self._greet(file, delivery, timeout_s)
         try:
@@ -193,7 +185,7 @@ class Link:
             if left < _HELLO_WAIT_S:
                 break
             try:
-                self._session = _open(self.endpoint, delivery, left, file)
+                self._session = open_session(self.endpoint, delivery, left, file)
             except (TlsRefused, Unreachable):
                 # The server was there and silent: that says more than that the rest was too short for one more link.
                 break
@@ -350,76 +342,3 @@ def _decoded(kind: type[T], message: Message, sample: zenoh.Sample) -> T | None:
         _log.warning("%s: not a message of this version", sample.key_expr)
         return None
     return from_message(kind, message)
-
-
-def _open(endpoint: str, delivery: Delivery, timeout_s: float, file: RobotFile | None) -> zenoh.Session:
-    """Opens the session. A listener that is silent and not zenoh can hold a handshake longer than zenoh's own
-    timeout, so it is opened on a thread of its own."""
-    result: list[zenoh.Session | Exception] = []
-    is_late = threading.Event()
-
-    def run() -> None:
-        try:
-            session = zenoh.open(zenoh.Config.from_json5(_config(endpoint, delivery, timeout_s, file)))
-            if is_late.is_set():
-                session.close()
-            result.append(session)
-        except Exception as error:
-            result.append(error)
-
-    thread = threading.Thread(target=run, daemon=True, name="waymark-open")
-    thread.start()
-    thread.join(timeout_s + 1)
-    opened = result[0] if result else None
-    if isinstance(opened, zenoh.Session):
-        return opened
-    is_late.set()
-    detail = f": {opened}" if opened is not None else f" within {timeout_s} s"
-    kind = TlsRefused if _listens(endpoint) else Unreachable
-    raise kind(f"no session with a server at {endpoint}{detail}", field="endpoint") from opened
-
-
-def _listens(endpoint: str) -> bool:
-    """Whether something takes connections at an encrypted endpoint."""
-    protocol, _, address = endpoint.partition("/")
-    host, _, port = address.rpartition(":")
-    if protocol != "tls" or not port.isdecimal():
-        return False
-    try:
-        with socket.create_connection((host.strip("[]"), int(port)), timeout=_PROBE_S):
-            return True
-    except OSError:
-        return False
-
-
-def _config(endpoint: str, delivery: Delivery, timeout_s: float, file: RobotFile | None = None) -> str:
-    # A session whose sender waits must not be closed.
-    close_us = 60_000_000 if delivery == "every" else 5_000_000
-    return json.dumps(
-        {
-            "mode": "client",
-            "connect": {
-                "endpoints": [endpoint],
-                "timeout_ms": int(timeout_s * 1000),
-                "retry": {"period_init_ms": 100, "period_max_ms": 2000},
-            },
-            "scouting": {"delay": 0, "multicast": {"enabled": False}, "gossip": {"enabled": False}},
-            "adminspace": {"enabled": False},
-            "transport": {
-                "link": {
-                    "tx": {
-                        "lease": 2000,
-                        "queue": {
-                            "congestion_control": {
-                                "drop": {"wait_before_drop": _DROP_US, "max_wait_before_drop_fragments": _DROP_US},
-                                "block": {"wait_before_close": close_us},
-                            }
-                        },
-                    },
-                    "rx": {"max_message_size": _MAX_MESSAGE_BYTES},
-                    **({} if file is None else {"tls": file.settings()}),
-                },
-                "shared_memory": {"enabled": False},
-            },
-        }
-    )

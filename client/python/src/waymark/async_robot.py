@@ -10,8 +10,9 @@ from collections.abc import AsyncIterator
 from typing import Any, Generic, TypeVar
 from weakref import WeakSet
 
-from waymark._link import INBOX, Delivery, Link, Listener, Subscription, name
+from waymark._link import INBOX, Link, Listener, Subscription, name
 from waymark._servers import LOOK_EVERY_S
+from waymark._session import Delivery
 from waymark.api.localise import LocaliseResult
 from waymark.errors import NoAnswer
 from waymark.image import Capture, Picture

@@ -1,0 +1,95 @@
+"""Opening a robot's zenoh session: its settings, encryption and queues."""
+
+from __future__ import annotations
+
+import json
+import socket
+import threading
+from typing import Literal
+
+import zenoh
+
+from waymark.errors import TlsRefused, Unreachable
+from waymark.robot_file import RobotFile
+
+Delivery = Literal["latest", "every"]
+
+# Largest message taken from the server, in bytes.
+_MAX_MESSAGE_BYTES = 4 << 20
+# What a droppable message waits for room on the link, in microseconds.
+_DROP_US = 50_000
+# Longest wait for a connection that only shows whether something listens, in seconds.
+_PROBE_S = 0.5
+
+
+def open_session(endpoint: str, delivery: Delivery, timeout_s: float, file: RobotFile | None) -> zenoh.Session:
+    """Opens the session. A listener that is silent and not zenoh can hold a handshake longer than zenoh's own
+    timeout, so it is opened on a thread of its own."""
+    result: list[zenoh.Session | Exception] = []
+    is_late = threading.Event()
+
+    def run() -> None:
+        try:
+            session = zenoh.open(zenoh.Config.from_json5(_config(endpoint, delivery, timeout_s, file)))
+            if is_late.is_set():
+                session.close()
+            result.append(session)
+        except Exception as error:
+            result.append(error)
+
+    thread = threading.Thread(target=run, daemon=True, name="waymark-open")
+    thread.start()
+    thread.join(timeout_s + 1)
+    opened = result[0] if result else None
+    if isinstance(opened, zenoh.Session):
+        return opened
+    is_late.set()
+    detail = f": {opened}" if opened is not None else f" within {timeout_s} s"
+    kind = TlsRefused if _listens(endpoint) else Unreachable
+    raise kind(f"no session with a server at {endpoint}{detail}", field="endpoint") from opened
+
+
+def _listens(endpoint: str) -> bool:
+    """Whether something takes connections at an encrypted endpoint."""
+    protocol, _, address = endpoint.partition("/")
+    host, _, port = address.rpartition(":")
+    if protocol != "tls" or not port.isdecimal():
+        return False
+    try:
+        with socket.create_connection((host.strip("[]"), int(port)), timeout=_PROBE_S):
+            return True
+    except OSError:
+        return False
+
+
+def _config(endpoint: str, delivery: Delivery, timeout_s: float, file: RobotFile | None = None) -> str:
+    # A session whose sender waits must not be closed.
+    close_us = 60_000_000 if delivery == "every" else 5_000_000
+    return json.dumps(
+        {
+            "mode": "client",
+            "connect": {
+                "endpoints": [endpoint],
+                "timeout_ms": int(timeout_s * 1000),
+                "retry": {"period_init_ms": 100, "period_max_ms": 2000},
+            },
+            "scouting": {"delay": 0, "multicast": {"enabled": False}, "gossip": {"enabled": False}},
+            "adminspace": {"enabled": False},
+            "transport": {
+                "link": {
+                    "tx": {
+                        "lease": 2000,
+                        "queue": {
+                            "congestion_control": {
+                                "drop": {"wait_before_drop": _DROP_US, "max_wait_before_drop_fragments": _DROP_US},
+                                "block": {"wait_before_close": close_us},
+                            }
+                        },
+                    },
+                    "rx": {"max_message_size": _MAX_MESSAGE_BYTES},
+                    **({} if file is None else {"tls": file.settings()}),
+                },
+                "shared_memory": {"enabled": False},
+            },
+        }
+    )
