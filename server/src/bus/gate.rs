@@ -25,10 +25,14 @@ use tokio::{sync::watch, task::JoinHandle, time::Instant};
 const GATHER: Duration = Duration::from_millis(20);
 /// How often certificates that have expired are looked for, and whether messages still pass to the server's own router.
 const LOOK_EVERY: Duration = Duration::from_secs(10);
-/// Time between two attempts to open.
-const RETRY: Duration = Duration::from_millis(200);
+/// Time between closing and opening. zenoh computes its trees of routers at most every 100 ms, and sends what is declared
+/// to those whose index in them is new: a gate that joins before takes the index of the closed one, and hears of nothing.
+const FORGOTTEN: Duration = Duration::from_millis(250);
+/// Wait of the first attempt until the two routers know of each other. Each further attempt waits twice as long, at most
+/// [`LONGEST_JOIN`].
+const FIRST_JOIN: Duration = Duration::from_secs(2);
 /// Longest wait until the two routers know of each other.
-const JOIN: Duration = Duration::from_secs(10);
+const LONGEST_JOIN: Duration = Duration::from_secs(10);
 /// Between two questions whether they do.
 const ASK_EVERY: Duration = Duration::from_millis(20);
 /// Who asks that: no robot's certificate is needed.
@@ -65,7 +69,7 @@ impl GateSettings {
         Policy::new(&valid, &self.snapshots, &self.ros2, !self.certificates.enrols_robots())
     }
 
-    async fn open(&self, policy: &Policy) -> Result<zenoh::Session, BusError> {
+    async fn open(&self, policy: &Policy, join: Duration) -> Result<zenoh::Session, BusError> {
         let shown = self.certificates.current().borrow().clone();
         let authorities = self.certificates.client_authorities_pem();
         let authorities = authorities.map_err(|e| self.fault(&e))?;
@@ -83,7 +87,7 @@ impl GateSettings {
             frame_bytes: self.frame_bytes,
         };
         let session = router::open(&settings).await?;
-        if self.join(&session).await {
+        if self.join(&session, join).await {
             return Ok(session);
         }
         // Robots would be linked, and never heard.
@@ -97,9 +101,9 @@ impl GateSettings {
     }
 
     /// Waits until messages pass to the server's own router: earlier ones would be lost. False if they do not.
-    async fn join(&self, session: &zenoh::Session) -> bool {
+    async fn join(&self, session: &zenoh::Session, within: Duration) -> bool {
         let Ok(robot) = Name::new(ASKS) else { return false };
-        let (key, until) = (self.keys.build(&Key::Hello(robot)), Instant::now() + JOIN);
+        let (key, until) = (self.keys.build(&Key::Hello(robot)), Instant::now() + within);
         while Instant::now() < until {
             if let Ok(replies) = session.get(&key).timeout(ASK_EVERY * 10).await
                 && replies.recv_async().await.is_ok_and(|reply| reply.result().is_ok())
@@ -119,11 +123,12 @@ impl Gate {
         let mut news = (settings.registry.changes(), settings.certificates.current());
         let change = *news.0.borrow_and_update();
         let policy = settings.policy();
-        let session = match settings.open(&policy).await {
+        let session = match settings.open(&policy, FIRST_JOIN).await {
             Ok(session) => session,
             Err(error) => {
                 tracing::warn!(%error, follows = "it is tried once more", "gate_not_open");
-                settings.open(&policy).await?
+                tokio::time::sleep(FORGOTTEN).await;
+                settings.open(&policy, LONGEST_JOIN).await?
             }
         };
         settings.registry.set_applied(change);
@@ -171,7 +176,7 @@ async fn keep(
         let is_cut_off = why == Why::Interval
             && tokio::select! {
                 _ = stopping.wait_for(|stop| *stop) => break,
-                is_joined = settings.join(&session) => !is_joined,
+                is_joined = settings.join(&session, LONGEST_JOIN) => !is_joined,
             };
         if is_cut_off {
             tracing::error!(endpoint = settings.endpoint, follows = "it opens again", "gate_cut_off");
@@ -195,19 +200,59 @@ async fn keep(
     pulse.end();
 }
 
-/// Tries until it is open: the port may be taken for a moment.
+/// Tries until it is open, after another was closed: the port may be taken for a moment.
 async fn reopened(settings: &GateSettings, policy: &Policy) -> zenoh::Session {
+    let mut join = FIRST_JOIN;
     loop {
-        match settings.open(policy).await {
+        tokio::time::sleep(FORGOTTEN).await;
+        match settings.open(policy, join).await {
             Ok(session) => return session,
             Err(error) => tracing::error!(%error, follows = "it is tried again", "gate_not_open"),
         }
-        tokio::time::sleep(RETRY).await;
+        join = LONGEST_JOIN.min(join * 2);
     }
 }
 
 async fn close(session: &zenoh::Session) {
     if let Err(error) = session.close().await {
         tracing::warn!(%error, "zenoh_close_failed");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A router as the gate is, but for its certificates.
+    async fn joined(listen: &str, connect: Option<&str>) -> zenoh::Session {
+        let listen = vec![listen.to_owned()];
+        let settings =
+            RouterSettings { listen, connect, tls: None, access: None, robots: 4, frame_bytes: 1000 };
+        router::open(&settings).await.expect("a router")
+    }
+
+    #[tokio::test(flavor = "multi_thread")]
+    async fn a_router_that_follows_a_closed_one_hears_of_what_is_declared() {
+        let endpoint = || router::endpoint("tcp/127.0.0.1:0").unwrap();
+        let (inner, gate) = (endpoint(), endpoint());
+        let server = joined(&inner, None).await;
+        let answer = |query: zenoh::query::Query| {
+            zenoh::Wait::wait(query.reply(query.key_expr().clone(), "")).unwrap();
+        };
+        let _answers = server.declare_queryable("gate/hello").callback(answer).await.unwrap();
+        for opened in 0..6 {
+            let session = joined(&gate, Some(&inner)).await;
+            let until = Instant::now() + LONGEST_JOIN;
+            let is_answered = async || {
+                let replies = session.get("gate/hello").timeout(ASK_EVERY * 10).await.unwrap();
+                replies.recv_async().await.is_ok_and(|reply| reply.result().is_ok())
+            };
+            while !is_answered().await {
+                assert!(Instant::now() < until, "gate {opened} hears of nothing");
+                tokio::time::sleep(ASK_EVERY).await;
+            }
+            close(&session).await;
+            tokio::time::sleep(FORGOTTEN).await;
+        }
     }
 }
