@@ -26,7 +26,7 @@ use std::{
     },
     time::{Duration, Instant},
 };
-use tokio::task::JoinHandle;
+use tokio::task::{JoinHandle, JoinSet};
 use vision::frame::GrayImage;
 
 const MAP: &str = "corridor";
@@ -36,6 +36,8 @@ const MUSEUM: &str = "museum";
 const VIEWS: usize = 3;
 /// Width of a poster of the museum, px.
 const POSTER_PX: usize = 240;
+/// Robots that get their certificates at a time: each change of them cuts the connected ones off for a moment.
+const ENROLLING: usize = 32;
 /// Longest lesson.
 const LESSON: Duration = Duration::from_hours(1);
 
@@ -111,24 +113,22 @@ impl<'a> Site<'a> {
 
     /// Robots on the map, each with a certificate.
     pub(super) async fn enrol(&self, count: usize) -> anyhow::Result<Vec<PlannedRobot>> {
-        let (maps, folder) = (self.maps()?, self.folder.join("robots"));
+        let folder = self.folder.join("robots");
         std::fs::create_dir(&folder)?;
         let bar = screen::progress(count, "robots");
         let mut robots = Vec::new();
-        for i in 0..count {
-            let name = format!("r{i}");
-            maps.put_robot(&name, MAP).await?;
-            let pair = KeyPair::generate()?;
-            let request = CertificateParams::default().serialize_request(&pair)?.pem()?;
-            let enrolled = maps.enrol_robot(&name, &CertificateRequest { request, valid_s: None }).await?;
-            let (certificate, key) = (folder.join(format!("{name}.pem")), folder.join(format!("{name}.key")));
-            std::fs::write(&certificate, &enrolled.certificate_pem)?;
-            std::fs::write(&key, pair.serialize_pem())?;
-            robots.push(PlannedRobot { name, fleet: enrolled.fleet, certificate, key });
-            bar.inc(1);
+        for first in (0..count).step_by(ENROLLING) {
+            let mut enrolling = JoinSet::new();
+            for i in first..count.min(first + ENROLLING) {
+                enrolling.spawn(enrol(self.maps()?, folder.clone(), i));
+            }
+            robots.extend(enrolling.join_all().await);
+            bar.set_position(robots.len() as u64);
         }
         bar.finish_and_clear();
-        Ok(robots)
+        let mut robots = robots.into_iter().collect::<anyhow::Result<Vec<_>>>()?;
+        robots.sort_by_key(|(i, _)| *i);
+        Ok(robots.into_iter().map(|(_, robot)| robot).collect())
     }
 
     /// A change of the map while robots are answered, and a question that is refused.
@@ -167,6 +167,19 @@ impl<'a> Site<'a> {
         };
         known().context("the server's counters of frames are not in its metrics")
     }
+}
+
+/// Robot number `i`, with a certificate in `folder`.
+async fn enrol(maps: MapClient, folder: PathBuf, i: usize) -> anyhow::Result<(usize, PlannedRobot)> {
+    let name = format!("r{i}");
+    maps.put_robot(&name, MAP).await?;
+    let pair = KeyPair::generate()?;
+    let request = CertificateParams::default().serialize_request(&pair)?.pem()?;
+    let enrolled = maps.enrol_robot(&name, &CertificateRequest { request, valid_s: None }).await?;
+    let (certificate, key) = (folder.join(format!("{name}.pem")), folder.join(format!("{name}.key")));
+    std::fs::write(&certificate, &enrolled.certificate_pem)?;
+    std::fs::write(&key, pair.serialize_pem())?;
+    Ok((i, PlannedRobot { name, fleet: enrolled.fleet, certificate, key }))
 }
 
 /// A client of plain HTTP on this machine.
