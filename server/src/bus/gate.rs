@@ -25,11 +25,12 @@ use tokio::{sync::watch, task::JoinHandle, time::Instant};
 const GATHER: Duration = Duration::from_millis(20);
 /// How often certificates that have expired are looked for, and whether messages still pass to the server's own router.
 const LOOK_EVERY: Duration = Duration::from_secs(10);
-/// Time between closing and opening. zenoh computes its trees of routers at most every 100 ms, and sends what is declared
-/// to those whose index in them is new: a gate that joins before takes the index of the closed one, and hears of nothing.
-const FORGOTTEN: Duration = Duration::from_millis(250);
-/// Wait of the first attempt until the two routers know of each other. Each further attempt waits twice as long, at most
-/// [`LONGEST_JOIN`].
+/// Time between closing a gate and opening the next. zenoh computes its trees of routers at most every 100 ms, and tells
+/// what is declared to routers whose index in them is new. A gate that joined earlier would take the index of the closed
+/// one, and be told of no subscription.
+const BEFORE_REOPENING: Duration = Duration::from_millis(250);
+/// Wait of the first attempt until the two routers know of each other. While the server runs, each further attempt waits
+/// twice as long, at most [`LONGEST_JOIN`]; the second and last one of a start waits that long.
 const FIRST_JOIN: Duration = Duration::from_secs(2);
 /// Longest wait until the two routers know of each other.
 const LONGEST_JOIN: Duration = Duration::from_secs(10);
@@ -127,7 +128,7 @@ impl Gate {
             Ok(session) => session,
             Err(error) => {
                 tracing::warn!(%error, follows = "it is tried once more", "gate_not_open");
-                tokio::time::sleep(FORGOTTEN).await;
+                tokio::time::sleep(BEFORE_REOPENING).await;
                 settings.open(&policy, LONGEST_JOIN).await?
             }
         };
@@ -204,7 +205,7 @@ async fn keep(
 async fn reopened(settings: &GateSettings, policy: &Policy) -> zenoh::Session {
     let mut join = FIRST_JOIN;
     loop {
-        tokio::time::sleep(FORGOTTEN).await;
+        tokio::time::sleep(BEFORE_REOPENING).await;
         match settings.open(policy, join).await {
             Ok(session) => return session,
             Err(error) => tracing::error!(%error, follows = "it is tried again", "gate_not_open"),
@@ -232,7 +233,7 @@ mod tests {
     }
 
     #[tokio::test(flavor = "multi_thread")]
-    async fn a_router_that_follows_a_closed_one_hears_of_what_is_declared() {
+    async fn a_gate_that_follows_a_closed_one_is_told_what_the_server_declares() {
         let endpoint = || router::endpoint("tcp/127.0.0.1:0").unwrap();
         let (inner, gate) = (endpoint(), endpoint());
         let server = joined(&inner, None).await;
@@ -248,11 +249,11 @@ mod tests {
                 replies.recv_async().await.is_ok_and(|reply| reply.result().is_ok())
             };
             while !is_answered().await {
-                assert!(Instant::now() < until, "gate {opened} hears of nothing");
+                assert!(Instant::now() < until, "gate {opened} reaches no queryable");
                 tokio::time::sleep(ASK_EVERY).await;
             }
             close(&session).await;
-            tokio::time::sleep(FORGOTTEN).await;
+            tokio::time::sleep(BEFORE_REOPENING).await;
         }
     }
 }
