@@ -2,11 +2,12 @@
 //! landmark moved, a landmark quarantined, a lesson. Derived data that follows later is timed apart. Then how long it takes
 //! to make as many landmarks once more, one request at a time and in one request, and what a backup of the map costs.
 
+mod backup_cost;
 mod large_map;
-mod restored;
 
 use crate::evaluate::statistics::quantile;
 use anyhow::Context as _;
+use backup_cost::{BackupCost, download_backup, measure_restore};
 use cli::{pictures, scratch, screen};
 use client::{
     Capture, LandmarkRegion, MapClient, RobotClient, RobotOptions,
@@ -14,7 +15,6 @@ use client::{
 };
 use large_map::{FIRST_POSTER, fill, picture, place, settings, walls};
 use reqwest::header::{AUTHORIZATION, HeaderMap};
-use restored::{Restored, backed_up, restored};
 use serde::Serialize;
 use serde_json::{Value, json};
 use server::Server;
@@ -93,7 +93,7 @@ struct Measured {
     costs: Vec<(&'static str, Cost)>,
     one_by_one_s: f64,
     at_once_s: f64,
-    restored: Restored,
+    backup: BackupCost,
 }
 
 /// Runs the benchmark.
@@ -109,7 +109,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
 }
 
 fn show(measured: &Measured) {
-    let Measured { landmarks, walls, filled_s, start_ms, frames, costs, one_by_one_s, at_once_s, restored } =
+    let Measured { landmarks, walls, filled_s, start_ms, frames, costs, one_by_one_s, at_once_s, backup } =
         measured;
     screen::say(&format!(
         "{landmarks} landmarks, {walls} wall segments (made in {filled_s:.0} s, server ready after {start_ms:.0} ms), \
@@ -121,7 +121,7 @@ fn show(measured: &Measured) {
     }
     screen::say(&format!("{landmarks} landmarks made one request at a time: {one_by_one_s:.1} s"));
     screen::say(&format!("{landmarks} landmarks made in requests of {BULK}: {at_once_s:.2} s"));
-    screen::say(&restored.sentence());
+    screen::say(&backup.sentence());
 }
 
 /// A client for requests that the SDK does not make, with its token.
@@ -160,14 +160,14 @@ async fn measured(args: &Args) -> anyhow::Result<Measured> {
     let frames = answered.len();
     costs.push(("a frame answered meanwhile", Cost::of(&mut answered)));
     let backups = scratch::Folder::new("backup")?;
-    let backup = backups.path().join("all.waymark");
-    let backup_s = backed_up(&large.maps, &backup).await?;
+    let backup_file = backups.path().join("all.waymark");
+    let backup_s = download_backup(&large.maps, &backup_file).await?;
     let (one_by_one_s, at_once_s) = large.creations(args).await?;
     robot.close().await?;
     server.stop().await;
-    let restored = restored(args, &backup, backup_s).await?;
+    let backup = measure_restore(args, &backup_file, backup_s).await?;
     let (landmarks, walls) = (args.landmarks, args.walls);
-    Ok(Measured { landmarks, walls, filled_s, start_ms, frames, costs, one_by_one_s, at_once_s, restored })
+    Ok(Measured { landmarks, walls, filled_s, start_ms, frames, costs, one_by_one_s, at_once_s, backup })
 }
 
 /// Sends frames until told to end; `answered` gets the time until each answer, ms.

@@ -36,7 +36,8 @@ const MUSEUM: &str = "museum";
 const VIEWS: usize = 3;
 /// Width of a poster of the museum, px.
 const POSTER_PX: usize = 240;
-/// Robots that get their certificates at a time: each change of them cuts the connected ones off for a moment.
+/// Robots that get their certificates at a time: the server gathers changes so close together into one reopening of its
+/// encrypted listener.
 const ENROLLING: usize = 32;
 /// Longest lesson.
 const LESSON: Duration = Duration::from_hours(1);
@@ -120,7 +121,7 @@ impl<'a> Site<'a> {
         for first in (0..count).step_by(ENROLLING) {
             let mut enrolling = JoinSet::new();
             for i in first..count.min(first + ENROLLING) {
-                enrolling.spawn(enrol(self.maps()?, folder.clone(), i));
+                enrolling.spawn(enrol_one(self.maps()?, folder.clone(), i));
             }
             robots.extend(enrolling.join_all().await);
             bar.set_position(robots.len() as u64);
@@ -170,7 +171,7 @@ impl<'a> Site<'a> {
 }
 
 /// Robot number `i`, with a certificate in `folder`.
-async fn enrol(maps: MapClient, folder: PathBuf, i: usize) -> anyhow::Result<(usize, PlannedRobot)> {
+async fn enrol_one(maps: MapClient, folder: PathBuf, i: usize) -> anyhow::Result<(usize, PlannedRobot)> {
     let name = format!("r{i}");
     maps.put_robot(&name, MAP).await?;
     let pair = KeyPair::generate()?;

@@ -1,4 +1,4 @@
-//! How long the map takes into a backup, out of it into an empty data directory, and until a server there is ready.
+//! What a backup costs: making and downloading it, restoring it into an empty data directory, and starting a server there.
 
 use super::{Args, MAP, large_map::settings};
 use anyhow::Context as _;
@@ -18,9 +18,10 @@ use tokio::{fs, io::AsyncWriteExt as _};
 /// Longest wait for the backup.
 const LONGEST: Duration = Duration::from_hours(1);
 
-/// What a backup of everything costs.
+/// Seconds and size of one backup of the whole server.
 #[derive(Debug, Serialize)]
-pub(super) struct Restored {
+pub(super) struct BackupCost {
+    /// Making it and downloading it.
     backup_s: f64,
     backup_mb: f64,
     /// Verification of the whole file, and putting it in place.
@@ -30,8 +31,8 @@ pub(super) struct Restored {
     landmarks: usize,
 }
 
-impl Restored {
-    /// For people.
+impl BackupCost {
+    /// The line of the table for people.
     pub(super) fn sentence(&self) -> String {
         let Self { backup_s, backup_mb, restore_s, start_s, landmarks } = self;
         format!(
@@ -41,8 +42,8 @@ impl Restored {
     }
 }
 
-/// Makes a backup of the running server, and brings it to `file`: seconds.
-pub(super) async fn backed_up(maps: &MapClient, file: &Path) -> anyhow::Result<f64> {
+/// Makes a backup of the running server and downloads it to `file`. Gives the seconds of both together.
+pub(super) async fn download_backup(maps: &MapClient, file: &Path) -> anyhow::Result<f64> {
     let started = Instant::now();
     let backup = maps.wait_for_backup(maps.make_backup().await?, LONGEST).await?;
     anyhow::ensure!(backup.state == BackupState::Complete, "no backup: {:?}", backup.reason);
@@ -54,8 +55,8 @@ pub(super) async fn backed_up(maps: &MapClient, file: &Path) -> anyhow::Result<f
     Ok(started.elapsed().as_secs_f64())
 }
 
-/// Restores `file`, whose making took `backup_s`, into an empty data directory, and starts a server there.
-pub(super) async fn restored(args: &Args, file: &Path, backup_s: f64) -> anyhow::Result<Restored> {
+/// Restores `file` into an empty data directory and starts a server there. `backup_s`: what [`download_backup`] gave.
+pub(super) async fn measure_restore(args: &Args, file: &Path, backup_s: f64) -> anyhow::Result<BackupCost> {
     let folder = scratch::Folder::new("restored")?;
     let backup_mb = fs::metadata(file).await?.len() as f64 / 1e6;
     let started = Instant::now();
@@ -69,5 +70,5 @@ pub(super) async fn restored(args: &Args, file: &Path, backup_s: f64) -> anyhow:
     let landmarks = maps.landmarks(MAP).await.context("the restored map")?.len();
     server.stop().await;
     anyhow::ensure!(landmarks == args.landmarks as usize, "{landmarks} landmarks are restored");
-    Ok(Restored { backup_s, backup_mb, restore_s, start_s, landmarks })
+    Ok(BackupCost { backup_s, backup_mb, restore_s, start_s, landmarks })
 }
