@@ -12,8 +12,6 @@ const TRAIL_STEP_M = 0.05;
 const DRAWN_EVERY_MS = 100;
 /** Robots whose earlier tracks are read when a map is opened. */
 const TRACKED_ROBOTS = 50;
-/** A pose that is older is no pose, ms. */
-export const STALE_MS = 2000;
 
 export interface LiveRobot {
   name: string;
@@ -23,6 +21,8 @@ export interface LiveRobot {
   trust: string;
   /** When the pose was true, by this page's clock, ms. */
   posed_ms: number;
+  /** When the server last heard from it, by this page's clock, ms; absent if it never has since its start. */
+  heard_ms?: number | undefined;
   trail: Point[];
   /** Where odometry alone takes it. */
   odometry: Point[];
@@ -100,9 +100,10 @@ export class LiveMap {
   async #readRobots(map: string): Promise<void> {
     const { items } = await get<{ items: Robot[] }>("/robots", { limit: 500 }).catch(() => ({ items: [] as Robot[] }));
     const here = items.filter((robot) => robot.map === map);
-    for (const { name, alive, pose } of here) {
+    for (const { name, alive, pose, activity } of here) {
       const robot = this.#of(name);
       robot.is_connected = alive;
+      if (activity) this.#hear(robot, activity.last_message_ms);
       if (pose && !robot.pose) this.#pose({ robot: name, pose, covariance: pose.covariance, age_ms: pose.age_ms, trust: pose.trust });
     }
     this.#tell();
@@ -131,9 +132,15 @@ export class LiveMap {
     return robot;
   }
 
+  /** A message of a robot has come, or came so long ago, ms. */
+  #hear(robot: LiveRobot, ago_ms = 0): void {
+    robot.heard_ms = Math.max(robot.heard_ms ?? -Infinity, performance.now() - ago_ms);
+  }
+
   /** Keeps the places where a robot without a pose may be. */
   #answer({ robot: name, answer }: AnswerEvent): void {
     const robot = this.#of(name);
+    this.#hear(robot);
     const told = answer.hypotheses ?? [];
     if (!told.length && !robot.hypotheses.length) return;
     robot.hypotheses = told.flatMap(({ probability, map_from_robot }) =>
@@ -145,12 +152,14 @@ export class LiveMap {
   #pose({ robot: name, pose, covariance, age_ms, trust }: PoseEvent): void {
     const robot = this.#of(name);
     robot.is_connected = true;
+    this.#hear(robot, age_ms);
     Object.assign(robot, { pose, covariance, trust, posed_ms: performance.now() - age_ms, hypotheses: [] });
     extend(robot.trail, pose);
     this.#tell();
   }
 
   #spot({ robot, pose }: SpotEvent, track: "odometry" | "truth"): void {
+    this.#hear(this.#of(robot));
     if (extend(this.#of(robot)[track], pose)) this.#tell();
   }
 

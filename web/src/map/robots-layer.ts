@@ -6,12 +6,14 @@ import Polygon from "ol/geom/Polygon";
 import VectorLayer from "ol/layer/Vector";
 import VectorSource from "ol/source/Vector";
 import { Fill, RegularShape, Stroke, Style, Text } from "ol/style";
+import { ago } from "../words/amounts";
+import { isStale } from "../words/robots";
 import type { Colours } from "./colours";
 import { type Point as Position, ellipse, ring, yawHalf } from "./geometry";
-import { type Hypothesis, type LiveRobot, STALE_MS } from "./live.svelte";
+import type { Hypothesis, LiveRobot } from "./live.svelte";
 
 /** Length of the cone of the heading, m. */
-const CONE_M = 1.2;
+export const CONE_M = 1.2;
 
 export interface RobotLayer {
   layer: VectorLayer;
@@ -32,12 +34,13 @@ export function robotLayer(colours: Colours): RobotLayer {
   };
 }
 
-function drawn(robot: LiveRobot, now_ms: number, colours: Colours): Feature[] {
+/** The features of one robot: possible places, trail, ellipse, cone, the robot itself. */
+export function drawn(robot: LiveRobot, now_ms: number, colours: Colours): Feature[] {
   const { pose, covariance, trail, name } = robot;
   const places = robot.hypotheses.map((place) => possible(place, name, colours));
   if (!pose) return places;
-  const isStale = !robot.is_connected || now_ms - robot.posed_ms > STALE_MS;
-  const colour = isStale ? colours.stale : colours.robot;
+  const stale = isStale(robot, now_ms);
+  const colour = stale ? colours.stale : colours.robot;
   const at: Position = [pose.x_m, pose.y_m];
   const path = feature(new LineString(trail), new Style({ stroke: new Stroke({ color: `${colour}99`, width: 2 }) }));
   const features = trail.length > 1 ? [...places, path] : places;
@@ -54,7 +57,7 @@ function drawn(robot: LiveRobot, now_ms: number, colours: Colours): Feature[] {
     fill: new Fill({ color: colour }),
     stroke: new Stroke({ color: colours.halo, width: 1.5 }),
   });
-  const label = isStale ? `${name} (no fresh pose)` : name;
+  const label = stale ? `${name} (${ago(now_ms - robot.posed_ms)})` : name;
   const text = new Text({
     text: label,
     font: "600 12px system-ui, sans-serif",

@@ -9,6 +9,7 @@ import { summaryText } from "../../src/words/difference";
 import { gateText, poseGateText } from "../../src/words/gates";
 import { priorText } from "../../src/words/prior";
 import { type LiveQuad, named, quadKind, quadText } from "../../src/words/quads";
+import { robotAge, robotState } from "../../src/words/robots";
 import { stateOf } from "../../src/words/states";
 import { area, proposals } from "../../src/pages/teach/photograph";
 
@@ -68,6 +69,16 @@ test("a quad is called by what named it, and nothing else", () => {
   expect([named(unsure), quadKind(unsure)]).toEqual([undefined, "unsure"]);
   expect(quadText(unsure)).toContain("corners");
   expect(quadText(quad({}))).toBe("no known landmark");
+});
+
+test("a robot's state and age follow the clock alone", () => {
+  const robot = { is_connected: true, pose: {}, posed_ms: 1000, heard_ms: 1000 };
+  expect([robotState(robot, 2900).word, robotState(robot, 3100).word]).toEqual(["Live", "No fresh pose"]);
+  expect([robotAge(robot, 1500), robotAge(robot, 13_000)]).toEqual(["pose now", "pose 12 s ago"]);
+  expect(robotState({ ...robot, is_connected: false }, 1000).word).toBe("Not connected");
+  const lost = { is_connected: true, posed_ms: 0, heard_ms: 1000 };
+  expect([robotState(lost, 1100).word, robotAge(lost, 61_000)]).toEqual(["No pose", "last seen 60 s ago"]);
+  expect(robotAge({ is_connected: false, posed_ms: 0 }, 0)).toBe("not heard since the server's start");
 });
 
 test("amounts are short and right", () => {
