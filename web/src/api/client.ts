@@ -37,6 +37,8 @@ export interface Options {
   why?: string;
   /** Makes a creation once, however often it is sent. */
   key?: string;
+  /** A status of a refusal that is an answer here. */
+  alsoTakes?: number;
   signal?: AbortSignal;
 }
 
@@ -86,7 +88,7 @@ async function send(method: Method, at: string, options: Options): Promise<Respo
     const text = late ? `The server has not answered within ${(options.file?.deadline_ms ?? DEADLINE_MS) / 1000} s.` : "The server cannot be reached. Does it run? Is the network up?";
     throw new ApiError(text, 0, "unreachable", null);
   }
-  if (answer.ok) return answer;
+  if (answer.ok || answer.status === options.alsoTakes) return answer;
   if (answer.status === 401) onSignedOut();
   throw await refusal(answer);
 }
@@ -111,6 +113,14 @@ const revisionOf = (answer: Response) => (answer.headers.get("etag") ?? "").repl
 export async function get<T>(at: string, query?: Options["query"], signal?: AbortSignal): Promise<T> {
   const answer = await send("GET", at, { ...(query && { query }), ...(signal && { signal }) });
   return (await answer.json()) as T;
+}
+
+/** Reads a body whose status is a part of what it says. An error is one only where no JSON came. */
+export async function getAnyway<T>(at: string): Promise<{ status: number; body: T }> {
+  const answer = await send("GET", at, { alsoTakes: 503 });
+  const body = (await answer.json().catch(() => undefined)) as T | undefined;
+  if (body === undefined) throw await refusal(answer);
+  return { status: answer.status, body };
 }
 
 /** Reads a body with its revision. */

@@ -12,11 +12,12 @@ export interface StreamEvents {
 export class Stream {
   #source: EventSource | undefined;
   #opened = false;
-  readonly #address: string;
+  readonly #address: () => string;
   readonly #events: StreamEvents;
 
-  constructor(address: string, events: StreamEvents) {
-    this.#address = address;
+  /** An address that is a function is asked for whenever the stream is opened anew. */
+  constructor(address: string | (() => string), events: StreamEvents) {
+    this.#address = typeof address === "string" ? () => address : address;
     this.#events = events;
     document.addEventListener("visibilitychange", this.#look);
     this.#look();
@@ -38,7 +39,7 @@ export class Stream {
   };
 
   #open(): void {
-    const source = new EventSource(this.#address);
+    const source = new EventSource(this.#address());
     this.#source = source;
     source.onopen = () => {
       this.#events.onopen?.(this.#opened);

@@ -2,7 +2,7 @@
 import OlMap from "ol/Map";
 import View from "ol/View";
 import { ScaleLine } from "ol/control";
-import { DragRotate, defaults as interactions } from "ol/interaction";
+import { DragRotate, Pointer, defaults as interactions } from "ol/interaction";
 import { altKeyOnly } from "ol/events/condition";
 import type BaseLayer from "ol/layer/Base";
 import Graticule from "ol/layer/Vector";
@@ -17,6 +17,8 @@ import type { Bounds, Point } from "./geometry";
 /** Metres on the floor, y upwards. */
 export const METRES = "waymark-metres";
 const FAR_M = 1e5;
+/** A pointer that moves less between press and release has clicked, px. */
+const CLICK_PX = 6;
 
 const projection = new Projection({ code: METRES, units: "m", extent: [-FAR_M, -FAR_M, FAR_M, FAR_M] });
 projection.setGetPointResolution((resolution) => resolution);
@@ -31,6 +33,8 @@ export interface FloorEvents {
 
 export class Floor {
   readonly map: OlMap;
+  /** While this is set, a drag over the floor is told to it, and does not move the map. */
+  aim: ((from: Point, to: Point, is_done: boolean) => void) | undefined;
   #grid = new Graticule({ source: new VectorSource(), zIndex: -1 });
 
   constructor(target: HTMLElement, events: FloorEvents) {
@@ -41,7 +45,7 @@ export class Floor {
       view,
       controls,
       keyboardEventTarget: target,
-      interactions: interactions({ onFocusOnly: false }).extend([new DragRotate({ condition: altKeyOnly })]),
+      interactions: interactions({ onFocusOnly: false }).extend([new DragRotate({ condition: altKeyOnly }), this.#aiming()]),
     });
     this.map.updateSize();
     this.map.addLayer(this.#grid);
@@ -63,6 +67,29 @@ export class Floor {
       this.#drawGrid();
       const [x = 0, y = 0] = view.getCenter() ?? [];
       events.onmove([x.toFixed(2), y.toFixed(2), (view.getResolution() ?? 1).toPrecision(4), view.getRotation().toFixed(3)].join(","));
+    });
+  }
+
+  #aiming(): Pointer {
+    let from: { at: Point; pixel: number[] } | undefined;
+    let is_drag = false;
+    const point = ([x = 0, y = 0]: number[]): Point => [x, y];
+    return new Pointer({
+      handleDownEvent: ({ coordinate, pixel, originalEvent }) => {
+        from = { at: point(coordinate), pixel };
+        is_drag = false;
+        return this.aim !== undefined && !originalEvent.altKey && (!("isPrimary" in originalEvent) || originalEvent.isPrimary);
+      },
+      handleDragEvent: ({ coordinate, pixel }) => {
+        if (!from) return;
+        is_drag ||= Math.hypot((pixel[0] ?? 0) - (from.pixel[0] ?? 0), (pixel[1] ?? 0) - (from.pixel[1] ?? 0)) > CLICK_PX;
+        if (is_drag) this.aim?.(from.at, point(coordinate), false);
+      },
+      handleUpEvent: ({ coordinate }) => {
+        if (from && is_drag) this.aim?.(from.at, point(coordinate), true);
+        from = undefined;
+        return false;
+      },
     });
   }
 

@@ -72,3 +72,14 @@ export function onWall(at: Point, walls: readonly { a: number[]; b: number[] }[]
   const side = Math.sign((from[0] - best.x) * best.normal[0] + (from[1] - best.y) * best.normal[1]) || 1;
   return { x_m: best.x, y_m: best.y, theta_rad: Math.atan2(side * best.normal[1], side * best.normal[0]) };
 }
+
+/** The points of a path that are at least a step apart, with the last one. */
+export function thinned(points: readonly Point[], step_m: number): Point[] {
+  const kept: Point[] = [];
+  points.forEach((at, i) => {
+    const last = kept.at(-1);
+    const far = !last || Math.hypot(at[0] - last[0], at[1] - last[1]) >= step_m;
+    if (far || (i === points.length - 1 && (at[0] !== last[0] || at[1] !== last[1]))) kept.push(at);
+  });
+  return kept;
+}

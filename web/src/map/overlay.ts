@@ -4,7 +4,7 @@ import LineString from "ol/geom/LineString";
 import MultiPoint from "ol/geom/MultiPoint";
 import VectorLayer from "ol/layer/Vector";
 import VectorSource from "ol/source/Vector";
-import { Circle, Fill, Stroke, Style } from "ol/style";
+import { Circle, Fill, RegularShape, Stroke, Style } from "ol/style";
 import { colours } from "./colours";
 import type { Point } from "./geometry";
 
@@ -26,6 +26,14 @@ export function moves(all: readonly [Point, Point][]): VectorLayer {
   const source = new VectorSource({ features: all.map((ends) => new Feature(new LineString(ends))) });
   const style = new Style({ stroke: new Stroke({ color: accent, width: 2, lineDash: [6, 4] }) });
   return new VectorLayer({ source, style, zIndex: 8 }) as unknown as VectorLayer;
+}
+
+/** Crosses where something goes. */
+export function gone(all: readonly Point[]): VectorLayer {
+  const { state, halo } = colours();
+  const source = new VectorSource({ features: all.map((at) => new Feature(new MultiPoint([at]))) });
+  const cross = (colour: string, width: number) => new Style({ image: new RegularShape({ points: 4, radius: 10, radius2: 0, angle: Math.PI / 4, stroke: new Stroke({ color: colour, width }) }) });
+  return new VectorLayer({ source, style: [cross(halo, 6), cross(state.quarantined, 3)], zIndex: 8 }) as unknown as VectorLayer;
 }
 
 /** Points of a path by how many landmarks are seen from them: none, one, more. */

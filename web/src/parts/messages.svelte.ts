@@ -8,8 +8,9 @@ export interface Message {
 
 /** Most messages at a time: the oldest go. */
 const MOST = 4;
-/** How long a message without a fault stays, ms. */
+/** How long a message without a fault stays, ms: longer if it has a way back. */
 const STAYS_MS = 12_000;
+const UNDO_STAYS_MS = 60_000;
 let count = 0;
 
 export const messages = $state<Message[]>([]);
@@ -23,7 +24,7 @@ function show(message: Omit<Message, "id">): void {
   const id = ++count;
   messages.push({ ...message, id });
   if (messages.length > MOST) messages.shift();
-  if (!message.is_error) setTimeout(() => close(id), STAYS_MS);
+  if (!message.is_error) setTimeout(() => close(id), message.undo ? UNDO_STAYS_MS : STAYS_MS);
 }
 
 /** Says what was done. */

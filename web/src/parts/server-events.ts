@@ -8,15 +8,15 @@ type Kind = "map_changed" | "landmark_changed" | "landmarks_changed" | "job" | "
 /** Events that come within this time count as one, ms. */
 const TOGETHER_MS = 250;
 
-/** Calls `then` after events of these kinds, and where some were missed. Ends with the component that asks. */
-export function whenChanged(kinds: readonly Kind[], then: () => void): void {
+/** Calls `then` after events of these kinds, of one map or all, and where some were missed. Ends with the component that asks. */
+export function whenChanged(kinds: readonly Kind[], then: () => void, map?: string): void {
   let timer: ReturnType<typeof setTimeout> | undefined;
   const tell = () => (timer ??= setTimeout(() => {
     timer = undefined;
     then();
   }, TOGETHER_MS));
   const on = Object.fromEntries([...kinds, "reset"].map((kind) => [kind, tell]));
-  const stream = new Stream(address("/events"), { on, onopen: (again) => again && tell() });
+  const stream = new Stream(address("/events", { map }), { on, onopen: (again) => again && tell() });
   onDestroy(() => {
     stream.close();
     clearTimeout(timer);

@@ -44,6 +44,11 @@ export function movesOf(items: readonly LandmarkDifference[]): [Spot, Spot][] {
   });
 }
 
+/** Where landmarks are that go. */
+export function removedOf(items: readonly LandmarkDifference[]): Spot[] {
+  return items.flatMap(({ change, before }): Spot[] => (change === "removed" && before?.place ? [[before.place.x_m, before.place.y_m]] : []));
+}
+
 /** By how much a landmark was moved; empty if it was not. */
 export function movedText(difference: LandmarkDifference): string {
   const [move] = movesOf([difference]);

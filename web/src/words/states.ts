@@ -13,6 +13,9 @@ export function stateOf(landmark: Landmark): LandmarkState {
   return landmark.place && landmark.size ? "active" : "not-placed";
 }
 
+/** Whether the server has what was learnt of it: one that looks like another is refused with its model. */
+export const isLearnt = (landmark: Landmark) => Boolean(landmark.model) && !landmark.failed_gates.some(({ gate }) => gate === "looks_like");
+
 interface Words {
   word: string;
   /** What it means for robots. */

@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { boundsOf, ellipse, onWall, ring, yawHalf } from "../../src/map/geometry";
+import { boundsOf, ellipse, onWall, ring, thinned, yawHalf } from "../../src/map/geometry";
 
 test("the ellipse has the axes of the covariance", () => {
   const { a, b, turn } = ellipse([4, 0, 0, 0, 1, 0, 0, 0, 0.01]);
@@ -27,4 +27,11 @@ test("a landmark snaps to the nearest wall and faces the side it is dropped on",
   expect(onWall([3, 2.5], walls, 0.5)).toBeUndefined();
   expect(onWall([12, 0], walls, 0.5)).toBeUndefined();
   expect(onWall([3, 0], [{ a: [1, 1], b: [1, 1] }], 5)).toBeUndefined();
+});
+
+test("a driven path is thinned to steps, and keeps both ends", () => {
+  const path = Array.from({ length: 11 }, (_, i): [number, number] => [i / 10, 0]);
+  expect(thinned(path, 0.3).map(([x]) => x)).toEqual([0, 0.3, 0.6, 0.9, 1]);
+  expect(thinned([[1, 1], [1, 1], [1, 1]], 0.3)).toEqual([[1, 1]]);
+  expect(thinned([], 0.3)).toEqual([]);
 });

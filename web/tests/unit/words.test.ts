@@ -9,6 +9,7 @@ import { summaryText } from "../../src/words/difference";
 import { gateText, poseGateText } from "../../src/words/gates";
 import { priorText } from "../../src/words/prior";
 import { type LiveQuad, named, quadKind, quadText } from "../../src/words/quads";
+import { recordingOf } from "../../src/words/recording";
 import { robotAge, robotState } from "../../src/words/robots";
 import { stateOf } from "../../src/words/states";
 import { area, proposals } from "../../src/pages/teach/photograph";
@@ -102,4 +103,12 @@ test("proposals are the quads of four corners, largest first", () => {
   const corners = (side: number) => [[0, 0], [side, 0], [side, side], [0, side]].map(([u_px = 0, v_px = 0]) => ({ u_px, v_px }));
   const found = proposals({ seq: 1, status: "no_match", latency_ms: 1, quads: [quad({ corners: corners(2) }), quad({ corners: corners(9) }), quad({ corners: corners(3).slice(1) })] });
   expect(found.map(area)).toEqual([81, 4]);
+});
+
+test("commands that record and replay have only options that the program has", () => {
+  const sources = ["record", "replay", "mod"].map((name) => readFileSync(`../cli/src/recording/${name}.rs`, "utf8")).join("") + readFileSync("../cli/src/session.rs", "utf8");
+  const commands = recordingOf("r1", "hall", "http://127.0.0.1:8080");
+  expect(commands.record).toBe("waymark record r1.mcap --robot r1 --server http://127.0.0.1:8080");
+  expect(commands.compare).toBe("waymark replay r1.mcap --robot replay --map hall --server http://127.0.0.1:8080 --compare");
+  for (const option of new Set(Object.values(commands).join(" ").match(/--[a-z]+/g))) expect(sources, option).toMatch(new RegExp(`\\b${option.slice(2)}: `));
 });

@@ -1,1 +1,0 @@
-import{s as i,t as o,d,c as n,n as l,g as m,w as v,x as c}from"./index-C3TApj8e.js";import{s as f}from"./snippet-CIIzudCN.js";var h=m('<div class="card empty svelte-1fpw1hr"><p> </p> <!></div>');function w(e,t){var a=h(),s=n(a),r=c(s,!0),p=i(s,2);f(p,()=>t.children??l),o(()=>v(r,t.what)),d(e,a)}export{w as E};

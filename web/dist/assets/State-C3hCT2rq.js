@@ -1,1 +1,0 @@
-import{t as r,d as n,g as l,a2 as i,v as o,w as m,x as v}from"./index-C3TApj8e.js";var _=l("<span> </span>");function f(e,a){var t=_(),s=v(t,!0);r(()=>{i(t,1,`state ${a.kind??""}`,"svelte-lrhrev"),o(t,"title",a.meaning),m(s,a.word)}),n(e,t)}export{f as S};

@@ -1,1 +1,0 @@
-import{J as s,u as n}from"./index-C3TApj8e.js";const i=400;async function u(o,a){for(;;){const t=await s(n`/jobs/${o}`);if(t.state!=="queued"&&t.state!=="running")return t;a(t),await new Promise(e=>setTimeout(e,i))}}export{u as f};

@@ -1,1 +1,0 @@
-import{o as a}from"./index-client-Z4-awQIy.js";import{I as i}from"./index-C3TApj8e.js";import{S as c}from"./stream-D5Y2CCm9.js";const p=250;function T(s,r){let e;const t=()=>e??=setTimeout(()=>{e=void 0,r()},p),n=Object.fromEntries([...s,"reset"].map(o=>[o,t])),m=new c(i("/events"),{on:n,onopen:o=>o&&t()});a(()=>{m.close(),clearTimeout(e)})}export{T as w};
