@@ -1,9 +1,10 @@
 // What every journey needs: the real server with driving robots, a browser, and checks that hold on every page: no error in
 // the console, no request to another origin, nothing serious from axe-core, nothing wider than the screen.
 import assert from "node:assert/strict";
-import { spawn } from "node:child_process";
+import { execFile, spawn } from "node:child_process";
 import { mkdirSync, readFileSync } from "node:fs";
 import { createRequire } from "node:module";
+import { promisify } from "node:util";
 import { chromium } from "playwright-core";
 
 export const PROGRAM = process.env.WAYMARK_PROGRAM ?? new URL("../../../target/debug/waymark", import.meta.url).pathname;
@@ -11,7 +12,7 @@ const CHROMIUM = process.env.CHROMIUM ?? "/usr/bin/chromium";
 const OUTPUT = new URL("../output/", import.meta.url).pathname;
 const AXE = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
 const GUIDE = new URL("../../../docs/pictures/pages/", import.meta.url).pathname;
-const PICTURES = ["map-desk", "landmarks-desk", "landmark-desk", "teach", "answer-evidence-desk", "history"];
+const PICTURES = ["map-desk", "landmarks-desk", "landmark-desk", "teach", "answer-evidence-desk", "history", "health-desk"];
 /** Time for anything that a journey waits for, ms: two cores are shared with driving robots. */
 export const SOON = 90_000;
 
@@ -36,11 +37,15 @@ export async function serve(...args) {
   return { link: `${origin}${(await answer.json()).path}`, origin, robots, stop };
 }
 
+/** Runs a command of the program to its end. */
+export const run = (args, options = {}) => promisify(execFile)(PROGRAM, args, { env: clean(), timeout: SOON, ...options });
+
+/** Without settings of the program: the server takes variables of this prefix for its own. */
+export const clean = () => Object.fromEntries(Object.entries(process.env).filter(([name]) => !name.startsWith("WAYMARK_")));
+
 /** Starts the program, and waits until it says this. */
 async function started(args, says) {
-  // The server takes variables of this prefix for its settings.
-  const env = Object.fromEntries(Object.entries(process.env).filter(([name]) => !name.startsWith("WAYMARK_")));
-  const child = spawn(PROGRAM, args, { stdio: ["ignore", "pipe", "pipe"], env });
+  const child = spawn(PROGRAM, args, { stdio: ["ignore", "pipe", "pipe"], env: clean() });
   let said = "";
   const found = await new Promise((done, failed) => {
     const hear = (text) => {
@@ -113,9 +118,14 @@ export async function hall({ context }, { origin }, api) {
   assert.equal(answer.status(), 201, await answer.text());
   const place = { x_m: 0, y_m: 2, z_m: 1.4, theta_rad: -Math.PI / 2, roll_rad: 0, tilt_rad: 0 };
   await api("PATCH", "/maps/hall/landmarks/poster", { place }, { "if-match": "*" });
-  const { id } = await api("POST", "/maps/hall/landmarks/poster/learn", {});
-  await eventually("end of the lesson", async () => (await api("GET", `/jobs/${id}`)).state === "done");
+  await learnt(api, "poster");
   return photograph;
+}
+
+/** Has a landmark of the map `hall` learnt. */
+export async function learnt(api, landmark) {
+  const { id } = await api("POST", `/maps/hall/landmarks/${landmark}/learn`, {});
+  await eventually("end of the lesson", async () => (await api("GET", `/jobs/${id}`)).state === "done");
 }
 
 /** Sends a photograph of a landmark of the map `hall`. */
@@ -124,6 +134,25 @@ export const uploaded = (context, origin, landmark, buffer, parts = {}) =>
     headers: { "x-waymark-page": "1" },
     multipart: { image: { name: "photo.png", mimeType: "image/png", buffer }, ...parts },
   });
+
+/** How many pixels of a part of a page have about this colour, [r, g, b]. */
+export async function pixels(part, colour) {
+  const shot = await part.screenshot();
+  return part.page().evaluate(
+    async ([base64, [r, g, b]]) => {
+      const bytes = Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
+      const picture = await createImageBitmap(new Blob([bytes], { type: "image/png" }));
+      const canvas = Object.assign(document.createElement("canvas"), { width: picture.width, height: picture.height });
+      const pen = canvas.getContext("2d");
+      pen.drawImage(picture, 0, 0);
+      const { data } = pen.getImageData(0, 0, canvas.width, canvas.height);
+      let found = 0;
+      for (let i = 0; i < data.length; i += 4) found += Math.abs(data[i] - r) + Math.abs(data[i + 1] - g) + Math.abs(data[i + 2] - b) < 40;
+      return found;
+    },
+    [shot.toString("base64"), colour],
+  );
+}
 
 /** Asks the API as the page does, with the session of the browser. */
 export const asker = ({ context }, { origin }) => async (method, path, body, headers = {}) => {

@@ -1,4 +1,4 @@
-// Journeys of an administrator through the pages of a running server, at a desk and on a phone.
+// Journeys on a map of a running server: its view, its tools, its settings; at a desk and on a phone.
 import assert from "node:assert/strict";
 import { readFile } from "node:fs/promises";
 import { after, afterEach, before, test } from "node:test";
@@ -81,53 +81,6 @@ for (const [size, where] of [[undefined, "desk"], [PHONE, "phone"]]) {
     await page.getByText(/a landmark is seen\. \d+ blind parts?/).waitFor();
     await check(page, `map-${where}`);
   });
-
-  test(`landmarks are found and opened, at the ${where}`, async () => {
-    const page = await go(`/maps/${MAP}/landmarks`, size);
-    const cards = page.locator("a.one");
-    await cards.first().waitFor();
-    await check(page, `landmarks-${where}`);
-    await page.getByLabel("Shown as").selectOption("table");
-    const [first] = (await api("GET", `/maps/${MAP}/landmarks`)).items;
-    await page.getByLabel("Name").fill(first.name);
-    await page.getByRole("link", { name: first.name, exact: true }).click();
-    await page.getByRole("heading", { name: "Photographs", exact: true }).waitFor();
-    await page.getByRole("img", { name: /Hausdorff/ }).waitFor();
-    await page.getByRole("img", { name: /Photograph \d+/ }).first().waitFor();
-    await check(page, `landmark-${where}`);
-  });
-
-  test(`a robot is shown with its frame and measures, at the ${where}`, async () => {
-    const page = await go("/robots", size);
-    await page.getByRole("cell", { name: "Live" }).first().waitFor();
-    await check(page, `robots-${where}`);
-    await page.getByRole("row").nth(1).getByRole("link").first().click();
-    await page.getByRole("img", { name: /Last frame/ }).first().waitFor();
-    await page.getByText(/From receipt to answer, ms: \d/).waitFor();
-    await check(page, `robot-${where}`);
-  });
-
-  test(`answers are listed and opened, at the ${where}`, async () => {
-    const page = await go("/answers", size);
-    await page.getByLabel("How it ended").selectOption("matched");
-    await page.waitForURL(/status=matched/);
-    await page.getByRole("cell", { name: "recognised" }).first().waitFor();
-    await check(page, `answers-${where}`);
-    await page.getByRole("row").nth(1).getByRole("link").first().click();
-    await page.getByRole("img", { name: "What the robot saw, upright" }).first().waitFor();
-    await page.getByRole("img", { name: /What was learnt of/ }).first().waitFor();
-    await check(page, `answer-${where}`);
-  });
-
-  test(`the server's parts are shown, at the ${where}`, async () => {
-    const page = await go("/admin", size);
-    for (const part of ["Health", "Jobs", "Users and tokens", "Audit log", "Backups"]) {
-      await page.getByRole("button", { name: part }).click();
-      await page.getByRole("heading", { name: part }).waitFor();
-      await page.waitForFunction(() => !document.querySelector(".loading"));
-      await check(page, `server-${part.toLowerCase().replaceAll(" ", "-")}-${where}`);
-    }
-  });
 }
 
 test("a map shows where odometry alone and a simulator say that robots are", async () => {
@@ -150,116 +103,6 @@ test("a map shows where odometry alone and a simulator say that robots are", asy
   assert.ok((await blue()) >= before + 20, `pixels of the true track: ${before} before, ${await blue()} after`);
   await page.reload();
   assert.ok(await page.getByLabel("Odometry (dashed), truth of a simulator", { exact: true }).isChecked(), "the layer is in the address");
-  assert.deepEqual(page.faults, []);
-});
-
-test("a landmark is renamed, measured, taken out of use and brought back by undo", async () => {
-  const [first] = (await api("GET", `/maps/${MAP}/landmarks`)).items;
-  const page = await go(`/maps/${MAP}/landmarks/${first.name}`);
-  await page.getByRole("button", { name: "Size" }).click();
-  await page.getByLabel("Width, metres").fill("0.77");
-  await page.getByRole("button", { name: "Save" }).click();
-  await page.getByText("0.77 m wide").waitFor();
-  await page.getByRole("button", { name: "Undo" }).click();
-  await page.getByText(`${first.size.width_m.toFixed(2)} m wide`).waitFor();
-  await page.getByRole("button", { name: "Take out of use" }).click();
-  await page.getByText("Out of use").first().waitFor();
-  await page.getByRole("button", { name: "It is as it was: use it" }).click();
-  await page.getByRole("button", { name: "Take out of use" }).waitFor();
-  await page.getByRole("button", { name: "Rename" }).click();
-  await page.getByRole("dialog").getByLabel("Name").fill("by-the-door");
-  await page.getByRole("dialog").getByRole("button", { name: "Rename" }).click();
-  await page.getByRole("heading", { name: /by-the-door/ }).waitFor();
-  await check(page, "landmark-renamed");
-  await page.goto(`/maps/${MAP}/history`);
-  await page.getByRole("button", { name: /Undo change/ }).first().click();
-  await page.getByLabel("Why").fill("the old name was right");
-  await page.getByRole("button", { name: "Undo it" }).click();
-  await page.getByRole("cell", { name: "the old name was right" }).waitFor();
-  const names = (await api("GET", `/maps/${MAP}/landmarks`)).items.map(({ name }) => name);
-  assert.ok(names.includes(first.name), names.join());
-  await check(page, "history");
-});
-
-test("two landmarks that are one object are merged", async () => {
-  const [first] = (await api("GET", `/maps/${MAP}/landmarks`)).items;
-  await api("POST", `/maps/${MAP}/landmarks`, { name: "twin" });
-  const page = await go(`/maps/${MAP}/landmarks/${first.name}`);
-  await page.getByRole("img", { name: /Points .*named/ }).waitFor();
-  await page.getByRole("button", { name: "Merge" }).click();
-  await page.getByLabel("The other one").selectOption("twin");
-  await check(page, "landmark-merge");
-  await page.getByRole("button", { name: "Make them one" }).click();
-  await page.getByText(`twin is part of ${first.name} now`).waitFor();
-  const names = (await api("GET", `/maps/${MAP}/landmarks`)).items.map(({ name }) => name);
-  assert.ok(!names.includes("twin"), names.join());
-  assert.deepEqual(page.faults, []);
-});
-
-test("a draft is begun, compared, tried and published", async () => {
-  const page = await go(`/maps/${MAP}/history`);
-  await page.getByRole("button", { name: "Begin a draft" }).click();
-  await page.getByLabel("Name of the draft").fill("spring");
-  await page.getByRole("button", { name: "Begin", exact: true }).click();
-  await page.getByRole("heading", { name: "Draft spring" }).waitFor();
-  await api("POST", "/maps/spring/landmarks", { name: "new-door" });
-  await page.reload();
-  await page.getByText("Publishing would change: 1 landmark added").waitFor();
-  await page.getByRole("button", { name: "Try it on the last frames" }).click();
-  await page.getByText(/answered as before/).waitFor();
-  await check(page, "draft");
-  await page.getByRole("button", { name: "Publish" }).click();
-  await page.getByRole("dialog").getByRole("button", { name: "Publish" }).click();
-  await page.getByRole("cell", { name: /Draft published/ }).waitFor();
-  await api("GET", `/maps/${MAP}/landmarks/new-door`);
-  assert.deepEqual(page.faults, []);
-});
-
-test("a landmark is taught by a robot's frame, learnt and tried", async () => {
-  await api("POST", "/maps", { name: "school" });
-  const [robot] = (await api("GET", "/robots")).items;
-  const camera = (await api("GET", `/robots/${robot.name}/cameras`)).cameras[0].name;
-  const frame = await its.context.request.get(`${server.origin}/api/v1/robots/${robot.name}/cameras/${camera}/frame`);
-  const file = { name: "frame.jpg", mimeType: frame.headers()["content-type"], buffer: await frame.body() };
-  const page = await go("/maps/school/teach");
-  await page.locator("input[type=file]").first().setInputFiles(file);
-  await page.getByRole("button", { name: "Set the corners myself" }).click();
-  const corner = page.getByRole("slider", { name: "Corner, top left" });
-  await corner.focus();
-  await page.keyboard.press("Shift+ArrowLeft");
-  await page.getByLabel("Name").fill("window");
-  await page.getByLabel("Width, metres").fill("0.8");
-  await page.getByLabel("Height, metres").fill("1.2");
-  await check(page, "teach");
-  await page.getByRole("button", { name: "Add the photograph" }).click();
-  await page.getByRole("button", { name: "Learn window" }).click();
-  await page.getByText(/window is learnt/).waitFor();
-  await page.getByLabel("Photograph to try").setInputFiles(file);
-  await page.getByRole("list", { name: "Quads" }).getByRole("listitem").first().waitFor();
-  assert.deepEqual(page.faults, []);
-  const landmark = await api("GET", "/maps/school/landmarks/window");
-  assert.equal(landmark.views, 1);
-  assert.equal(landmark.size.width_m, 0.8);
-});
-
-test("candidates appear while a robot drives, and are named, accepted or thrown away", async () => {
-  const page = await go("/robots");
-  await page.getByRole("cell", { name: "Live" }).first().waitFor();
-  const [{ name: robot }] = (await api("GET", "/robots")).items;
-  await page.goto(`/maps/${MAP}/gather`);
-  await page.getByLabel("Robot").selectOption(robot);
-  await page.getByLabel("also further views of known landmarks").check();
-  await page.getByRole("button", { name: "Begin to gather" }).click();
-  await page.getByRole("article", { name: /Candidate \d+/ }).first().waitFor();
-  await page.getByRole("button", { name: "Stop" }).click();
-  await page.getByRole("button", { name: "Begin to gather" }).waitFor();
-  await page.getByRole("button", { name: /Take the name/ }).first().click();
-  await check(page, "gather");
-  await page.getByRole("button", { name: "Accept what is named, and learn" }).click();
-  await page.getByText("1 landmark accepted and learnt.").waitFor();
-  await page.getByRole("button", { name: "Throw everything away" }).click();
-  await page.getByRole("dialog").getByRole("button", { name: "Throw away" }).click();
-  await page.getByText("The gathering is thrown away.").waitFor();
   assert.deepEqual(page.faults, []);
 });
 
@@ -299,6 +142,13 @@ test("a landmark is moved on the map and snaps to a wall", async () => {
   await page.getByRole("button", { name: "Undo" }).click();
   await page.waitForTimeout(500);
   assert.equal((await api("GET", "/maps/room/landmarks/sign")).place.y_m, 2);
+  // By a drag, to 0.3 m before the lower wall.
+  await page.getByRole("button", { name: "Move", exact: true }).click();
+  await page.mouse.move(box.x + box.width / 2 - 150, box.y + box.height / 2 - 100);
+  await page.mouse.down();
+  await page.mouse.move(box.x + box.width / 2 - 100, box.y + box.height / 2 + 85, { steps: 8 });
+  await page.mouse.up();
+  await page.getByText(/sign is on the wall at -2\.\d\d m, -2\.00 m/).waitFor();
   await check(page, "landmark-moved");
 });
 
@@ -313,23 +163,28 @@ test("a person tells a robot where it is", async () => {
   await page.waitForTimeout(400);
   await page.mouse.click(box.x + box.width / 2 + 60, box.y + box.height / 2);
   await page.getByText(`${robot} is told where it is`).waitFor();
+  // The same by one drag, which leaves the map where it was.
+  await page.getByRole("button", { name: "Tell a robot where it is" }).click();
+  const view = new URL(page.url()).searchParams.get("view");
+  await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
+  await page.mouse.down();
+  await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2 - 40, { steps: 5 });
+  const asked = page.waitForRequest((request) => request.method() === "PUT" && request.url().endsWith(`/robots/${robot}/pose`));
+  await page.mouse.up();
+  assert.ok(Math.abs((await asked).postDataJSON().theta_rad - Math.PI / 2) < 0.05, (await asked).postData());
+  await page.getByText(`${robot} is told where it is`).nth(1).waitFor();
+  assert.equal(new URL(page.url()).searchParams.get("view"), view, "the map stays");
   assert.deepEqual(page.faults, []);
 });
 
-test("a robot that knocks is admitted, and its certificates are listed", async () => {
-  const robots = (await api("GET", "/robots")).items;
-  const name = robots.at(-1).name;
-  const page = await go("/robots");
-  await page.getByRole("button", { name: `Remove ${name}` }).click();
-  await page.getByRole("button", { name: "Remove the robot" }).click();
-  await page.getByRole("heading", { name: "Robots that knock" }).waitFor();
-  await check(page, "robot-knocks");
-  await page.getByRole("button", { name: `Admit ${name}` }).click();
-  await page.getByRole("dialog").getByLabel("Map").selectOption(MAP);
-  await page.getByRole("button", { name: "Register it" }).click();
-  await page.getByRole("link", { name, exact: true }).click();
-  await page.getByText(/waymark robot enrol/).waitFor();
-  assert.deepEqual(page.faults, []);
+test("the blind parts of what a robot drove are shown", async () => {
+  const page = await go(`/maps/${MAP}`);
+  await page.getByRole("region", { name: "Robots on this map" }).getByText("Live").first().waitFor();
+  await page.getByRole("button", { name: "Check a path" }).click();
+  const [{ name: robot }] = (await api("GET", "/robots")).items;
+  await page.getByLabel("Path").selectOption(robot);
+  await page.getByText(/From \d+ % of \d+\.\d\d m a landmark is seen\. \d+ blind parts?/).waitFor();
+  await check(page, "driven-path");
 });
 
 for (const [size, where] of [[undefined, "desk"], [PHONE, "phone"]]) {
@@ -417,40 +272,4 @@ test("a map is saved as a file and loaded under another name", async () => {
   const [a, b] = [await api("GET", `/maps/${MAP}`), await api("GET", "/maps/twin")];
   assert.equal(a.landmarks, b.landmarks);
   assert.deepEqual(page.faults, []);
-});
-
-test("a camera is calibrated from what it has seen, or it is said what is missing; fixes and a run are shown", async () => {
-  const [{ name: robot }] = (await api("GET", "/robots")).items;
-  const page = await go(`/robots/${robot}`);
-  await page.getByRole("button", { name: /^Calibrate / }).first().click();
-  const dialog = page.getByRole("dialog");
-  await dialog.getByRole("button", { name: "Calibrate", exact: true }).click();
-  await dialog.getByText(/Focal length/).or(dialog.getByRole("alert")).first().waitFor();
-  await page.keyboard.press("Escape");
-  await page.getByText("What the position rests on").click();
-  await page.getByText(/The position rests on:/).waitFor();
-  await page.getByRole("button", { name: "Record a run" }).click();
-  await page.getByText(/A run is being recorded/).waitFor();
-  await page.getByRole("button", { name: "Give the recording up" }).click();
-  await page.getByText("The recording is given up.").waitFor();
-  await page.getByText(/Error of the position, m/).waitFor();
-  // A refused calibration is an answer of 409 or 422, which the browser reports.
-  assert.deepEqual(page.faults.filter((fault) => !/409|422|404/.test(fault)), []);
-});
-
-test("a viewer sees no button that may not be pressed, and is refused all the same", async () => {
-  const { text } = await api("POST", "/tokens", { name: "guest", role: "viewer" });
-  const guest = await its.context.browser().newContext({ baseURL: server.origin });
-  const page = await open(guest, server.origin, "/");
-  await page.getByLabel("Token").fill(text);
-  await page.getByRole("button", { name: "Sign in" }).click();
-  await page.getByRole("link", { name: MAP, exact: true }).waitFor();
-  for (const name of ["New map", "Delete", "Copy", "Rename"]) assert.equal(await page.getByRole("button", { name }).count(), 0, name);
-  const refused = await guest.request.fetch(`${server.origin}/api/v1/maps`, { method: "POST", headers: { "x-waymark-page": "1" }, data: { name: "mine" } });
-  assert.equal(refused.status(), 403);
-  await page.getByRole("button", { name: "Sign out" }).click();
-  await page.getByRole("heading", { name: "Sign in to Waymark" }).waitFor();
-  // The first answer of a page without a session is 401, which the browser reports.
-  assert.deepEqual(page.faults.filter((fault) => !fault.includes("401")), []);
-  await guest.close();
 });
