@@ -36,6 +36,7 @@ mod shell;
 pub mod simulated_errors;
 pub mod stopwatch;
 pub mod survey;
+mod traces;
 mod version;
 mod validity;
 mod view;
@@ -43,6 +44,8 @@ mod view;
 use clap::{CommandFactory as _, Parser, Subcommand};
 use failure::{EXIT_STATUSES, Failure};
 use std::{process::ExitCode, time::Duration};
+use traces::Traces;
+use tracing_subscriber::{EnvFilter, Layer as _, layer::SubscriberExt as _, util::SubscriberInitExt as _};
 
 /// Maps and landmarks for fleets of robots: teach the pictures and doors of a building once, and every robot that
 /// sends camera frames learns where it is.
@@ -213,7 +216,14 @@ pub fn main() -> ExitCode {
     // A running server logs what it does; the other commands print results.
     let default =
         if matches!(cli.command, Command::Serve(_)) { "info,zenoh=warn" } else { "warn,zenoh=error" };
-    start_log(cli.log.as_deref(), default, cli.log_format);
+    let traces = match &cli.command {
+        Command::Serve(_) | Command::Demo(_) => match Traces::from_environment() {
+            Ok(traces) => traces,
+            Err(failure) => return report(&failure),
+        },
+        _ => None,
+    };
+    start_log_and(cli.log.as_deref(), default, cli.log_format, traces.as_ref());
     let done = |()| ExitCode::SUCCESS;
     let result = match &cli.command {
         Command::Demo(args) => run(demo::run(args)),
@@ -282,12 +292,18 @@ fn run<T>(work: impl Future<Output = anyhow::Result<T>>) -> anyhow::Result<T> {
 
 /// Starts the log on standard error (standard output belongs to results), with `filter` or else with `default`.
 pub fn start_log(filter: Option<&str>, default: &str, format: LogFormat) {
-    let filter = tracing_subscriber::EnvFilter::builder().parse_lossy(filter.unwrap_or(default));
-    let log = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr);
-    match format {
-        LogFormat::Text => log.with_ansi(screen::has_colour(&std::io::stderr())).init(),
-        LogFormat::Json => log.json().with_span_list(false).init(),
-    }
+    start_log_and(filter, default, format, None);
+}
+
+/// The same, with traces.
+fn start_log_and(filter: Option<&str>, default: &str, format: LogFormat, traces: Option<&Traces>) {
+    let filter = EnvFilter::builder().parse_lossy(filter.unwrap_or(default));
+    let log = tracing_subscriber::fmt::layer().with_writer(std::io::stderr);
+    let log = match format {
+        LogFormat::Text => log.with_ansi(screen::has_colour(&std::io::stderr())).boxed(),
+        LogFormat::Json => log.json().with_span_list(false).boxed(),
+    };
+    tracing_subscriber::registry().with(log.with_filter(filter)).with(traces.map(Traces::layer)).init();
 }
 
 #[cfg(test)]

@@ -40,6 +40,8 @@ Several servers, each with its own maps, share one zenoh router (docs/guides/sev
 
   waymark serve --router tcp/127.0.0.1:7447 --server-name hall --http 127.0.0.1:8081
 
+With OTEL_EXPORTER_OTLP_ENDPOINT=http://127.0.0.1:4318 traces of requests and frames go to a collector of OpenTelemetry.
+
 Runs until Ctrl-C or SIGTERM. If a part of it ends by itself, /readyz answers 503 with its name and the program ends with
 an error: start it again, and it goes on from what is on the disk.
 

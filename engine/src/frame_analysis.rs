@@ -31,6 +31,7 @@ impl StageTimes {
     pub fn ended(&mut self, stage: &str) {
         let now = Instant::now();
         let ms = (now - self.since).as_secs_f64() * 1e3;
+        tracing::trace!(stage, ms, "stage_ended");
         self.times.push(v1::StageTime { stage: stage.to_owned(), ms });
         self.since = now;
     }

@@ -53,6 +53,7 @@ mod style;
 mod teach_and_recognise;
 mod tidy;
 mod tokens;
+mod traces;
 mod two_programs;
 mod underlay;
 mod visibility_settings;

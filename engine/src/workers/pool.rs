@@ -76,7 +76,8 @@ impl Engine {
     fn answer_in_span(&self, key: &SlotKey, job: &FrameJob, publish: &dyn Publish) -> FrameOutcome {
         let (robot, camera, frame) = (&key.robot, &key.camera, &job.frame);
         let (epoch, seq) = (frame.epoch, frame.seq);
-        tracing::debug_span!("frame", %robot, %camera, epoch, seq)
+        let waited_ms = u64::try_from(job.received.elapsed().as_millis()).unwrap_or(u64::MAX);
+        tracing::debug_span!("frame", %robot, %camera, epoch, seq, waited_ms)
             .in_scope(|| self.answer_frame(key, job, publish))
     }
 }

@@ -24,7 +24,7 @@ use std::{
     net::IpAddr,
     time::{Duration, Instant},
 };
-use tracing::Instrument as _;
+use tracing::{Instrument as _, field::Empty};
 
 /// Headers of an answer with a body, about.
 const MOST_HEADERS: usize = 12;
@@ -55,12 +55,7 @@ pub(super) async fn guard(State(app): State<AppState>, mut request: Request, nex
         Err(error) => error.into_response(),
         Ok(()) => match reused_answers::kept(&app, &request) {
             Some(response) => response,
-            None => match tokio::time::timeout(deadline, placed(&app, request, next).instrument(span(&id)))
-                .await
-            {
-                Ok(response) => response,
-                Err(_elapsed) => timed_out(&method, deadline).into_response(),
-            },
+            None => in_span(&app, request, next, &id, deadline).await,
         },
     };
     let took = started.elapsed();
@@ -85,9 +80,24 @@ pub(super) async fn guard(State(app): State<AppState>, mut request: Request, nex
     response
 }
 
-/// Everything that is logged for a request has its id.
-fn span(id: &HeaderValue) -> tracing::Span {
-    tracing::info_span!("request", id = id.to_str().unwrap_or_default())
+/// Handles a request until its deadline. What is logged meanwhile has its id; how it ended is for traces.
+async fn in_span(
+    app: &AppState,
+    request: Request,
+    next: Next,
+    id: &HeaderValue,
+    deadline: Duration,
+) -> Response {
+    let (id, method) = (id.to_str().unwrap_or_default(), request.method().clone());
+    let span = tracing::info_span!("request", id, %method, route = Empty, status = Empty);
+    let handled = placed(app, request, next).instrument(span.clone());
+    let response = match tokio::time::timeout(deadline, handled).await {
+        Ok(response) => response,
+        Err(_elapsed) => timed_out(&method, deadline).into_response(),
+    };
+    span.record("route", response.extensions().get::<MatchedPath>().map(MatchedPath::as_str));
+    span.record("status", response.status().as_u16());
+    response
 }
 
 /// A bundle of a map is large: its way takes longer than that of other requests.
