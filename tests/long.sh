@@ -29,7 +29,7 @@ part simulation 'Simulation, 20 000 seeds of frames and 1 000 of the store' \
     'WAYMARK_SEEDS=20000 cargo test --release -p engine --test simulation;
      WAYMARK_SEEDS=1000 cargo test -p server --lib publication::tests::simulation'
 part kills '200 kills' 'WAYMARK_KILLS=200 cargo test -p tests --test end_to_end restart::'
-part cuts '5 000 power cuts, and faults of the disk' 'WAYMARK_LONG=1 cargo test -p server --lib -- store::power_cuts store::damage; WAYMARK_LONG=1 cargo test -p tests --test end_to_end -- full_disk::'
+part cuts '5 000 power cuts, and faults of the disk' 'WAYMARK_LONG=1 cargo test -p server --lib -- store::power_cuts store::damage store::io_errors; WAYMARK_LONG=1 cargo test -p tests --test end_to_end -- full_disk::'
 part soak 'An hour of mixed load' 'cargo run --release -p lab -- bench load --minutes 60'
 part planted 'Planted faults' 'tests/planted/run.sh'
 echo "report: $report"

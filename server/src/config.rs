@@ -155,6 +155,9 @@ pub struct Config {
     /// Name of the layer between SQLite and the files, where a test has its own.
     #[cfg(test)]
     pub(crate) vfs: Option<&'static str>,
+    /// Pages of the log from which on it is moved into the file, where a test has fewer.
+    #[cfg(test)]
+    pub(crate) log_pages: i64,
 }
 
 impl Config {
@@ -165,6 +168,15 @@ impl Config {
         return self.vfs;
         #[cfg(not(test))]
         None
+    }
+
+    /// Pages of the log from which on it is moved into the file.
+    #[cfg_attr(not(test), expect(clippy::unused_self, reason = "only tests have another"))]
+    pub(crate) fn log_pages(&self) -> i64 {
+        #[cfg(test)]
+        return self.log_pages;
+        #[cfg(not(test))]
+        crate::store::LOG_PAGES
     }
 
     /// The listeners that other machines can reach, by setting, with their addresses: they are not encrypted.
@@ -241,6 +253,8 @@ impl TryFrom<RawConfig> for Config {
             params: Arc::new(raw.algorithm),
             #[cfg(test)]
             vfs: None,
+            #[cfg(test)]
+            log_pages: crate::store::LOG_PAGES,
         })
     }
 }

@@ -13,6 +13,7 @@ mod clocks;
 mod command_line;
 mod demo;
 mod detect_command;
+mod disk_errors;
 mod drafts;
 mod earlier_database;
 mod encrypted_http;

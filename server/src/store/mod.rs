@@ -9,6 +9,7 @@ mod error;
 pub(crate) mod kind;
 pub(crate) mod migrations;
 pub(crate) mod open;
+mod checkpoint;
 mod writer;
 mod statements;
 pub(crate) mod map_rows;
@@ -46,6 +47,7 @@ pub(crate) mod history;
 pub(crate) mod contents;
 pub(crate) mod drafts;
 
+pub(crate) use checkpoint::LOG_PAGES;
 pub(crate) use error::StoreError;
 pub(crate) use on_commit::{CommittedChange, OnCommit};
 pub(crate) use open::OpenError;
@@ -150,7 +152,8 @@ impl Store {
         let commits = Arc::<AtomicU64>::default();
         let parts = (on_commit, vitals.clone(), jobs.clone(), commits.clone());
         let heart = vitals.hearts().begin(WRITER);
-        let writer = writer::Writer::new(conn, received, history, parts, heart.clone());
+        let with = (heart.clone(), config.log_pages());
+        let writer = writer::Writer::new(conn, received, history, parts, with);
         let (close, closed) = oneshot::channel();
         let task = tokio::spawn(writer.run(closed, vitals.begin(WRITER)));
         let task = WriterTask { task, close, reads: opened.reads.clone(), _lock: opened.lock };
@@ -276,6 +279,8 @@ fn text_revision(text: &str) -> String {
 
 #[cfg(test)]
 mod damage;
+#[cfg(test)]
+mod io_errors;
 #[cfg(test)]
 mod power_cuts;
 #[cfg(test)]

@@ -12,7 +12,8 @@ use std::{
 };
 
 use super::{
-    StoreError, disk_guard, error::is_without_room, history, migrations, pictures, restored, schema,
+    StoreError, checkpoint::renew_log, disk_guard, error::is_without_room, history, migrations, pictures,
+    restored, schema,
 };
 
 /// First version without the write-ahead-log corruption of 3.7.0 to 3.51.2 (sqlite.org/wal.html#walresetbug).
@@ -27,8 +28,10 @@ pub(crate) const FILE: &str = "waymark.sqlite";
 const LOCK: &str = "lock";
 
 /// Settings that each connection must have: name and value.
-const PRAGMAS: [(&str, &str); 7] = [
+const PRAGMAS: [(&str, &str); 8] = [
     ("journal_mode", "wal"),
+    // The writer moves the log into the file itself, to learn of errors.
+    ("wal_autocheckpoint", "0"),
     // 2 = FULL: a commit is on the disk before it is acknowledged.
     ("synchronous", "2"),
     ("foreign_keys", "1"),
@@ -108,6 +111,14 @@ pub(super) async fn open(data: &Path, vfs: Option<&'static str>) -> Result<Opene
     let lock = lock(data)?;
     restored::put_in_place(data, FILE)
         .map_err(|source| OpenError::Directory { path: data.to_owned(), source })?;
+    let log = data.join(format!("{FILE}-wal"));
+    match renew_log(&log) {
+        // Blocks that are there are written in place; some file systems need room all the same.
+        Err(error) if error.kind() == std::io::ErrorKind::StorageFull => {
+            tracing::warn!(%error, follows = "it stays as it is", "log_not_renewed");
+        }
+        renewed => renewed.map_err(|source| OpenError::Directory { path: log, source })?,
+    }
     let (writer, reads) = match connect(data, vfs).await {
         Err(OpenError::Open(error)) if vfs.is_none() && is_without_room(&error) => {
             let follows = "the index of its log is in memory; what adds data is refused until there is room";
@@ -179,6 +190,7 @@ fn options(file: &Path) -> SqliteConnectOptions {
         .filename(file)
         .foreign_keys(true)
         .busy_timeout(BUSY_TIMEOUT)
+        .pragma("wal_autocheckpoint", "0")
         .pragma("mmap_size", "0")
         .pragma("trusted_schema", "OFF")
         .pragma("cell_size_check", "ON")

@@ -17,7 +17,7 @@ const LONG_CUTS: u64 = 5_000;
 /// Cuts of the self-check.
 const CHECKS: u64 = 60;
 /// Pages after which the log is moved into the file: often, so that cuts fall into it.
-const CHECKPOINT_PAGES: u32 = 40;
+pub(super) const LOG_PAGES: i64 = 40;
 /// Latest call that is cut.
 const LATEST: u64 = 600;
 
@@ -32,13 +32,13 @@ struct Outcome {
 }
 
 /// A directory in memory where the system has one: the layer below decides what is on the disk, and nothing is synced.
-fn folder() -> TempDir {
+pub(super) fn folder() -> TempDir {
     let memory = Path::new("/dev/shm");
     if memory.is_dir() { TempDir::new_in(memory).unwrap() } else { TempDir::new().unwrap() }
 }
 
 /// A database with one map.
-async fn template() -> TempDir {
+pub(super) async fn template() -> TempDir {
     let dir = folder();
     let (store, task) = Catalogue::open(&config(dir.path())).await.unwrap();
     store.write(|tx| Box::pin(maps::create(tx, "hall", DistanceKind::Both, 2))).await.unwrap();
@@ -46,7 +46,7 @@ async fn template() -> TempDir {
     dir
 }
 
-fn name(number: u64) -> String {
+pub(super) fn name(number: u64) -> String {
     format!("l{number:05}")
 }
 
@@ -69,8 +69,8 @@ async fn cut(template: &Path, seed: u64, synchronous: Option<&str>) -> Outcome {
     fs::copy(template.join(super::open::FILE), before.path().join(super::open::FILE)).unwrap();
     let disk = Disk::of(before.path()).unwrap();
     let over = Config { vfs: Some(power_cut::NAME), ..config(&before.path().canonicalize().unwrap()) };
+    let over = Config { log_pages: LOG_PAGES, ..over };
     let (store, task) = Catalogue::open(&over).await.unwrap();
-    set(&store, format!("PRAGMA wal_autocheckpoint = {CHECKPOINT_PAGES}")).await;
     if let Some(level) = synchronous {
         set(&store, format!("PRAGMA synchronous = {level}")).await;
     }
@@ -93,7 +93,7 @@ async fn cut(template: &Path, seed: u64, synchronous: Option<&str>) -> Outcome {
     task.close().await;
     disk.after_cut(after.path(), &mut random).unwrap();
     let in_checkpoint = disk.cut_in().is_some_and(|file| file == super::open::FILE);
-    let found = found(after.path(), seed).await;
+    let found = found(after.path(), &format!("seed {seed}")).await;
     assert!(found.landmarks <= acknowledged + 1, "seed {seed}: more than was asked for");
     Outcome {
         acknowledged,
@@ -104,30 +104,31 @@ async fn cut(template: &Path, seed: u64, synchronous: Option<&str>) -> Outcome {
 }
 
 /// What the next start finds.
-struct Found {
-    landmarks: u64,
-    version: u64,
+#[derive(Debug, Clone, Copy)]
+pub(super) struct StoredState {
+    pub(super) landmarks: u64,
+    pub(super) version: u64,
 }
 
 /// Starts on what the disk holds: everything is whole, and numbers have no gap.
-async fn found(data: &Path, seed: u64) -> Found {
-    let (store, task) = Catalogue::open(&config(data)).await.unwrap_or_else(|e| panic!("seed {seed}: {e}"));
-    let version = store.snapshots().get("hall").unwrap_or_else(|| panic!("seed {seed}: no map")).version;
+pub(super) async fn found(data: &Path, what: &str) -> StoredState {
+    let (store, task) = Catalogue::open(&config(data)).await.unwrap_or_else(|e| panic!("{what}: {e}"));
+    let version = store.snapshots().get("hall").unwrap_or_else(|| panic!("{what}: no map")).version;
     let rows = sqlx::query_as::<_, (i64, String)>("SELECT id, name FROM landmarks ORDER BY name");
     let rows = rows.fetch_all(store.reads()).await.unwrap();
     let names: Vec<String> = rows.iter().map(|(_, name)| name.clone()).collect();
-    assert_eq!(names, (0..names.len() as u64).map(name).collect::<Vec<_>>(), "seed {seed}: a gap");
+    assert_eq!(names, (0..names.len() as u64).map(name).collect::<Vec<_>>(), "{what}: a gap");
     let ids: Vec<i64> = rows.iter().map(|(id, _)| *id).collect();
     assert!(
         ids.iter().zip(ids.first().copied().unwrap_or_default()..).all(|(id, wanted)| *id == wanted),
-        "seed {seed}: {ids:?}"
+        "{what}: {ids:?}"
     );
     task.close().await;
     let mut conn = super::copies::open_live(&data.join(super::open::FILE)).await.unwrap();
     let said: String = sqlx::query_scalar("PRAGMA integrity_check").fetch_one(&mut conn).await.unwrap();
-    assert_eq!(said, "ok", "seed {seed}");
+    assert_eq!(said, "ok", "{what}");
     conn.close().await.unwrap();
-    Found { landmarks: names.len() as u64, version }
+    StoredState { landmarks: names.len() as u64, version }
 }
 
 async fn cuts(count: u64, synchronous: Option<&str>) -> Vec<Outcome> {

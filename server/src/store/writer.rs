@@ -12,6 +12,7 @@
 use super::{
     actor::Actor,
     audit,
+    checkpoint::{empty_log, move_long_log},
     error::StoreError,
     history::{self, Author, HistoryLimits},
     kept_answers::Keeping,
@@ -181,10 +182,15 @@ pub(super) struct Writer {
     commits: Arc<AtomicU64>,
     /// Beats by probes, and by what the database does for a long write.
     heart: Arc<Heartbeat>,
+    /// Pages of the log from which on it is moved into the file.
+    log_pages: i64,
 }
 
 /// Steps of the database's machine between two beats: a beat costs a thousandth of them.
 const STEPS_A_BEAT: i32 = 1000;
+
+/// Why the log is not empty.
+const READ: &str = "another connection reads the database";
 
 /// Its name among the parts of the server.
 pub(crate) const PART: &str = "the writer of the store";
@@ -195,10 +201,10 @@ impl Writer {
         commands: mpsc::Receiver<Command>,
         history: HistoryLimits,
         (on_commit, vitals, jobs, commits): (Arc<dyn OnCommit>, Arc<Vitals>, Arc<Notify>, Arc<AtomicU64>),
-        heart: Arc<Heartbeat>,
+        (heart, log_pages): (Arc<Heartbeat>, i64),
     ) -> Self {
         let tx = Tx { conn, author: Author::default(), history, changes: Vec::new(), after: Vec::new() };
-        Self { tx, commands, on_commit, vitals, jobs, commits, heart }
+        Self { tx, commands, on_commit, vitals, jobs, commits, heart, log_pages }
     }
 
     /// Runs until told to close and what is queued is done, or until an error after which nothing may be written.
@@ -230,7 +236,8 @@ impl Writer {
         if let Err(error) = note_head(&mut self.tx.conn, "stop").await {
             tracing::warn!(%error, "audit_head_not_read");
         }
-        if let Err(error) = checkpoint(&mut self.tx.conn).await {
+        let emptied = empty_log(&mut self.tx.conn).await.map_err(|error| error.to_string());
+        if let Err(error) = emptied.and_then(|is_empty| is_empty.then_some(()).ok_or(READ.to_owned())) {
             tracing::warn!(%error, follows = "the write-ahead log holds data: copy it with the file", "checkpoint_failed");
         }
         if let Err(error) = sqlx::Connection::close(self.tx.conn).await {
@@ -301,7 +308,20 @@ impl Writer {
                 return Err(error);
             }
         }
-        Ok(())
+        self.move_log().await
+    }
+
+    /// After the answer: what is in the log is on the disk. An error of the disk ends the writer here, too: the log would grow
+    /// without an end, and the sync that has failed cannot be repeated.
+    async fn move_log(&mut self) -> Result<(), StoreError> {
+        match move_long_log(&mut self.tx.conn, self.log_pages).await {
+            Err(error) if error.is_fatal() => Err(error),
+            Err(error) => {
+                tracing::warn!(%error, follows = "the log grows; the next commit tries again", "log_not_moved");
+                Ok(())
+            }
+            Ok(()) => Ok(()),
+        }
     }
 
     /// Publishes everything that the write has changed.
@@ -335,19 +355,4 @@ async fn beat_with(conn: &mut SqliteConnection, heart: &Arc<Heartbeat>) -> Resul
         true
     });
     Ok(())
-}
-
-/// Moves the write-ahead log into the file and empties it, so that the file alone is complete. Closing the connection does
-/// that only if it is the last one of the file, and another program or a slow reader may hold one. Errors: somebody still
-/// reads, or the database refuses.
-async fn checkpoint(conn: &mut SqliteConnection) -> Result<(), StoreError> {
-    let busy: i64 = sqlx::query_scalar("PRAGMA wal_checkpoint(TRUNCATE)")
-        .fetch_one(conn)
-        .await
-        .map_err(StoreError::during("checkpoint"))?;
-    if busy == 0 {
-        Ok(())
-    } else {
-        Err(StoreError::InUse("another connection reads the database".to_owned()))
-    }
 }

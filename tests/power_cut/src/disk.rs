@@ -1,5 +1,6 @@
 //! What a disk holds after a cut: sectors that were not synced, by file.
 
+use crate::io_error::{Call, IoError, Planned};
 use std::{
     collections::BTreeMap,
     fs, io,
@@ -36,7 +37,7 @@ impl Random {
 }
 
 /// What was not synced of a file.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Unsynced {
     /// Length at the last sync.
     pub(crate) synced_len: u64,
@@ -44,11 +45,33 @@ pub(crate) struct Unsynced {
     pub(crate) is_synced: bool,
     /// Content at the last sync of the sectors that have changed since, filled up with zeros.
     pub(crate) before: BTreeMap<u64, Vec<u8>>,
+    /// The same of sectors whose sync has failed: they are as good as synced, unless they are written again.
+    pub(crate) lost: BTreeMap<u64, Vec<u8>>,
 }
 
-#[derive(Debug, Default)]
+impl Unsynced {
+    /// A file as it is on the disk.
+    pub(crate) fn new(len: u64) -> Self {
+        Self { synced_len: len, is_synced: len > 0, before: BTreeMap::new(), lost: BTreeMap::new() }
+    }
+
+    /// All that was written is on the disk, but for what a failed sync has lost.
+    pub(crate) fn synced(&mut self, len: u64) {
+        self.before.clear();
+        (self.synced_len, self.is_synced) = (len, true);
+    }
+
+    /// Nothing that was written will be synced any more.
+    pub(crate) fn not_synced(&mut self) {
+        self.lost.append(&mut self.before);
+    }
+}
+
+#[derive(Debug, Default, Clone)]
 pub(crate) struct State {
     pub(crate) files: BTreeMap<PathBuf, Unsynced>,
+    /// Errors of single calls.
+    errors: Option<Planned>,
     /// Calls until the cut.
     left: Option<u64>,
     cut_in: Option<PathBuf>,
@@ -56,6 +79,11 @@ pub(crate) struct State {
 }
 
 impl State {
+    /// Whether this call has an error.
+    pub(crate) fn fails(&mut self, call: Call, path: &Path) -> bool {
+        self.errors.as_mut().is_some_and(|errors| errors.fails(call, path))
+    }
+
     /// Counts a call that changes a file. False once the power is cut.
     pub(crate) fn goes_on(&mut self, path: &Path) -> bool {
         if self.is_cut {
@@ -83,7 +111,15 @@ pub(crate) fn of(file: &Path) -> Option<Arc<Mutex<State>>> {
     disks.iter().find(|(folder, _)| file.starts_with(folder)).map(|(_, state)| state.clone())
 }
 
-/// A disk whose power can be cut: a directory, until this is dropped.
+/// To be called where a program has written a whole file anew by itself, and synced it.
+pub fn synced(file: &Path) {
+    let Some(disk) = of(file) else { return };
+    if let Some(unsynced) = lock(&disk).files.get_mut(file) {
+        *unsynced = Unsynced::new(fs::metadata(file).map_or(0, |data| data.len()));
+    }
+}
+
+/// A disk whose power can be cut, and whose calls can fail: a directory, until this is dropped.
 #[derive(Debug)]
 pub struct Disk {
     folder: PathBuf,
@@ -101,6 +137,28 @@ impl Disk {
     /// Cuts the power at the call after so many writes, truncations, syncs and deletions from now on.
     pub fn cut_after(&self, calls: u64) {
         lock(&self.state).left = Some(calls);
+    }
+
+    /// Has these errors from now on; `None`: no more.
+    pub fn set_error(&self, error: Option<IoError>) {
+        lock(&self.state).errors = error.map(Planned::new);
+    }
+
+    /// How many calls have failed since the last [`Self::set_error`].
+    pub fn failed_calls(&self) -> u64 {
+        lock(&self.state).errors.as_ref().map_or(0, |errors| errors.failed)
+    }
+
+    /// The files as a process that is killed now leaves them, at the directory `to`: what was not synced, or is lost, stays so.
+    pub fn after_kill(&self, to: &Path) -> io::Result<Self> {
+        let copy = Self::of(to)?;
+        let state = lock(&self.state);
+        for (path, unsynced) in &state.files {
+            let Some(name) = path.file_name().filter(|_| path.exists()) else { continue };
+            fs::copy(path, copy.folder.join(name))?;
+            lock(&copy.state).files.insert(copy.folder.join(name), unsynced.clone());
+        }
+        Ok(copy)
     }
 
     /// Name of the file whose call was cut; `None` before the cut.
@@ -121,7 +179,7 @@ impl Disk {
             let mut bytes = fs::read(path)?;
             // All that was not synced is lost, half of it, or a tenth.
             let kept_of_ten = [0, 5, 9][random.below(3) as usize];
-            for (sector, old) in &unsynced.before {
+            for (sector, old) in unsynced.before.iter().chain(&unsynced.lost) {
                 if random.below(10) < kept_of_ten {
                     continue;
                 }

@@ -1,14 +1,16 @@
 //! The layer as SQLite sees it: a table of functions for the file system (`sqlite3_vfs`), and one for each open file
 //! (`sqlite3_io_methods`). A file is our own structure, followed in memory by that of SQLite's own layer.
 
-use crate::disk::{self, SECTOR, State, Unsynced};
+use crate::{
+    disk::{self, SECTOR, State, Unsynced},
+    io_error::Call,
+};
 use libsqlite3_sys::{
     SQLITE_IOERR_DELETE, SQLITE_IOERR_FSYNC, SQLITE_IOERR_TRUNCATE, SQLITE_IOERR_WRITE, SQLITE_OK,
     SQLITE_OPEN_MAIN_DB, SQLITE_OPEN_WAL, sqlite3_file, sqlite3_io_methods, sqlite3_vfs, sqlite3_vfs_find,
     sqlite3_vfs_register,
 };
 use std::{
-    collections::BTreeMap,
     ffi::{CStr, c_char, c_int, c_void},
     mem::size_of,
     path::{Path, PathBuf},
@@ -114,7 +116,7 @@ unsafe extern "C" fn open(
             let path = PathBuf::from(CStr::from_ptr(name).to_string_lossy().into_owned());
             if let Some(disk) = disk::of(&path) {
                 let len = std::fs::metadata(&path).map_or(0, |data| data.len());
-                let new = || Unsynced { synced_len: len, is_synced: len > 0, before: BTreeMap::new() };
+                let new = || Unsynced::new(len);
                 let mut state = disk.lock().unwrap_or_else(PoisonError::into_inner);
                 state.files.entry(path.clone()).or_insert_with(new);
                 drop(state);
@@ -161,10 +163,14 @@ unsafe extern "C" fn read(file: *mut sqlite3_file, to: *mut c_void, count: c_int
     pass!(file.xRead(to, count, at))
 }
 
-/// Keeps what the sectors from `from` to `end` (bytes) held at the last sync.
+/// Keeps what the sectors from `from` to `end` (bytes) hold on the disk.
 fn keep(file: *mut sqlite3_file, unsynced: &mut Unsynced, from: u64, end: u64) {
+    let Unsynced { before, lost, .. } = unsynced;
     for sector in from / SECTOR..end.div_ceil(SECTOR) {
-        unsynced.before.entry(sector).or_insert_with(|| {
+        before.entry(sector).or_insert_with(|| {
+            if let Some(old) = lost.remove(&sector) {
+                return old;
+            }
             let mut old = vec![0_u8; SECTOR as usize];
             // What lies beyond the end is read as zeros.
             pass!(file.xRead(old.as_mut_ptr().cast(), SECTOR as c_int, (sector * SECTOR) as i64));
@@ -182,6 +188,10 @@ unsafe extern "C" fn write(file: *mut sqlite3_file, from: *const c_void, count: 
         if let Some(unsynced) = state.files.get_mut(&tracked.path) {
             keep(file, unsynced, at as u64, at as u64 + count as u64);
         }
+        if state.fails(Call::Write, &tracked.path) {
+            pass!(file.xWrite(from, count / 2, at));
+            return SQLITE_IOERR_WRITE;
+        }
     }
     pass!(file.xWrite(from, count, at))
 }
@@ -190,6 +200,9 @@ unsafe extern "C" fn truncate(file: *mut sqlite3_file, size: i64) -> c_int {
     // SAFETY: an open file of this layer.
     if let Some((tracked, mut state)) = unsafe { tracked(file) } {
         if !state.goes_on(&tracked.path) {
+            return SQLITE_IOERR_TRUNCATE;
+        }
+        if state.fails(Call::Truncate, &tracked.path) {
             return SQLITE_IOERR_TRUNCATE;
         }
         let mut now = 0;
@@ -208,11 +221,15 @@ unsafe extern "C" fn sync(file: *mut sqlite3_file, flags: c_int) -> c_int {
     if !state.goes_on(&tracked.path) {
         return SQLITE_IOERR_FSYNC;
     }
+    let fails = state.fails(Call::Sync, &tracked.path);
     let mut now = 0;
     let sized = pass!(file.xFileSize(&raw mut now));
     if let Some(unsynced) = state.files.get_mut(&tracked.path) {
-        unsynced.before.clear();
-        (unsynced.synced_len, unsynced.is_synced) = (now as u64, true);
+        if fails {
+            unsynced.not_synced();
+            return SQLITE_IOERR_FSYNC;
+        }
+        unsynced.synced(now as u64);
     }
     sized
 }
