@@ -17,7 +17,7 @@ part() {
     echo "== $2"
     bash -ec "$3" >"$log/$1" 2>&1 || { outcome=FAILED; failed=1; }
     say '' "## $2: $outcome" '' "\`$3\`, $((SECONDS - begun)) s" '' '```text'
-    grep -E '^test |^test result|^\||panicked|seed [0-9]|cuts|kills|slope|p99' "$log/$1" | tail -60 | cut -c1-118 >>"$report"
+    grep -E '^test |^test result|^\||panicked|seed [0-9]|cuts|kills|answered again|slope|p99' "$log/$1" | tail -60 | cut -c1-118 >>"$report"
     say '```'
     echo "   $outcome, $((SECONDS - begun)) s, log $log/$1"
 }
@@ -29,7 +29,7 @@ part simulation 'Simulation, 20 000 seeds of frames and 1 000 of the store' \
     'WAYMARK_SEEDS=20000 cargo test --release -p engine --test simulation;
      WAYMARK_SEEDS=1000 cargo test -p server --lib publication::tests::simulation'
 part kills '200 kills' 'WAYMARK_KILLS=200 cargo test -p tests --test end_to_end restart::'
-part cuts '5 000 power cuts, and faults of the disk' 'WAYMARK_LONG=1 cargo test -p server --lib -- store::power_cuts store::damage store::io_errors; WAYMARK_LONG=1 cargo test -p tests --test end_to_end -- full_disk::'
+part cuts '5 000 power cuts, and faults of disk and link' 'WAYMARK_LONG=1 cargo test -p server --lib -- store::power_cuts store::damage store::io_errors; WAYMARK_LONG=1 cargo test -p tests --test end_to_end -- full_disk::; WAYMARK_LONG=1 cargo test -p tests --test link_faults -- --nocapture'
 part soak 'An hour of mixed load' 'cargo run --release -p lab -- bench load --minutes 60'
 part planted 'Planted faults' 'tests/planted/run.sh'
 echo "report: $report"

@@ -11,6 +11,7 @@ pub mod guides;
 pub mod machines;
 mod open_data;
 pub mod pictures;
+pub mod proxy;
 pub mod robots;
 pub mod ros;
 pub mod router;
