@@ -2,7 +2,7 @@
 // Prints figures and asserts none: `node tests/scale.js`. WAYMARK_PROGRAM names the program, which is to be a release build;
 // WAYMARK_PYTHON a Python with the package of client/python.
 import { execFileSync, spawn } from "node:child_process";
-import { mkdtempSync, rmSync } from "node:fs";
+import { mkdtempSync, readFileSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { browser, serve } from "./journeys/harness.js";
@@ -35,6 +35,18 @@ async function build(api) {
   const landmarks = Array.from({ length: LANDMARKS }, (_, i) => ({ name: `sign-${i}`, size: { width_m: 0.6, height_m: 0.8 }, place: place(i) }));
   await api("POST", "/maps/big/bulk/create-landmarks", { landmarks });
   for (let i = 0; i < ROBOTS; i++) await api("PUT", `/robots/r${i}`, { map: "big" });
+}
+
+/** Memory of a process, MB. */
+function memory(process) {
+  let text = "";
+  try {
+    text = readFileSync(`/proc/${process}/smaps_rollup`, "utf8");
+  } catch {
+    // It has ended meanwhile.
+  }
+  const sum = (names) => [...text.matchAll(new RegExp(`^(?:${names}):\\s+(\\d+) kB`, "gm"))].reduce((all, [, kb]) => all + Number(kb) / 1000, 0);
+  return { resident: sum("Rss"), private: sum("Private_Clean|Private_Dirty") };
 }
 
 /** Pictures a second while the map is dragged, over `ms`. */
@@ -118,12 +130,13 @@ try {
   await cdp.send("Performance.enable");
   const { metrics } = await cdp.send("Performance.getMetrics");
   const heap = metrics.find(({ name }) => name === "JSHeapUsedSize").value;
-  const sizes = execFileSync("ps", ["-eo", "rss,args"], { encoding: "utf8" }).split("\n").filter((line) => line.includes("--type=renderer"));
-  const rss = Math.max(...sizes.map((line) => Number(line.trim().split(" ")[0]) / 1000));
+  // The largest process that draws a page: what it has resident, and what of that is its own, not the browser's program.
+  const renderers = execFileSync("pgrep", ["-f", "type=renderer"], { encoding: "utf8" }).trim().split("\n").map(memory);
+  const largest = renderers.reduce((a, b) => (b.resident > a.resident ? b : a));
   console.log(`robots live on the page: ${live} of ${ROBOTS}`);
   console.log(`first paint after ${paint_ms?.toFixed(0)} ms, the whole map after ${shown_ms.toFixed(0)} ms`);
   console.log(`while panning, pictures a second: ${far.toFixed(1)} (whole map), ${near.toFixed(1)} (near)`);
-  console.log(`script heap ${(heap / 1e6).toFixed(0)} MB; largest renderer process ${rss.toFixed(0)} MB`);
+  console.log(`script heap ${(heap / 1e6).toFixed(0)} MB; the page's process ${largest.private.toFixed(0)} MB of its own, ${largest.resident.toFixed(0)} MB resident`);
 } finally {
   for (const end of ended.reverse()) await end();
   rmSync(data, { recursive: true, force: true });
