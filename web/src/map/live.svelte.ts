@@ -66,6 +66,7 @@ export class LiveMap {
   #stream: Stream;
   #heard = new Map<string, LiveRobot>();
   #pending = false;
+  #is_closed = false;
   #told_ms = 0;
   #timer: ReturnType<typeof setTimeout> | undefined;
 
@@ -93,6 +94,7 @@ export class LiveMap {
   }
 
   close(): void {
+    this.#is_closed = true;
     clearTimeout(this.#timer);
     this.#stream.close();
   }
@@ -107,7 +109,11 @@ export class LiveMap {
       if (pose && !robot.pose) this.#pose({ robot: name, pose, covariance: pose.covariance, age_ms: pose.age_ms, trust: pose.trust });
     }
     this.#tell();
-    await Promise.all(here.slice(0, TRACKED_ROBOTS).map(({ name }) => this.#readTracks(name)));
+    // One after the other: a browser has six connections to a server, and the map itself is to come first.
+    for (const { name } of here.slice(0, TRACKED_ROBOTS)) {
+      if (this.#is_closed) return;
+      await this.#readTracks(name);
+    }
   }
 
   /** Puts what was driven before the page was opened in front of what was heard since. */
