@@ -13,8 +13,9 @@ const ANALYSIS_BYTES_PER_PX: usize = 64;
 const PHOTOGRAPH_BYTES_PER_PX: usize = 24;
 /// A request: its head, a body that needs no place, buffers of encryption.
 const CONNECTION_BYTES: usize = (32 << 10) + (64 << 10) + (64 << 10);
-/// A robot: its session at the router with encryption, epochs, fused pose, corrections, trajectories.
-const ROBOT_BYTES: usize = 384 << 10;
+/// A robot: its session at the router with encryption, epochs, fused pose, corrections, trajectories. 0.8 MB each are measured
+/// with a thousand.
+const ROBOT_BYTES: usize = 1 << 20;
 /// The queue of readings of one live event stream.
 const STREAM_BYTES: usize = 256 << 10;
 
@@ -85,7 +86,7 @@ mod tests {
             (|l| l.replay_bytes += 7 << 20, 7),
             (|l| l.uploads += 1, 16),
             (|l| l.upload_bytes += 1 << 20, 16),
-            (|l| l.robots += 1024, 384),
+            (|l| l.robots += 1024, 1024),
             (|l| l.frame_pixels += 1 << 20, 3 * ANALYSIS_BYTES_PER_PX),
         ];
         for (change, more_mb) in changes {
