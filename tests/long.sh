@@ -24,12 +24,15 @@ part() {
 
 say "# Long forms of the tests, $(date -u +%Y-%m-%d)" '' \
     "Commit $(git rev-parse --short HEAD), $(nproc) processors, $(sed -n 's/^model name.*: //p' /proc/cpuinfo | head -1)."
-part fuzz 'Fuzz targets' 'fuzz/long.sh; WAYMARK_RUNS=100000 cargo test -p server --lib any_bytes_as_a_bundle'
+part fuzz 'Fuzz targets' 'fuzz/long.sh; WAYMARK_RUNS=100000 cargo test --workspace --lib -- any_bytes_as_a_bundle'
 part simulation 'Simulation, 20 000 seeds of frames and 1 000 of the store' \
     'WAYMARK_SEEDS=20000 cargo test --release -p engine --test simulation;
-     WAYMARK_SEEDS=1000 cargo test -p server --lib publication::tests::simulation'
-part kills '200 kills' 'WAYMARK_KILLS=200 cargo test -p tests --test end_to_end restart::'
-part cuts '5 000 power cuts, and faults of disk and link' 'WAYMARK_LONG=1 cargo test -p server --lib -- store::power_cuts store::damage store::io_errors; WAYMARK_LONG=1 cargo test -p tests --test end_to_end -- full_disk::; WAYMARK_LONG=1 cargo test -p tests --test link_faults -- --nocapture'
+     WAYMARK_SEEDS=1000 cargo test --workspace --lib -- publication::tests::simulation'
+part kills '200 kills' 'WAYMARK_KILLS=200 cargo test --workspace --test end_to_end -- --nocapture restart::'
+part cuts '5 000 power cuts, and faults of disk and link' \
+    'WAYMARK_LONG=1 cargo test --workspace --lib -- store::power_cuts store::damage store::io_errors;
+     WAYMARK_LONG=1 cargo test --workspace --test end_to_end -- full_disk::;
+     WAYMARK_LONG=1 cargo test --workspace --test link_faults -- --nocapture'
 part soak 'An hour of mixed load' 'cargo run --release -p lab -- bench load --minutes 60'
 part planted 'Planted faults' 'tests/planted/run.sh'
 echo "report: $report"

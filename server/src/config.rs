@@ -157,7 +157,7 @@ pub struct Config {
     pub(crate) vfs: Option<&'static str>,
     /// Pages of the log from which on it is moved into the file, where a test has fewer.
     #[cfg(test)]
-    pub(crate) log_pages: i64,
+    pub(crate) log_pages: Option<i64>,
 }
 
 impl Config {
@@ -170,13 +170,13 @@ impl Config {
         None
     }
 
-    /// Pages of the log from which on it is moved into the file.
+    /// Pages of the log from which on it is moved into the file, where a test has fewer.
     #[cfg_attr(not(test), expect(clippy::unused_self, reason = "only tests have another"))]
-    pub(crate) fn log_pages(&self) -> i64 {
+    pub(crate) fn log_pages(&self) -> Option<i64> {
         #[cfg(test)]
         return self.log_pages;
         #[cfg(not(test))]
-        crate::store::LOG_PAGES
+        None
     }
 
     /// The listeners that other machines can reach, by setting, with their addresses: they are not encrypted.
@@ -254,7 +254,7 @@ impl TryFrom<RawConfig> for Config {
             #[cfg(test)]
             vfs: None,
             #[cfg(test)]
-            log_pages: crate::store::LOG_PAGES,
+            log_pages: None,
         })
     }
 }

@@ -10,7 +10,7 @@ use std::{
 };
 
 /// Pages of the log from which on it is moved into the file: 4 MB, as SQLite has it.
-pub(crate) const LOG_PAGES: i64 = 1000;
+pub(super) const LOG_PAGES: i64 = 1000;
 
 /// Bytes that are written anew at a time.
 const PIECE_BYTES: usize = 1 << 20;

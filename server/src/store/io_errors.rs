@@ -49,7 +49,7 @@ fn errors(numbers: u64) -> impl Iterator<Item = IoError> {
 
 async fn open(disk: &Path) -> Result<(Catalogue, CatalogueTasks), OpenError> {
     let over = Config { vfs: Some(power_cut::NAME), ..config(&disk.canonicalize().unwrap()) };
-    let over = Config { log_pages: power_cuts::LOG_PAGES, ..over };
+    let over = Config { log_pages: Some(power_cuts::LOG_PAGES), ..over };
     Catalogue::open(&over).await
 }
 

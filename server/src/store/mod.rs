@@ -47,7 +47,6 @@ pub(crate) mod history;
 pub(crate) mod contents;
 pub(crate) mod drafts;
 
-pub(crate) use checkpoint::LOG_PAGES;
 pub(crate) use error::StoreError;
 pub(crate) use on_commit::{CommittedChange, OnCommit};
 pub(crate) use open::OpenError;
@@ -152,7 +151,7 @@ impl Store {
         let commits = Arc::<AtomicU64>::default();
         let parts = (on_commit, vitals.clone(), jobs.clone(), commits.clone());
         let heart = vitals.hearts().begin(WRITER);
-        let with = (heart.clone(), config.log_pages());
+        let with = (heart.clone(), config.log_pages().unwrap_or(checkpoint::LOG_PAGES));
         let writer = writer::Writer::new(conn, received, history, parts, with);
         let (close, closed) = oneshot::channel();
         let task = tokio::spawn(writer.run(closed, vitals.begin(WRITER)));

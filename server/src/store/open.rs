@@ -7,7 +7,6 @@ use sqlx::{
 };
 use std::{
     fs::{File, TryLockError},
-    io::ErrorKind,
     path::{Path, PathBuf},
     time::Duration,
 };
@@ -114,9 +113,8 @@ pub(super) async fn open(data: &Path, vfs: Option<&'static str>) -> Result<Opene
         .map_err(|source| OpenError::Directory { path: data.to_owned(), source })?;
     let log = data.join(format!("{FILE}-wal"));
     match renew_log(&log) {
-        // Blocks that are there are written in place; some file systems need room all the same. A disk that takes nothing
-        // serves robots.
-        Err(error) if matches!(error.kind(), ErrorKind::StorageFull | ErrorKind::ReadOnlyFilesystem) => {
+        // Blocks that are there are written in place; some file systems need room all the same.
+        Err(error) if error.kind() == std::io::ErrorKind::StorageFull => {
             tracing::warn!(%error, follows = "it stays as it is", "log_not_renewed");
         }
         renewed => renewed.map_err(|source| OpenError::Directory { path: log, source })?,

@@ -69,7 +69,7 @@ async fn cut(template: &Path, seed: u64, synchronous: Option<&str>) -> Outcome {
     fs::copy(template.join(super::open::FILE), before.path().join(super::open::FILE)).unwrap();
     let disk = Disk::of(before.path()).unwrap();
     let over = Config { vfs: Some(power_cut::NAME), ..config(&before.path().canonicalize().unwrap()) };
-    let over = Config { log_pages: LOG_PAGES, ..over };
+    let over = Config { log_pages: Some(LOG_PAGES), ..over };
     let (store, task) = Catalogue::open(&over).await.unwrap();
     if let Some(level) = synchronous {
         set(&store, format!("PRAGMA synchronous = {level}")).await;
