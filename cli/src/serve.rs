@@ -13,6 +13,8 @@ use std::{
     path::PathBuf,
     time::Duration,
 };
+#[cfg(unix)]
+use tokio::signal::unix::{Signal, SignalKind, signal};
 
 /// Time that the other parts have to end after one has failed.
 const STOP_AFTER_FAILURE: Duration = Duration::from_secs(10);
@@ -130,13 +132,14 @@ impl Serve {
         warn_of_plain_text(&config);
         let data = config.data.clone();
         let server = Server::start(config).await?;
+        let signals = StopSignals::heard()?;
         ready(&server);
         let metrics = server.metrics_addr.map(|address| address.to_string()).unwrap_or_default();
         tracing::info!(data = %data.display(), http = %server.http_addr, zenoh = server.zenoh_endpoint, metrics, "ready");
         let supervisor = Supervisor::of_environment();
         supervisor.tell("READY=1");
         tokio::select! {
-            stopped = stop_signal() => stopped?,
+            stopped = signals.first() => stopped?,
             failure = server.failed() => return Err(after(&failure, server).await),
             never = supervisor.keep_alive(server.vitals()) => match never {},
         }
@@ -185,19 +188,40 @@ fn ready(server: &RunningServer) {
     std::io::stdout().write_all(text.as_bytes()).ok();
 }
 
+/// What tells the server to stop, heard from its making on: who was told that the server is ready may stop it at once.
 #[cfg(unix)]
-async fn stop_signal() -> anyhow::Result<()> {
-    use tokio::signal::unix::{SignalKind, signal};
-    let mut terminate = signal(SignalKind::terminate()).context("SIGTERM")?;
-    tokio::select! {
-        pressed = tokio::signal::ctrl_c() => pressed.context("Ctrl-C"),
-        _ = terminate.recv() => Ok(()),
+struct StopSignals {
+    terminate: Signal,
+    interrupt: Signal,
+}
+
+#[cfg(unix)]
+impl StopSignals {
+    fn heard() -> anyhow::Result<Self> {
+        let terminate = signal(SignalKind::terminate()).context("SIGTERM")?;
+        Ok(Self { terminate, interrupt: signal(SignalKind::interrupt()).context("Ctrl-C")? })
+    }
+
+    async fn first(mut self) -> anyhow::Result<()> {
+        tokio::select! {
+            _ = self.interrupt.recv() => Ok(()),
+            _ = self.terminate.recv() => Ok(()),
+        }
     }
 }
 
 #[cfg(not(unix))]
-async fn stop_signal() -> anyhow::Result<()> {
-    tokio::signal::ctrl_c().await.context("Ctrl-C")
+struct StopSignals;
+
+#[cfg(not(unix))]
+impl StopSignals {
+    fn heard() -> anyhow::Result<Self> {
+        Ok(Self)
+    }
+
+    async fn first(self) -> anyhow::Result<()> {
+        tokio::signal::ctrl_c().await.context("Ctrl-C")
+    }
 }
 
 #[cfg(test)]
