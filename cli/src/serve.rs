@@ -188,7 +188,7 @@ fn ready(server: &RunningServer) {
     std::io::stdout().write_all(text.as_bytes()).ok();
 }
 
-/// What tells the server to stop, heard from its making on: who was told that the server is ready may stop it at once.
+/// SIGTERM and Ctrl-C. They are heard as soon as this is made, before anybody is told that the server is ready.
 #[cfg(unix)]
 struct StopSignals {
     terminate: Signal,
