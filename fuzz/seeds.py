@@ -120,6 +120,8 @@ def json_bodies():
     for i, body in enumerate(of):
         body = examples[body] if isinstance(body, str) else body
         seed("json", f"body-{i:02}", bytes([i]) + json.dumps(body).encode())
+    far = {**capture, "robot_from_camera": {**capture["robot_from_camera"], "z_m": 12.2}}
+    seed("json", "far-camera", b"\x03" + json.dumps(far).encode())
 
 
 def map_files():

@@ -3,7 +3,7 @@
 use crate::{Code, Rejection, v1};
 use map::{
     check::{MAX_COORDINATE_M, MAX_VARIANCE, OutOfRange},
-    extrinsics::CameraExtrinsics,
+    extrinsics::{CameraExtrinsics, MAX_MOUNTING_M},
     pose2::{Pose2, Pose2Covariance},
 };
 use nalgebra::{Isometry3, Matrix3, Quaternion, Translation3, UnitQuaternion};
@@ -88,12 +88,13 @@ pub fn pose2_covariance_wire(value: &Pose2Covariance) -> v1::Pose2Covariance {
     }
 }
 
-/// Extrinsics of a camera, with the default covariance.
+/// Extrinsics of a camera within [`MAX_MOUNTING_M`] of the robot's origin, with the default covariance.
 pub fn mounting(pose: &v1::Pose3) -> Result<CameraExtrinsics, Rejection> {
-    CameraExtrinsics::new(pose3(pose)?).map_err(|e| {
-        let r = refused(&e);
-        Rejection { field: String::new(), ..r }
-    })
+    let transform = pose3(pose)?;
+    for (field, value) in [("x_m", pose.x_m), ("y_m", pose.y_m), ("z_m", pose.z_m)] {
+        within(field, value, MAX_MOUNTING_M)?;
+    }
+    CameraExtrinsics::new(transform).map_err(|e| refused(&e))
 }
 
 /// An out-of-range error of `map` as a rejection.
@@ -294,9 +295,10 @@ mod tests {
 
     #[test]
     fn a_camera_far_from_its_robot_is_refused() {
-        let at = |x_m| mounting(&v1::Pose3 { qw: 1.0, x_m, ..v1::Pose3::default() });
-        assert!(at(map::extrinsics::MAX_MOUNTING_M).is_ok());
-        assert_eq!(at(map::extrinsics::MAX_MOUNTING_M + 0.01).unwrap_err().code, Code::OutOfRange);
+        let at = |y_m| mounting(&v1::Pose3 { qw: 1.0, y_m, ..v1::Pose3::default() });
+        assert!(at(MAX_MOUNTING_M).is_ok());
+        let refused = at(MAX_MOUNTING_M + 0.01).unwrap_err();
+        assert_eq!((refused.code, refused.field.as_str()), (Code::OutOfRange, "y_m"));
     }
 
     #[test]
