@@ -9,11 +9,13 @@ use crate::{
     start_error::StartError,
     store::Store,
 };
-use axum::Router;
+use axum::{extract::Request, response::Response};
 use engine::vitals::Pulse;
-use std::{net::SocketAddr, sync::Arc, time::Duration};
+use futures::FutureExt as _;
+use std::{convert::Infallible, net::SocketAddr, sync::Arc, time::Duration};
 use tokio::{net::TcpListener, sync::watch, task::JoinHandle};
 use tokio_rustls::TlsAcceptor;
+use tower::ServiceExt as _;
 
 /// Connections of the listener for metrics at a time.
 const METRICS_CONNECTIONS: usize = 8;
@@ -77,10 +79,14 @@ impl Serving {
         let metrics = listeners.metrics.map(|listener| {
             let limits = Limits { connections: METRICS_CONNECTIONS, ..limits.clone() };
             let pulse = vitals.begin("the listener for metrics");
-            serve((listener, None, pulse), http::metrics_alone(app), limits, stopping)
+            let router = http::metrics_alone(app);
+            let metrics = move |request| router.clone().oneshot(request);
+            serve((listener, None, pulse), metrics, limits, stopping)
         });
         let listener = (listeners.http, listeners.tls, vitals.begin("the HTTP listener"));
-        let http = serve(listener, http::router(app.clone()), limits.clone(), stopping);
+        let service = http::Service::new(app.clone());
+        let answer = move |request| service.clone().answer(request).map(Ok);
+        let http = serve(listener, answer, limits.clone(), stopping);
         vitals.fail_stalled_after(Duration::from_secs(limits.stalled_s));
         Self { http, metrics, probes, watch: tokio::spawn(vitals.watch()) }
     }
@@ -97,15 +103,15 @@ impl Serving {
     }
 }
 
-fn serve(
+fn serve<Answering: Future<Output = Result<Response, Infallible>> + Send + 'static>(
     (listener, tls, pulse): (TcpListener, Option<TlsAcceptor>, Pulse),
-    router: Router,
+    answer: impl Fn(Request) -> Answering + Clone + Send + Sync + 'static,
     limits: Limits,
     stopping: &watch::Receiver<bool>,
 ) -> JoinHandle<()> {
     let stopping = stopping.clone();
     tokio::spawn(async move {
-        http::listen::serve(listener, router, tls, limits, stopping).await;
+        http::listen::serve(listener, answer, tls, limits, stopping).await;
         drop(pulse);
     })
 }

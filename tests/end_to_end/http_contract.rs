@@ -331,7 +331,9 @@ async fn the_pages_are_served_with_their_policy() {
         assert_eq!(response.status(), StatusCode::OK, "{path}");
         assert!(response.headers()[CONTENT_TYPE].to_str().expect("text").starts_with(kind), "{path}");
         let policy = response.headers()["content-security-policy"].to_str().expect("text");
-        assert!(policy.contains("default-src 'none'") && policy.contains("script-src 'self'"), "{path}");
+        assert!(policy.contains("default-src 'none'") && policy.contains("frame-ancestors 'none'"), "{path}");
+        // What is no page may load nothing at all.
+        assert_eq!(policy.contains("script-src 'self'"), kind == "text/html", "{path}");
     }
     inside.server.stop().await;
 }

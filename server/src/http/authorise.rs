@@ -2,7 +2,7 @@
 //! found its route. Out: the same with its [`Principal`], or 401, 403, or 404 for what the principal may not see.
 
 use super::{
-    API, AppState,
+    API, App, AppState,
     cookie::session_cookie,
     error::{ApiError, method_not_allowed},
     history,
@@ -109,6 +109,16 @@ fn principal(app: &AppState, parts: &Parts, role: Role) -> Result<Principal, Api
     let principal = tokens.principal(token, now_ms).map_err(|d| unauthenticated(denied(d), role))?;
     check_page(&parts.method, &parts.headers)?;
     Ok(principal)
+}
+
+/// The valid token that a request comes with, in its header or by its session. A header that is not valid hides the session.
+pub(super) fn token(app: &App, headers: &HeaderMap, now: Instant) -> Option<TokenId> {
+    let (tokens, now_ms) = (app.store.tokens(), now_ms());
+    if let Some(value) = headers.get(header::AUTHORIZATION) {
+        return tokens.valid(bearer(value)?, now_ms).ok();
+    }
+    let token = session_cookie(headers).and_then(|cookie| app.sessions.token(cookie, now))?;
+    tokens.check(token, now_ms).is_ok().then_some(token)
 }
 
 /// Who asks for what everybody may ask for. `None` for a stranger, and for one whose token or session is not valid.

@@ -1,22 +1,22 @@
-//! Around every request: an id, a log line, a bound of how often is asked, a deadline, a place for a large body, safe headers, and a refusal of what other web pages send.
+//! Around every request: an id, a log line, a bound of how often is asked, an answer that is kept, a deadline, a place for a
+//! large body, safe headers, and a refusal of what other web pages send.
 //!
 //! A browser reaches the server on behalf of any page it shows; so a request must name this server as its host and, if it
 //! changes anything, come from its own pages or from no page at all. Who asks is the matter of `authorise`.
 
 use super::{
-    AppState,
+    App, authorise,
     error::ApiError,
     peer::Peer,
     request_id::{REQUEST_ID, RequestId},
     request_rates::asking,
-    reused_answers,
+    reused_answers, safe_headers,
 };
 use crate::config::Limits;
 use axum::{
     body::HttpBody,
-    extract::{MatchedPath, Request, State},
+    extract::{MatchedPath, Request},
     http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, header},
-    middleware::Next,
     response::{IntoResponse, Response},
 };
 use serde_json::Value;
@@ -26,71 +26,61 @@ use std::{
 };
 use tracing::{Instrument as _, field::Empty};
 
-/// Headers of an answer with a body, about.
-const MOST_HEADERS: usize = 12;
 /// Bodies up to this size need no place, bytes.
 const SMALL_BODY: u64 = 64 << 10;
-/// The pages load only what this server serves; nothing may frame them.
-const CSP: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; \
-                   connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
-/// The documentation page sets styles from its script.
-const CSP_DOCS: &str = "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; \
-                        img-src 'self' data:; connect-src 'self'; base-uri 'none'; form-action 'none'; \
-                        frame-ancestors 'none'";
 
-/// The middleware.
-pub(super) async fn guard(State(app): State<AppState>, mut request: Request, next: Next) -> Response {
+/// What is around a request: `inner` answers it if the guard lets it pass and no earlier answer is kept.
+pub(super) async fn guard<Answering: Future<Output = Response>>(
+    app: &App,
+    mut request: Request,
+    inner: impl FnOnce(Request) -> Answering,
+) -> Response {
     let RequestId(id) = RequestId::of(request.headers());
     request.extensions_mut().insert(RequestId(id.clone()));
     let (method, uri) = (request.method().clone(), request.uri().clone());
     let started = Instant::now();
-    let deadline = Duration::from_secs(deadline_s(&app.config.limits, uri.path()));
     // With TLS, plain text comes from this machine alone, and a certificate proves the name that a page was asked by.
-    let is_encrypted = request.extensions().get::<Peer>().is_some_and(|peer| peer.is_encrypted);
+    let peer = request.extensions().get::<Peer>().copied();
     let is_loopback = app.config.tls.is_some() || app.config.http_addr.ip().to_canonical().is_loopback();
-    let loopback = is_loopback && !is_encrypted;
-    let may_ask = asking(&app, &request, started).map_or(Ok(()), |who| app.rates.take(who, started));
+    let loopback = is_loopback && !peer.is_some_and(|peer| peer.is_encrypted);
+    let token = authorise::token(app, request.headers(), started);
+    let may_ask = asking(token, peer.as_ref()).map_or(Ok(()), |who| app.rates.take(who, started));
     let checked = check_origin(request.method(), request.headers(), loopback).and(may_ask);
-    let mut response = match checked {
-        Err(error) => error.into_response(),
-        Ok(()) => match reused_answers::kept(&app, &request) {
-            Some(response) => response,
-            None => in_span(&app, request, next, &id, deadline).await,
-        },
+    let kept = token.filter(|_| checked.is_ok()).and_then(|token| reused_answers::kept(app, &request, token));
+    let kept_route = kept.as_ref().map(|kept| kept.route);
+    let mut response = match (checked, kept) {
+        (Err(error), _) => error.into_response(),
+        (Ok(()), Some(kept)) => kept.into_response(),
+        (Ok(()), None) => {
+            let deadline = Duration::from_secs(deadline_s(&app.config.limits, uri.path()));
+            in_span(app, request, inner, &id, deadline).await
+        }
     };
     let took = started.elapsed();
     let (status, path, ms) = (response.status(), uri.path(), took.as_secs_f64() * 1e3);
     let route = response.extensions().get::<MatchedPath>().map(MatchedPath::as_str);
-    let route = route.or_else(|| reused_answers::template(path));
-    app.http_times.add(method.as_str(), route, status.as_u16(), took);
+    app.http_times.add(method.as_str(), kept_route.or(route), status.as_u16(), took);
     if is_change(&method, status) {
         tracing::info!(id = id.to_str().unwrap_or_default(), %method, path, status = status.as_u16(), ms, "changed");
     } else {
         tracing::debug!(id = id.to_str().unwrap_or_default(), %method, path, status = status.as_u16(), ms, "request");
     }
-    let docs = path.starts_with("/api/docs");
-    let headers = response.headers_mut();
-    headers.reserve(MOST_HEADERS);
-    headers.insert(REQUEST_ID, id);
-    headers
-        .insert(header::CONTENT_SECURITY_POLICY, HeaderValue::from_static(if docs { CSP_DOCS } else { CSP }));
-    headers.insert(header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff"));
-    headers.insert(header::REFERRER_POLICY, HeaderValue::from_static("no-referrer"));
-    headers.insert("cross-origin-resource-policy", HeaderValue::from_static("same-origin"));
+    safe_headers::set(response.headers_mut(), path);
+    response.headers_mut().insert(REQUEST_ID, id);
     response
 }
 
 /// Handles a request until its deadline. What is logged meanwhile has its id; how it ended is for traces.
-async fn in_span(
-    app: &AppState,
+async fn in_span<Answering: Future<Output = Response>>(
+    app: &App,
     request: Request,
-    next: Next,
+    inner: impl FnOnce(Request) -> Answering,
     id: &HeaderValue,
     deadline: Duration,
 ) -> Response {
     let (id, method) = (id.to_str().unwrap_or_default(), request.method().clone());
     let span = tracing::info_span!("request", id, %method, route = Empty, status = Empty);
-    let handled = placed(app, request, next).instrument(span.clone());
+    let handled = placed(app, request, inner).instrument(span.clone());
     let response = match tokio::time::timeout(deadline, handled).await {
         Ok(response) => response,
         Err(_elapsed) => timed_out(&method, deadline).into_response(),
@@ -112,7 +102,11 @@ fn is_change(method: &Method, status: StatusCode) -> bool {
 }
 
 /// Handles a request. One with a large body has a place from before its body is read until it is answered.
-async fn placed(app: &AppState, request: Request, next: Next) -> Response {
+async fn placed<Answering: Future<Output = Response>>(
+    app: &App,
+    request: Request,
+    inner: impl FnOnce(Request) -> Answering,
+) -> Response {
     let small = request.body().size_hint().upper().is_some_and(|bytes| bytes <= SMALL_BODY);
     let _place = if small {
         None
@@ -122,7 +116,7 @@ async fn placed(app: &AppState, request: Request, next: Next) -> Response {
             Err(error) => return error.into_response(),
         }
     };
-    next.run(request).await
+    inner(request).await
 }
 
 /// 408. A change that had not begun is not made any more; one that had is made all the same, and nobody is told.

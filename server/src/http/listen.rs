@@ -3,17 +3,19 @@
 
 use super::{
     encryption::{self, Spoken},
+    head_timer::HeadTimer,
     peer::Peer,
 };
 use crate::config::Limits;
-use axum::{Router, extract::Request};
+use axum::{Router, body::Body, extract::Request, response::Response};
 use hyper::{body::Incoming, server::conn::http1, service::service_fn};
 use hyper_util::{
-    rt::{TokioIo, TokioTimer},
+    rt::TokioIo,
     server::graceful::{GracefulShutdown, Watcher},
 };
 use std::{
     collections::BTreeMap,
+    convert::Infallible,
     io,
     net::{IpAddr, SocketAddr},
     pin::Pin,
@@ -73,10 +75,10 @@ impl Drop for OfAddress {
 
 /// How connections are served.
 #[derive(Clone)]
-struct Serving {
+struct Serving<Answer> {
     http: http1::Builder,
     tls: Option<TlsAcceptor>,
-    router: Router,
+    answer: Answer,
     /// For who speaks plain text from another machine where TLS is on.
     refusing: Router,
     header_timeout: Duration,
@@ -84,9 +86,9 @@ struct Serving {
 }
 
 /// Serves until `stopping` is true: with `tls`, encrypted, and plain text to clients of this machine alone.
-pub(crate) async fn serve(
+pub(crate) async fn serve<Answering: Future<Output = Result<Response, Infallible>> + Send + 'static>(
     listener: TcpListener,
-    router: Router,
+    answer: impl Fn(Request) -> Answering + Clone + Send + Sync + 'static,
     tls: Option<TlsAcceptor>,
     limits: Limits,
     mut stopping: watch::Receiver<bool>,
@@ -96,11 +98,11 @@ pub(crate) async fn serve(
     let graceful = GracefulShutdown::new();
     let header_timeout = Duration::from_secs(limits.header_timeout_s);
     let mut http = http1::Builder::new();
-    http.timer(TokioTimer::new()).header_read_timeout(header_timeout).max_buf_size(HEAD_MAX);
+    http.header_read_timeout(header_timeout).max_buf_size(HEAD_MAX);
     let serving = Serving {
         http,
         tls,
-        router,
+        answer,
         refusing: encryption::refusing(),
         header_timeout,
         write_timeout: Duration::from_secs(limits.write_timeout_s),
@@ -130,23 +132,30 @@ pub(crate) async fn serve(
     }
 }
 
-impl Serving {
+impl<Answering, Answer> Serving<Answer>
+where
+    Answering: Future<Output = Result<Response, Infallible>> + Send + 'static,
+    Answer: Fn(Request) -> Answering + Clone + Send + Sync + 'static,
+{
     /// Serves one connection to its end.
     async fn connection(self, stream: TcpStream, peer: SocketAddr, watcher: Watcher) -> Result<(), String> {
+        let answer = self.answer.clone();
         let Some(tls) = &self.tls else {
-            return self.http(self.timed(stream), &self.router, Peer::plain(peer), watcher).await;
+            return self.http(self.timed(stream), answer, Peer::plain(peer), watcher).await;
         };
         let spoken = tokio::time::timeout(self.header_timeout, encryption::spoken(&stream, peer));
         match within(spoken.await)? {
             Spoken::Tls => {
                 let handshake = tls.accept(self.timed(stream));
                 let stream = within(tokio::time::timeout(self.header_timeout, handshake).await)?;
-                self.http(stream, &self.router, Peer { addr: peer, is_encrypted: true }, watcher).await
+                self.http(stream, answer, Peer { addr: peer, is_encrypted: true }, watcher).await
             }
-            Spoken::LocalPlain => {
-                self.http(self.timed(stream), &self.router, Peer::plain(peer), watcher).await
+            Spoken::LocalPlain => self.http(self.timed(stream), answer, Peer::plain(peer), watcher).await,
+            Spoken::Plain => {
+                let refusing = self.refusing.clone();
+                let refuse = move |request| refusing.clone().oneshot(request);
+                self.http(self.timed(stream), refuse, Peer::plain(peer), watcher).await
             }
-            Spoken::Plain => self.http(self.timed(stream), &self.refusing, Peer::plain(peer), watcher).await,
         }
     }
 
@@ -158,19 +167,21 @@ impl Serving {
         Box::pin(stream)
     }
 
-    async fn http(
+    async fn http<Answered: Future<Output = Result<Response, Infallible>> + Send + 'static>(
         &self,
         stream: impl AsyncRead + AsyncWrite + Unpin + Send + 'static,
-        router: &Router,
+        answer: impl Fn(Request) -> Answered + Send + 'static,
         peer: Peer,
         watcher: Watcher,
     ) -> Result<(), String> {
-        let router = router.clone();
-        let answer = service_fn(move |mut request: Request<Incoming>| {
+        let answer = service_fn(move |request: Request<Incoming>| {
+            let mut request = request.map(Body::new);
             request.extensions_mut().insert(peer);
-            router.clone().oneshot(request)
+            answer(request)
         });
-        let connection = self.http.serve_connection(TokioIo::new(stream), answer);
+        let mut http = self.http.clone();
+        http.timer(HeadTimer::default());
+        let connection = http.serve_connection(TokioIo::new(stream), answer);
         watcher.watch(connection).await.map_err(|error| error.to_string())
     }
 }
@@ -209,7 +220,6 @@ mod tests {
         routing::get,
     };
     use futures::{StreamExt, stream};
-    use std::convert::Infallible;
     use tokio::{
         io::{AsyncReadExt, AsyncWriteExt},
         time::timeout,
@@ -235,7 +245,8 @@ mod tests {
         let at = listener.local_addr().unwrap();
         let (stop, stopping) = watch::channel(false);
         let limits = Limits { connections: 1, write_timeout_s: WRITE_TIMEOUT_S, ..Limits::default() };
-        tokio::spawn(serve(listener, router, None, limits, stopping));
+        let answer = move |request| router.clone().oneshot(request);
+        tokio::spawn(serve(listener, answer, None, limits, stopping));
         (at, stop)
     }
 
@@ -297,13 +308,12 @@ mod tests {
         let settings =
             crate::config::Tls { names: Vec::new(), own: None, client_authority: None, local_zenoh: None };
         let certificates = Certificates::open(&settings, folder.path(), 1_800_000_000_000).unwrap();
-        let mut http = http1::Builder::new();
-        http.timer(TokioTimer::new());
         let second = Duration::from_secs(1);
+        let secret = Router::new().fallback(async || "secret");
         let serving = Serving {
-            http,
+            http: http1::Builder::new(),
             tls: Some(encryption::acceptor(certificates.current()).unwrap()),
-            router: Router::new().fallback(async || "secret"),
+            answer: move |request| secret.clone().oneshot(request),
             refusing: encryption::refusing(),
             header_timeout: second,
             write_timeout: second,

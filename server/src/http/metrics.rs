@@ -5,9 +5,9 @@ use super::{App, AppState, error::ApiError, guard};
 use crate::metrics::{self, exposition::Format};
 use axum::{
     Router,
-    extract::State,
+    extract::{Request, State},
     http::{HeaderMap, header},
-    middleware::from_fn_with_state,
+    middleware::{Next, from_fn_with_state},
     response::{IntoResponse, Response},
     routing::get,
 };
@@ -25,7 +25,10 @@ pub(super) fn at_root() -> Router<AppState> {
 
 /// A service of metrics alone, for a listener that only trusted programs reach: it asks for no token.
 pub(crate) fn alone(app: &Arc<App>) -> Router {
-    at_root().layer(from_fn_with_state(app.clone(), guard::guard)).with_state(app.clone())
+    let guarded = |State(app): State<AppState>, request: Request, next: Next| async move {
+        guard::guard(&app, request, |request| next.run(request)).await
+    };
+    at_root().layer(from_fn_with_state(app.clone(), guarded)).with_state(app.clone())
 }
 
 /// Metrics in the text format of Prometheus 0.0.4, or of `OpenMetrics` 1.0 where `Accept` names it. Also at `/metrics`.

@@ -20,6 +20,7 @@ mod examples;
 mod extract;
 mod gathering;
 mod guard;
+mod head_timer;
 mod health;
 mod drafts;
 mod history;
@@ -52,6 +53,7 @@ mod robots;
 mod room;
 mod ros2;
 mod router;
+mod safe_headers;
 mod security;
 mod servers;
 mod stored_answers;
@@ -67,7 +69,7 @@ pub(crate) mod listen;
 mod tests;
 
 pub(crate) use metrics::alone as metrics_alone;
-pub(crate) use router::router;
+pub(crate) use router::Service;
 
 use crate::{
     backup::Backups,

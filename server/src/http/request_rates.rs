@@ -1,12 +1,9 @@
 //! How often may be asked over HTTP: by each token, and by each address for requests without a valid token. In: a request, before
 //! its route is looked for. Out: nothing, or 429 with `Retry-After`. The local token is not bound.
 
-use super::{App, authorise::bearer, cookie::session_cookie, error::ApiError, peer::Peer};
-use crate::{config::Limits, identity::TokenId, store::now_ms};
-use axum::{
-    extract::Request,
-    http::{StatusCode, header},
-};
+use super::{error::ApiError, peer::Peer};
+use crate::{config::Limits, identity::TokenId};
+use axum::http::StatusCode;
 use engine::quotas::{BURST, Bucket};
 use std::{
     collections::BTreeMap,
@@ -77,19 +74,11 @@ impl RequestRates {
 }
 
 /// Who asks; `None`: nobody who is bound.
-pub(super) fn asking(app: &App, request: &Request, now: Instant) -> Option<Asking> {
-    let headers = request.headers();
-    let token = match headers.get(header::AUTHORIZATION) {
-        Some(value) => {
-            let found = bearer(value).and_then(|text| app.store.tokens().principal_of(text, now_ms()).ok());
-            found.map(|principal| principal.token)
-        }
-        None => session_cookie(headers).and_then(|cookie| app.sessions.token(cookie, now)),
-    };
+pub(super) fn asking(token: Option<TokenId>, peer: Option<&Peer>) -> Option<Asking> {
     match token {
         Some(TokenId::Local) => None,
         Some(TokenId::Stored(number)) => Some(Asking::Token(number)),
-        None => request.extensions().get::<Peer>().map(|peer| Asking::Address(site(peer.addr.ip()))),
+        None => peer.map(|peer| Asking::Address(site(peer.addr.ip()))),
     }
 }
 

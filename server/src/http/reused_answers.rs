@@ -7,15 +7,12 @@
 //! A kept answer is given at the door, before the request has found its route: tokens do not change but by their end, which
 //! is looked at each time, and what is kept was asked by the same token before.
 
-use super::{
-    API, AppState,
-    authorise::{Asker, bearer},
-};
-use crate::{identity::TokenId, store::now_ms};
+use super::{App, AppState, authorise::Asker, safe_headers};
+use crate::identity::TokenId;
 use axum::{
     body::{Body, Bytes, HttpBody as _, to_bytes},
     extract::{MatchedPath, Request},
-    http::{HeaderMap, HeaderValue, Method, StatusCode, header},
+    http::{HeaderMap, Method, StatusCode},
     middleware::Next,
     response::{IntoResponse, Response},
 };
@@ -24,16 +21,8 @@ use std::{
     sync::{Mutex, MutexGuard, PoisonError},
 };
 
-/// What is kept, below [`API`]: reads that rest on committed rows and published snapshots alone.
+/// What is kept, as the router writes it: reads that rest on committed rows and published snapshots alone.
 const REUSED: [&str; 5] = [
-    "/maps/{map}",
-    "/maps/{map}/landmarks",
-    "/maps/{map}/landmarks/{landmark}",
-    "/maps/{map}/walls",
-    "/whoami",
-];
-/// The same as the router writes them.
-const ROUTES: [&str; 5] = [
     "/api/v1/maps/{map}",
     "/api/v1/maps/{map}/landmarks",
     "/api/v1/maps/{map}/landmarks/{landmark}",
@@ -41,7 +30,7 @@ const ROUTES: [&str; 5] = [
     "/api/v1/whoami",
 ];
 /// How their paths begin.
-const BEGINNINGS: [&str; 2] = ["/maps/", "/whoami"];
+const BEGINNINGS: [&str; 2] = ["/api/v1/maps/", "/api/v1/whoami"];
 /// Larger answers are made anew, bytes: they are sent rarely, and cost more to send than to make.
 const MAX_BODY: u64 = 256 << 10;
 /// All bodies and addresses together, bytes. Beyond it, all are forgotten.
@@ -62,18 +51,19 @@ struct Question {
 }
 
 #[derive(Debug, Clone)]
-struct Answer {
-    content_type: HeaderValue,
-    etag: Option<HeaderValue>,
+pub(super) struct Answer {
+    /// That of its request, of [`REUSED`].
+    pub(super) route: &'static str,
+    /// All but those of a single request.
+    headers: HeaderMap,
     body: Bytes,
 }
 
 impl IntoResponse for Answer {
     fn into_response(self) -> Response {
-        let mut headers = HeaderMap::with_capacity(16);
-        headers.insert(header::CONTENT_TYPE, self.content_type);
-        headers.extend(self.etag.map(|tag| (header::ETAG, tag)));
-        (headers, self.body).into_response()
+        let mut response = Response::new(Body::from(self.body));
+        *response.headers_mut() = self.headers;
+        response
     }
 }
 
@@ -114,66 +104,44 @@ impl ReusedAnswers {
     }
 }
 
-fn stamp(app: &AppState) -> Stamp {
+fn stamp(app: &App) -> Stamp {
     Stamp { commits: app.store.commits(), publications: app.store.snapshots().publications() }
 }
 
-/// The kept answer to a read with a token that is still valid. `None` for everything else: it goes on to its route.
-pub(super) fn kept(app: &AppState, request: &Request) -> Option<Response> {
-    let path = request.uri().path().strip_prefix(API)?;
+/// The kept answer to a read with this valid token. `None` for everything else: it goes on to its route.
+pub(super) fn kept(app: &App, request: &Request, token: TokenId) -> Option<Answer> {
+    let path = request.uri().path();
     if request.method() != Method::GET || !BEGINNINGS.iter().any(|beginning| path.starts_with(beginning)) {
         return None;
     }
-    let token = bearer(request.headers().get(header::AUTHORIZATION)?)?;
-    let token = app.store.tokens().principal_of(token, now_ms()).ok()?.token;
     let question = Question { token, path_and_query: request.uri().path_and_query()?.as_str().to_owned() };
-    Some(app.reused.get(stamp(app), &question)?.into_response())
-}
-
-/// The route of an answer that is given before the request has found it, as the router writes it.
-pub(super) fn template(path: &str) -> Option<&'static str> {
-    let path = path.strip_prefix(API)?;
-    let fits = |route: &str| {
-        let pairs = || route.split('/').zip(path.split('/'));
-        let is_as_long = route.split('/').count() == path.split('/').count();
-        is_as_long && pairs().all(|(a, b)| a == b || a.starts_with('{'))
-    };
-    ROUTES.into_iter().find(|route| fits(&route[API.len()..]))
+    app.reused.get(stamp(app), &question)
 }
 
 /// Answers a read of a map as before if nothing has changed; lets everything else pass.
 pub(super) async fn reused(app: &AppState, request: Request, next: Next) -> Response {
-    let Some(question) = question(&request) else { return next.run(request).await };
+    let Some((route, question)) = question(&request) else { return next.run(request).await };
     let now = stamp(app);
-    // Sessions of pages have no token to look at before.
-    if let Some(answer) = app.reused.get(now, &question) {
-        return answer.into_response();
-    }
     let response = next.run(request).await;
     let is_small = response.body().size_hint().exact().is_some_and(|bytes| bytes <= MAX_BODY);
     if response.status() != StatusCode::OK || !is_small {
         return response;
     }
-    let (parts, body) = response.into_parts();
-    let Some(content_type) = parts.headers.get(header::CONTENT_TYPE).cloned() else {
-        return Response::from_parts(parts, body);
-    };
+    let (mut parts, body) = response.into_parts();
+    safe_headers::set(&mut parts.headers, &question.path_and_query);
     let Ok(body) = to_bytes(body, MAX_BODY as usize).await else {
         return StatusCode::INTERNAL_SERVER_ERROR.into_response();
     };
-    let etag = parts.headers.get(header::ETAG).cloned();
-    app.reused.keep(now, question, Answer { content_type, etag, body: body.clone() });
+    app.reused.keep(now, question, Answer { route, headers: parts.headers.clone(), body: body.clone() });
     Response::from_parts(parts, Body::from(body))
 }
 
-/// `None` for what is not kept.
-fn question(request: &Request) -> Option<Question> {
-    let matched = request.extensions().get::<MatchedPath>()?.as_str().strip_prefix(API)?;
-    if request.method() != Method::GET || !REUSED.contains(&matched) {
-        return None;
-    }
+/// The route and what is asked; `None` for what is not kept.
+fn question(request: &Request) -> Option<(&'static str, Question)> {
+    let matched = request.extensions().get::<MatchedPath>()?.as_str();
+    let route = REUSED.into_iter().find(|route| *route == matched && request.method() == Method::GET)?;
     let token = request.extensions().get::<Asker>()?.principal.token;
-    Some(Question { token, path_and_query: request.uri().path_and_query()?.as_str().to_owned() })
+    Some((route, Question { token, path_and_query: request.uri().path_and_query()?.as_str().to_owned() }))
 }
 
 #[cfg(test)]
@@ -185,8 +153,7 @@ mod tests {
     }
 
     fn answer(bytes: usize) -> Answer {
-        let content_type = HeaderValue::from_static("application/json");
-        Answer { content_type, etag: None, body: Bytes::from(vec![b'a'; bytes]) }
+        Answer { route: REUSED[0], headers: HeaderMap::new(), body: Bytes::from(vec![b'a'; bytes]) }
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Every route, with the layers around them and the OpenAPI document made from them.
+//! Every route, with what is around them and the OpenAPI document made from them.
 
 use super::{
     API, AppState, audit, authorise, backups, bulk, bundles, cameras, creation, documented, drafts,
@@ -21,9 +21,9 @@ use axum::{
     routing::get,
 };
 use engine::panics::{Edge, Panics};
-use std::any::Any;
-use tower::ServiceBuilder;
-use tower_http::catch_panic::CatchPanicLayer;
+use futures::FutureExt as _;
+use std::{any::Any, panic::AssertUnwindSafe};
+use tower::ServiceExt as _;
 use utoipa::{OpenApi, openapi};
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_swagger_ui::SwaggerUi;
@@ -90,14 +90,40 @@ pub(super) fn parts(limits: &Limits) -> (Router<AppState>, openapi::OpenApi) {
     (routes, with_security(document, API))
 }
 
-/// The whole service.
-pub(crate) fn router(app: AppState) -> Router {
-    let panics = app.store.vitals().panics().clone();
+/// The whole service: every route, with a guard in front.
+#[derive(Debug, Clone)]
+pub(crate) struct Service {
+    app: AppState,
+    routes: Router,
+}
+
+impl Service {
+    pub(crate) fn new(app: AppState) -> Self {
+        Self { routes: routes(&app), app }
+    }
+
+    /// Answers a request.
+    pub(crate) async fn answer(self, request: Request) -> Response {
+        let Self { app, routes } = self;
+        let panics = app.store.vitals().panics();
+        // The guard is no layer: what it answers itself costs neither a copy of the routes nor a look for one of them.
+        let inner = |request| async move {
+            match AssertUnwindSafe(routes.oneshot(request)).catch_unwind().await {
+                Ok(Ok(response)) => response,
+                Ok(Err(never)) => match never {},
+                Err(cause) => panicked(panics, cause.as_ref()),
+            }
+        };
+        guard::guard(&app, request, inner).await
+    }
+}
+
+fn routes(app: &AppState) -> Router {
     let (routes, document) = parts(&app.config.limits);
     let (health, _) = health::router().split_for_parts();
     let config = utoipa_swagger_ui::Config::from(format!("{API}/openapi.json"));
     let docs: Router<AppState> = SwaggerUi::new("/api/docs").config(config).into();
-    let router = routes
+    routes
         .merge(metrics::at_root())
         .route_layer(from_fn_with_state(app.clone(), operation))
         .route(&format!("{API}/openapi.json"), get(move || async move { Json(document) }))
@@ -107,13 +133,7 @@ pub(crate) fn router(app: AppState) -> Router {
         .merge(docs)
         .fallback(async || not_found())
         .method_not_allowed_fallback(async || method_not_allowed())
-        .with_state(app.clone());
-    let guarded = ServiceBuilder::new()
-        .layer(from_fn_with_state(app, guard::guard))
-        .layer(CatchPanicLayer::custom(move |cause: Box<dyn Any + Send>| panicked(&panics, cause.as_ref())))
-        .service(router);
-    // Around the router as a whole: a layer of the router is copied with its route, for each request.
-    Router::new().fallback_service(guarded)
+        .with_state(app.clone())
 }
 
 /// Around every operation. One layer and not three: each layer copies all that is below it, for each request.
@@ -138,10 +158,6 @@ async fn admitted(app: &AppState, request: Request, next: Next) -> Response {
 
 fn panicked(panics: &Panics, cause: &(dyn Any + Send)) -> Response {
     panics.caught(Edge::Request, cause, "a request", "it is refused as internal");
-    ApiError::new(
-        StatusCode::INTERNAL_SERVER_ERROR,
-        "internal",
-        "the server failed on this request; see its log",
-    )
-    .into_response()
+    let detail = "the server failed on this request; see its log";
+    ApiError::new(StatusCode::INTERNAL_SERVER_ERROR, "internal", detail).into_response()
 }

@@ -24,20 +24,18 @@ use crate::{
     store::{StoreError, maps},
 };
 use axum::{
-    Router,
     body::{Body, to_bytes},
     http::{Request, Response, header},
 };
 use engine::{panics::Edge, scene, snapshot::MapSnapshot, workers::Engine};
 use serde_json::Value;
 use std::time::Instant;
-use tower::ServiceExt;
 use vision::recognise::DistanceKind;
 
 /// A service on a fresh database with map `hall` and robot `r1` on it.
 struct Service {
     app: AppState,
-    router: Router,
+    routes: super::Service,
     store: Catalogue,
     engine: Engine,
     /// Text of the local token.
@@ -108,7 +106,7 @@ impl Service {
         let local = TokenText::local(80, &secret);
         let app = Arc::new(app);
         Self {
-            router: router(app.clone()),
+            routes: super::Service::new(app.clone()),
             app,
             store,
             engine,
@@ -128,8 +126,7 @@ impl Service {
 
     /// Asks without more credentials than the request has.
     fn ask_as_it_is(&self, request: Request<Body>) -> impl Future<Output = Response<Body>> + Send + 'static {
-        let router = self.router.clone();
-        async move { router.oneshot(request).await.unwrap() }
+        self.routes.clone().answer(request)
     }
 
     async fn get(&self, path: &str) -> (u16, Value) {

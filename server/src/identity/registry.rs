@@ -46,6 +46,16 @@ impl HeldToken {
         };
         Self { principal, is_revoked: token.revoked_ms.is_some(), sha256 }
     }
+
+    fn check(&self, now_ms: i64) -> Result<(), Denial> {
+        if self.is_revoked {
+            return Err(Denial::Revoked);
+        }
+        if self.principal.expires_ms.is_some_and(|end| end <= now_ms) {
+            return Err(Denial::Expired);
+        }
+        Ok(())
+    }
 }
 
 /// All tokens of the server.
@@ -76,6 +86,17 @@ impl TokenRegistry {
 
     /// Whose token this is at this time (ms since the Unix epoch).
     pub(crate) fn principal_of(&self, text: &str, now_ms: i64) -> Result<Principal, Denial> {
+        self.principal(self.shown(text)?, now_ms)
+    }
+
+    /// The number of a token that is valid at this time.
+    pub(crate) fn valid(&self, text: &str, now_ms: i64) -> Result<TokenId, Denial> {
+        let id = self.shown(text)?;
+        self.check(id, now_ms).map(|()| id)
+    }
+
+    /// The token of this text, which may be revoked or expired.
+    fn shown(&self, text: &str) -> Result<TokenId, Denial> {
         let TokenText { id, secret } = TokenText::parse(text).ok_or(Denial::Unknown)?;
         let wanted = match id {
             TokenId::Local => self.local.load().as_deref().copied(),
@@ -84,9 +105,17 @@ impl TokenRegistry {
         // A number that does not exist takes as long as a wrong secret.
         let is_known = wanted.is_some();
         if same(&wanted.unwrap_or_default(), &secret.digest()) & is_known {
-            self.principal(id, now_ms)
+            Ok(id)
         } else {
             Err(Denial::Unknown)
+        }
+    }
+
+    /// Whether a token that was shown before is still valid.
+    pub(crate) fn check(&self, id: TokenId, now_ms: i64) -> Result<(), Denial> {
+        match id {
+            TokenId::Local => Ok(()),
+            TokenId::Stored(id) => self.stored.load().get(&id).ok_or(Denial::Unknown)?.check(now_ms),
         }
     }
 
@@ -97,14 +126,9 @@ impl TokenRegistry {
             TokenId::Stored(id) => id,
         };
         let stored = self.stored.load();
-        let HeldToken { principal, is_revoked, .. } = stored.get(&id).ok_or(Denial::Unknown)?;
-        if *is_revoked {
-            return Err(Denial::Revoked);
-        }
-        if principal.expires_ms.is_some_and(|end| end <= now_ms) {
-            return Err(Denial::Expired);
-        }
-        Ok(principal.clone())
+        let held = stored.get(&id).ok_or(Denial::Unknown)?;
+        held.check(now_ms)?;
+        Ok(held.principal.clone())
     }
 }
 

@@ -16,9 +16,17 @@ pub(crate) const OTHER: &str = "other";
 const METHODS: [&str; 6] = ["GET", "HEAD", "POST", "PUT", "PATCH", "DELETE"];
 
 #[derive(Debug, Default)]
+struct OfRoute {
+    /// By method and status.
+    counts: BTreeMap<(&'static str, u16), u64>,
+    times: Histogram,
+}
+
+#[derive(Debug, Default)]
 struct State {
-    counts: BTreeMap<(&'static str, String, u16), u64>,
-    times: BTreeMap<String, Histogram>,
+    routes: BTreeMap<String, OfRoute>,
+    /// Counts of all routes.
+    series: usize,
 }
 
 /// All requests.
@@ -29,28 +37,38 @@ impl HttpTimes {
     /// A request was answered.
     pub(crate) fn add(&self, method: &str, route: Option<&str>, status: u16, took: Duration) {
         let method = METHODS.into_iter().find(|known| *known == method).unwrap_or(OTHER);
+        let route = route.unwrap_or(OTHER);
         let mut guard = self.lock();
-        let state = &mut *guard;
-        let mut key = (method, route.unwrap_or(OTHER).to_owned(), status);
-        if !state.counts.contains_key(&key) && state.counts.len() >= MAX_SERIES {
-            key = (OTHER, OTHER.to_owned(), status);
+        let State { routes, series } = &mut *guard;
+        // The usual way, without a copy of the route.
+        if let Some(of) = routes.get_mut(route)
+            && let Some(count) = of.counts.get_mut(&(method, status))
+        {
+            *count += 1;
+            of.times.add(took);
+            return;
         }
-        if let Some(times) = state.times.get(&key.1) {
-            times.add(took);
-        } else {
-            state.times.entry(key.1.clone()).or_default().add(took);
-        }
-        *state.counts.entry(key).or_default() += 1;
+        let (method, route) = if *series >= MAX_SERIES { (OTHER, OTHER) } else { (method, route) };
+        let of = routes.entry(route.to_owned()).or_default();
+        *series += usize::from(!of.counts.contains_key(&(method, status)));
+        *of.counts.entry((method, status)).or_default() += 1;
+        of.times.add(took);
     }
 
     /// Counts by method, route and status.
     pub(crate) fn counts(&self) -> Vec<((&'static str, String, u16), u64)> {
-        self.lock().counts.iter().map(|(key, count)| (key.clone(), *count)).collect()
+        let state = self.lock();
+        let of = |(route, of): (&String, &OfRoute)| {
+            let of =
+                of.counts.iter().map(|((method, status), count)| ((*method, route.clone(), *status), *count));
+            of.collect::<Vec<_>>()
+        };
+        state.routes.iter().flat_map(of).collect()
     }
 
     /// Times by route.
     pub(crate) fn times(&self) -> Vec<(String, HistogramCopy)> {
-        self.lock().times.iter().map(|(route, times)| (route.clone(), times.copy())).collect()
+        self.lock().routes.iter().map(|(route, of)| (route.clone(), of.times.copy())).collect()
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {

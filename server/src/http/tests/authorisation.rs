@@ -8,13 +8,14 @@ use crate::{
         tokens::{self, TokenInsert},
     },
 };
-use axum::middleware::from_fn_with_state;
+use axum::{Router, middleware::from_fn_with_state};
 use protos::{api::Role, v1};
 use serde_json::json;
 use std::{
     collections::{BTreeMap, BTreeSet},
     sync::atomic::{AtomicUsize, Ordering},
 };
+use tower::ServiceExt as _;
 
 /// `hall` with `r1`, job 1 and answer 1 are the principal's own; `yard` with `r2`, job 2 and answer 2 are not.
 const OWN: [&str; 3] = ["hall", "r1", "1"];
