@@ -26,6 +26,8 @@ use std::{
 };
 use tracing::{Instrument as _, field::Empty};
 
+/// Asked by what restarts the server if there is no answer.
+const LIVENESS: &str = "/healthz";
 /// Bodies up to this size need no place, bytes.
 const SMALL_BODY: u64 = 64 << 10;
 
@@ -43,8 +45,11 @@ pub(super) async fn guard<Answering: Future<Output = Response>>(
     let peer = request.extensions().get::<Peer>().copied();
     let is_loopback = app.config.tls.is_some() || app.config.http_addr.ip().to_canonical().is_loopback();
     let loopback = is_loopback && !peer.is_some_and(|peer| peer.is_encrypted);
-    let token = authorise::token(app, request.headers(), started);
-    let may_ask = asking(token, peer.as_ref()).map_or(Ok(()), |who| app.rates.take(who, started));
+    // Whoever asks too much must not make the server look dead.
+    let is_bound = uri.path() != LIVENESS;
+    let token = is_bound.then(|| authorise::token(app, request.headers(), started)).flatten();
+    let asking = is_bound.then(|| asking(token, peer.as_ref())).flatten();
+    let may_ask = asking.map_or(Ok(()), |who| app.rates.take(who, started));
     let checked = check_origin(request.method(), request.headers(), loopback).and(may_ask);
     let kept = token.filter(|_| checked.is_ok()).and_then(|token| reused_answers::kept(app, &request, token));
     let kept_route = kept.as_ref().map(|kept| kept.route);

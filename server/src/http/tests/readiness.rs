@@ -15,6 +15,23 @@ use serde_json::json;
 /// What no stranger reads: a reason with a path.
 const REASON: &str = "cannot read /srv/secret";
 
+#[tokio::test]
+async fn one_address_is_bound_and_the_server_looks_alive_all_the_same() {
+    let limits = Limits { address_requests_per_s: 5, ..Limits::default() };
+    let service = Service::start(limits).await;
+    let ask = async |path: &str| {
+        let mut asked = request("GET", path, "");
+        asked.extensions_mut().insert(super::peer::Peer::plain("192.0.2.7:4000".parse().unwrap()));
+        service.ask_as_it_is(asked).await.status().as_u16()
+    };
+    let mut refused = 0;
+    for _ in 0..40 {
+        refused += usize::from(ask("/version").await == 429);
+        assert_eq!(ask("/healthz").await, 200);
+    }
+    assert!(refused >= 20, "{refused} of 40 requests were refused");
+}
+
 /// Maps `hall` and `yard`, each with a damaged picture and a version that is not in use.
 async fn broken() -> Service {
     let service = Service::start(Limits::default()).await;
