@@ -22,6 +22,7 @@ use proptest::prelude::*;
 use std::sync::{Arc, LazyLock};
 
 mod gates;
+mod unknowns;
 
 const KINDS: [DistanceKind; 3] = [DistanceKind::Hausdorff, DistanceKind::Correlation, DistanceKind::Both];
 
