@@ -18,6 +18,7 @@ use std::{
     collections::{BTreeMap, BTreeSet},
     panic::AssertUnwindSafe,
     path::Path,
+    time::{Duration, Instant},
 };
 use tempfile::TempDir;
 use vision::{random::Random, recognise::DistanceKind};
@@ -46,6 +47,8 @@ struct World {
     /// What each editor has read last: revision, and number of the walls.
     read: [(String, i64); EDITORS],
     version: u64,
+    /// How long the last creation took.
+    write: Duration,
 }
 
 fn number_of(walls: &[map::segments::LaserSegment]) -> i64 {
@@ -75,6 +78,7 @@ impl World {
             next: 0,
             read: Default::default(),
             version: 1,
+            write: Duration::from_millis(1),
         }
     }
 
@@ -84,28 +88,32 @@ impl World {
 
     async fn step(&mut self) {
         match self.below(12) {
-            0..5 => self.create().await,
+            0..5 => {
+                let number = self.below(NAMES);
+                self.create(number).await;
+            }
             5 | 6 => self.look().await,
             7..10 => self.edit().await,
-            10 => self.hang_up().await,
+            10 => drop(self.hang_up().await),
             _ => {
-                // Half of the stops hit a write.
-                if self.below(2) == 0 {
-                    self.hang_up().await;
-                }
+                // Three of four stops hit a write, and who asked for it asks again.
+                let asked = if self.below(4) == 0 { None } else { self.hang_up().await };
                 self.restart().await;
+                if let Some(number) = asked {
+                    self.create(number).await;
+                }
             }
         }
         self.check();
     }
 
     /// A client creates a landmark under its key, perhaps once more.
-    async fn create(&mut self) {
-        let number = self.below(NAMES);
+    async fn create(&mut self, number: usize) {
         let name = format!("l{number}");
-        let was_there = self.created.contains(&name);
+        let (was_there, asked) = (self.created.contains(&name), Instant::now());
         match created(&self.store, &name).await {
             Ok(is_repeat) => {
+                self.write = if is_repeat { self.write } else { asked.elapsed() };
                 assert!(is_repeat || !was_there, "{name} was made a second time under its key");
                 assert!(
                     !is_repeat || was_there || self.unknown.contains(&name),
@@ -149,9 +157,9 @@ impl World {
         }
     }
 
-    /// A client asks and goes before the answer.
-    async fn hang_up(&mut self) {
-        let polls = self.below(6);
+    /// A client asks and goes before the answer; what it wanted to create.
+    async fn hang_up(&mut self) -> Option<usize> {
+        let after = self.write.mul_f64(1.2 * self.random.unit());
         let store = self.store.clone();
         if self.below(2) == 0 {
             let number = self.below(NAMES);
@@ -159,13 +167,15 @@ impl World {
             if !self.created.contains(&name) {
                 self.unknown.insert(name.clone());
             }
-            abandon(created(&store, &name), polls).await;
+            abandon(created(&store, &name), after).await;
+            Some(number)
         } else {
             let revision = self.store.revision("a", &Subject::Walls).await.unwrap();
             let k = self.next + 1;
             self.next = k;
             self.maybe.insert(k);
-            abandon(edited(&store, Precondition::OneOf(vec![revision]), k), polls).await;
+            abandon(edited(&store, Precondition::OneOf(vec![revision]), k), after).await;
+            None
         }
     }
 
@@ -186,7 +196,7 @@ impl World {
                 Err(error) => {
                     tries += 1;
                     assert!(tries < 2000, "the server does not start again: {error}");
-                    tokio::time::sleep(std::time::Duration::from_millis(5)).await;
+                    tokio::time::sleep(Duration::from_millis(5)).await;
                 }
             }
         };
@@ -250,14 +260,12 @@ async fn edited(store: &Catalogue, is: Precondition, k: i64) -> Result<String, S
     write.await
 }
 
-/// Polls so often, with time for the writer in between, and goes.
-async fn abandon<T>(asked: impl Future<Output = T>, polls: usize) {
-    let mut asked = Box::pin(asked);
-    for _ in 0..polls {
-        if futures::poll!(asked.as_mut()).is_ready() {
-            return;
-        }
-        tokio::time::sleep(std::time::Duration::from_micros(300)).await;
+/// Asks, and goes after this time.
+async fn abandon<T>(asked: impl Future<Output = T>, after: Duration) {
+    let (mut asked, begun) = (Box::pin(asked), Instant::now());
+    // A timer is late by more than a write takes.
+    while begun.elapsed() < after && !futures::poll!(asked.as_mut()).is_ready() {
+        tokio::task::yield_now().await;
     }
 }
 
