@@ -11,6 +11,10 @@ use clap::{Parser, Subcommand};
 use cli::screen;
 use std::process::ExitCode;
 
+/// That of the product.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 /// Experiments on labelled pictures and in simulated buildings, benchmarks beside peers, and training.
 #[derive(Debug, Parser)]
 #[command(name = "waymark-lab", version, propagate_version = true)]
