@@ -2,7 +2,9 @@
 # Tests of the tests: applies each patch of this folder in a worktree of its own, runs the command of its first line, and
 # expects it to fail. `tests/planted/run.sh [NAME...]`; without names all of them. Prints a table; fails where a fault was not
 # found, a patch no longer applies or does not build, or a test fails without it.
-# CARGO_TARGET_DIR: where it is built (target/planted). PLANTED_LOGS: where the output of the tests goes.
+# CARGO_TARGET_DIR: where it is built (target/planted). Never that of the checkout: cargo takes the crates of two checkouts for
+# the same ones, so a build with a fault would be used where there is none.
+# PLANTED_LOGS: where the output of the tests goes.
 set -uo pipefail
 root=$(git -C "$(dirname "$0")" rev-parse --show-toplevel)
 export CARGO_TARGET_DIR=${CARGO_TARGET_DIR:-$root/target/planted} CARGO_INCREMENTAL=0
