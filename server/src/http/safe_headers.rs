@@ -1,6 +1,7 @@
 //! What every answer tells a browser that it must not do with it. In: the headers of an answer, with its content type. Out: the
 //! same with a policy.
 
+use super::API;
 use axum::http::{HeaderMap, HeaderName, HeaderValue, header};
 
 /// Headers of an answer with a body, about.
@@ -24,8 +25,9 @@ const RESOURCE_POLICY: HeaderName = HeaderName::from_static("cross-origin-resour
 
 /// Sets them. `path` is that of the request.
 pub(super) fn set(headers: &mut HeaderMap, path: &str) {
-    let is_page =
-        headers.get(header::CONTENT_TYPE).is_some_and(|kind| kind.as_bytes().starts_with(b"text/html"));
+    // "Not modified" has no type, and its headers replace those that the browser keeps with the page.
+    let is_html = |kind: &HeaderValue| kind.as_bytes().starts_with(b"text/html");
+    let is_page = headers.get(header::CONTENT_TYPE).map_or(!path.starts_with(API), is_html);
     let policy = match (is_page, path.starts_with("/api/docs")) {
         (false, _) => OF_DATA,
         (true, false) => OF_PAGES,
@@ -49,10 +51,15 @@ mod tests {
         for (kind, path, allowed) in [
             ("text/html; charset=utf-8", "/maps/hall", Some("script-src 'self'")),
             ("text/html", "/api/docs/", Some("'unsafe-inline'")),
+            ("", "/maps/hall", Some("script-src 'self'")),
+            ("", "/api/docs/", Some("'unsafe-inline'")),
+            ("", "/api/v1/maps/hall/landmarks/door", None),
             ("application/json", "/api/v1/maps", None),
             ("image/svg+xml", "/api/v1/maps/hall/underlay/picture", None),
         ] {
-            let mut headers = HeaderMap::from_iter([(header::CONTENT_TYPE, HeaderValue::from_static(kind))]);
+            let mut headers = HeaderMap::new();
+            headers
+                .extend((!kind.is_empty()).then_some((header::CONTENT_TYPE, HeaderValue::from_static(kind))));
             set(&mut headers, path);
             let policy = headers[header::CONTENT_SECURITY_POLICY].to_str().unwrap();
             assert!(
