@@ -13,7 +13,7 @@ use tokio::time;
 /// Makes the deadlines of one connection, of which one at a time is waited for.
 #[derive(Debug, Default)]
 pub(super) struct HeadTimer {
-    /// Sleeps until the earliest deadline that it was ever polled with, and that has not passed.
+    /// The one timer of tokio, set for the deadline that is waited for or for an earlier one.
     shared: Arc<Mutex<Option<Pin<Box<time::Sleep>>>>>,
 }
 
@@ -51,7 +51,7 @@ impl Future for HeadSleep {
                 *shared = None;
                 return Poll::Ready(());
             }
-            // It was set for an earlier request.
+            // It was still set for the head of an earlier request, which has come.
             sleep.as_mut().reset(self.deadline);
         }
         Poll::Pending
