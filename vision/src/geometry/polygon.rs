@@ -20,27 +20,29 @@ pub fn intersection_area(a: &[Point2<f64>], b: &[Point2<f64>]) -> f64 {
     if a.len() < 3 || b.len() < 3 || boxes_apart(a, b) {
         return 0.0;
     }
+    let turn = signed_area(b).signum();
     // Each side of one cuts off corners of the other and adds at most one.
     if a.len() + b.len() <= SMALL {
-        let (mut part, mut next) = ([Point2::origin(); SMALL], [Point2::origin(); SMALL]);
+        let (mut part, mut next) = (&mut [Point2::origin(); SMALL], &mut [Point2::origin(); SMALL]);
         part[..a.len()].copy_from_slice(a);
         let mut n = a.len();
         for side in edges(b) {
             let mut vertices = 0;
-            cut(&part[..n], side, signed_area(b).signum(), |p| {
+            cut(&part[..n], side, turn, |p| {
                 // Rounding can make a polygon concave; a surplus corner is dropped, its area is negligible.
                 if let Some(place) = next.get_mut(vertices) {
                     (*place, vertices) = (p, vertices + 1);
                 }
             });
-            (part, next, n) = (next, part, vertices);
+            n = vertices;
+            std::mem::swap(&mut part, &mut next);
         }
         return area(&part[..n]);
     }
     let mut part = a.to_vec();
     for side in edges(b) {
         let mut next = Vec::with_capacity(part.len() + 1);
-        cut(&part, side, signed_area(b).signum(), |p| next.push(p));
+        cut(&part, side, turn, |p| next.push(p));
         part = next;
     }
     area(&part)

@@ -48,7 +48,7 @@ pub fn choose_sides(g: &Gradients, corners: &[Point2<f64>; 4], model: &Network) 
     if chosen.iter().all(Option::is_none) {
         return None;
     }
-    let mut met = sides.met(&chosen);
+    let mut met = sides.met(&chosen, None);
     let measure = |met: &Met, lines: &[Option<usize>; 4]| {
         let of_line = |i: usize, j: usize| SideMeasurement {
             features: joined(&known[i][j].0, &sides.corner_features(i, j, &met[i])),
@@ -57,9 +57,11 @@ pub fn choose_sides(g: &Gradients, corners: &[Point2<f64>; 4], model: &Network) 
         std::array::from_fn(|i| lines[i].map_or_else(SideMeasurement::default, |j| of_line(i, j)))
     };
     let nearest = measure(&met, &chosen);
+    let mut changed = [true; 4];
     for _ in 0..ROUNDS {
         let before = chosen;
-        for i in 0..4 {
+        // Beside unchanged neighbours the same line is the likeliest.
+        for i in (0..4).filter(|i| changed[(i + 1) % 4] || changed[(i + 3) % 4]) {
             let weigh =
                 |j: usize| model.output(&joined(&known[i][j].0, &sides.corner_features(i, j, &met[i])));
             let weights: Vec<f64> = (0..known[i].len()).map(weigh).collect();
@@ -68,7 +70,8 @@ pub fn choose_sides(g: &Gradients, corners: &[Point2<f64>; 4], model: &Network) 
         if chosen == before {
             break;
         }
-        met = sides.met(&chosen);
+        changed = std::array::from_fn(|i| chosen[i] != before[i]);
+        met = sides.met(&chosen, Some((&met, &changed)));
     }
     Some(SnappedSides { corners_px: meet_all(&sides.ends(&chosen))?, sides: measure(&met, &chosen), nearest })
 }
@@ -77,7 +80,7 @@ pub fn choose_sides(g: &Gradients, corners: &[Point2<f64>; 4], model: &Network) 
 /// training data of the model.
 pub fn side_candidates(g: &Gradients, corners: &[Point2<f64>; 4]) -> [Vec<SideCandidate>; 4] {
     let sides = Sides::new(g, corners);
-    let met = sides.met(&std::array::from_fn(|i| sides.nearest(i)));
+    let met = sides.met(&std::array::from_fn(|i| sides.nearest(i)), None);
     std::array::from_fn(|i| {
         (0..sides.lines(i).len())
             .map(|j| {

@@ -3,16 +3,14 @@
 
 use crate::detect::{
     border_model::{
+        band_row::Row,
         feature_constants::{
-            CORNER_SHARE, MAX_BAND_SAMPLES, MIN_BAND_SAMPLES, MIN_SIDE_PX, MIN_STEP, PX_PER_SAMPLE, REACH_PX,
+            CORNER_SHARE, MAX_BAND_SAMPLES, MIN_BAND_SAMPLES, MIN_SIDE_PX, PX_PER_SAMPLE, REACH_PX,
             REACH_SHARE, STEPS_OUTSIDE,
         },
-        side_lines::{self, Peak, SideLine},
+        side_lines::{self, Peak, Peaks, SideLine},
     },
-    edge_support::{
-        fixed_point::Fixed,
-        gradients::{Gradients, MIN_COS},
-    },
+    edge_support::{fixed_point::Fixed, gradients::Gradients},
 };
 use fearless_simd::{Level, dispatch};
 use nalgebra::{Point2, Vector2};
@@ -83,76 +81,30 @@ impl Band {
         self.step = vec![0.0; cells];
         self.level = vec![0; cells];
         self.rough = vec![0; cells + self.rows];
-        let mut square = vec![0.0; self.columns];
-        let mut peaks = Vec::new();
+        let (across, normal) = (Fixed::step(&self.normal), self.normal.cast().into());
+        let mut pixels = Row::EMPTY;
+        let mut peaks = Peaks::with_capacity(PEAKS_OF_A_ROW * self.rows);
         for row in 0..self.rows {
-            square.fill(0.0);
-            self.resample(g, row, &mut square);
-            self.summarise(row, &square);
-            self.peaks(row, &square, &mut peaks);
-        }
-        self.lines = side_lines::find(&peaks, self.rows, (self.first_px, self.columns), self.length_px);
-    }
-
-    /// Samples the pixels of a row. Pixels outside the image stay 0.
-    #[expect(clippy::inline_always, reason = "as above")]
-    #[inline(always)]
-    fn resample(&mut self, g: &Gradients, row: usize, square: &mut [f32]) {
-        let (width, height) = (g.width(), g.height());
-        let [nx, ny]: [f32; 2] = self.normal.cast().into();
-        let across = Fixed::step(&self.normal);
-        let mut place = Fixed::point(&self.at(self.along(row) * self.length_px, f64::from(self.first_px)));
-        let cells = row * self.columns..(row + 1) * self.columns;
-        let (steps, levels) = (&mut self.step[cells.clone()], &mut self.level[cells]);
-        let (mut first, mut end) = (0, 0);
-        for (i, ((step, level), square)) in steps.iter_mut().zip(levels).zip(square).enumerate() {
-            let pixel = place.pixel(width, height);
-            place = place.on(across, 1);
-            let Some(at) = pixel else { continue };
-            let (x, y) = (g.gx[at], g.gy[at]);
-            (*step, *square, *level) = (x * nx + y * ny, x * x + y * y, g.image.data()[at]);
-            // A straight line lies in the image from one column to another.
-            (first, end) = (if end == 0 { i } else { first }, i + 1);
-        }
-        (self.inside[0][row], self.inside[1][row]) = (first as i32, end as i32);
-    }
-
-    /// Prefix sums of texture of a row, and the outermost edges.
-    #[expect(clippy::inline_always, reason = "as above")]
-    #[inline(always)]
-    fn summarise(&mut self, row: usize, square: &[f32]) {
-        let step = &self.step[row * self.columns..(row + 1) * self.columns];
-        let rough = &mut self.rough[row * (self.columns + 1)..(row + 1) * (self.columns + 1)];
-        let mut sum = 0;
-        for (rough, square) in rough[1..].iter_mut().zip(square) {
-            sum += u16::from(*square > MIN_STEP * MIN_STEP);
-            *rough = sum;
-        }
-        for (outermost, least) in self.outermost.iter_mut().zip(STEPS_OUTSIDE) {
-            let is_edge = |i: &usize| step[*i].abs() > least && along_side(step[*i], square[*i]);
-            outermost[row] = (0..self.columns).rev().find(is_edge).map_or(-1, |i| i as i32);
-        }
-    }
-
-    #[expect(clippy::inline_always, reason = "as above")]
-    #[inline(always)]
-    fn peaks(&self, row: usize, square: &[f32], peaks: &mut Vec<Peak>) {
-        let along = (self.along(row) - 0.5) as f32;
-        let step = &self.step[row * self.columns..(row + 1) * self.columns];
-        for (i, (w, square)) in step.windows(3).zip(&square[1..]).enumerate() {
-            let (a, b, c) = (w[0].abs(), w[1].abs(), w[2].abs());
-            if b < MIN_STEP || b < a || b <= c || !along_side(b, *square) {
-                continue;
+            let along = self.along(row);
+            let start = Fixed::point(&self.at(along * self.length_px, f64::from(self.first_px)));
+            let cells = row * self.columns..(row + 1) * self.columns;
+            let (steps, levels) = (&mut self.step[cells.clone()], &mut self.level[cells]);
+            (self.inside[0][row], self.inside[1][row]) =
+                pixels.read(g, (start, across), normal, (steps, levels));
+            pixels.count_rough(&mut self.rough[row * (self.columns + 1)..(row + 1) * (self.columns + 1)]);
+            for (outermost, least) in self.outermost.iter_mut().zip(STEPS_OUTSIDE) {
+                outermost[row] = pixels.outermost(self.columns, least);
             }
-            let bend = a - 2.0 * b + c;
-            let shift = if bend < 0.0 { (0.5 * (a - c) / bend).clamp(-0.5, 0.5) } else { 0.0 };
-            peaks.push(Peak {
-                row: row as u32,
-                along,
-                offset_px: (self.first_px + i as i32 + 1) as f32 + shift,
-                step: w[1],
+            pixels.peaks(steps, |column, shift| {
+                peaks.push(Peak {
+                    row: row as u32,
+                    along: (along - 0.5) as f32,
+                    offset_px: (self.first_px + column as i32) as f32 + shift,
+                    step: steps[column],
+                });
             });
         }
+        self.lines = side_lines::find(&peaks, self.rows, (self.first_px, self.columns), self.length_px);
     }
 
     /// Position of a row along the side, 0 to 1.
@@ -183,11 +135,8 @@ impl Band {
     }
 }
 
-/// The gradient points along the normal to within about 35 degrees.
-#[inline]
-fn along_side(step: f32, square: f32) -> bool {
-    step * step >= MIN_COS * MIN_COS * square
-}
+/// Peaks of a row that memory is taken for at first.
+const PEAKS_OF_A_ROW: usize = 8;
 
 /// Fractional bits of a column in fixed point.
 const BITS: u32 = 16;
@@ -231,16 +180,25 @@ impl AlongLine<'_> {
         )
     }
 
-    /// Calls `pixel` with the step and the grey level of every pixel of a strip in the image; returns their number.
+    /// Calls `row` with the grey levels of each row of a strip in the image; returns the number of pixels.
     #[inline]
-    pub fn pixels(&self, range_px: (f64, f64), mut pixel: impl FnMut(f32, u8)) -> usize {
+    pub fn levels(&self, range_px: (f64, f64), row: impl FnMut(&[u8])) -> usize {
+        self.each(&self.band.level, range_px, row)
+    }
+
+    /// The same with the steps.
+    #[inline]
+    pub fn steps(&self, range_px: (f64, f64), row: impl FnMut(&[f32])) -> usize {
+        self.each(&self.band.step, range_px, row)
+    }
+
+    #[inline]
+    fn each<T>(&self, cells: &[T], range_px: (f64, f64), mut row_of: impl FnMut(&[T])) -> usize {
         let mut in_image = 0;
-        for (row, columns) in self.strip(range_px) {
+        for (row, columns) in self.strip(range_px).filter(|(_, columns)| !columns.is_empty()) {
             in_image += columns.len();
             let start = row * self.band.columns;
-            for i in start + columns.start..start + columns.end {
-                pixel(self.band.step[i], self.band.level[i]);
-            }
+            row_of(&cells[start + columns.start..start + columns.end]);
         }
         in_image
     }
@@ -315,9 +273,7 @@ mod tests {
         let line = SideLine { offset_px: 0.25, slope_px: 0.0, support: 1.0, sign: 1.0, step: 1.0 };
         let levels = |range| {
             let mut all = std::collections::BTreeSet::new();
-            let in_image = band.along_line(&line).pixels(range, |_, level| {
-                all.insert(level);
-            });
+            let in_image = band.along_line(&line).levels(range, |levels| all.extend(levels));
             assert_eq!(in_image, band.along_line(&line).rough(range).0);
             (in_image / MAX_BAND_SAMPLES, all.into_iter().collect::<Vec<_>>())
         };

@@ -58,7 +58,7 @@ pub(crate) type Ends = [[Point2<f64>; 2]; 4];
 pub(crate) type Met = [[Option<Neighbour>; 2]; 4];
 
 /// A side relative to one that it meets.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Neighbour {
     ends: [Point2<f64>; 2],
     along: Vector2<f64>,
@@ -108,8 +108,9 @@ impl<'a> Sides<'a> {
         })
     }
 
-    /// What each side meets when these lines are chosen.
-    pub(crate) fn met(&self, chosen: &[Option<usize>; 4]) -> Met {
+    /// What each side meets when these lines are chosen. `earlier`: what they met before, and the sides whose line is
+    /// another since.
+    pub(crate) fn met(&self, chosen: &[Option<usize>; 4], earlier: Option<(&Met, &[bool; 4])>) -> Met {
         let ends = self.ends(chosen);
         let neighbour = |ends: [Point2<f64>; 2], shares: [f64; 2]| {
             let along = (ends[1] - ends[0]).try_normalize(1e-9)?;
@@ -117,7 +118,13 @@ impl<'a> Sides<'a> {
             Some(Neighbour { ends, along, usual: step_along(self.g, &p, &q, USUAL_SAMPLES).0 })
         };
         std::array::from_fn(|i| {
-            [neighbour(ends[(i + 3) % 4], USUAL_SHARES[0]), neighbour(ends[(i + 1) % 4], USUAL_SHARES[1])]
+            std::array::from_fn(|which| {
+                let side = (i + [3, 1][which]) % 4;
+                match earlier {
+                    Some((met, changed)) if !changed[side] => met[i][which],
+                    _ => neighbour(ends[side], USUAL_SHARES[which]),
+                }
+            })
         })
     }
 
@@ -241,30 +248,43 @@ fn roughness(along: &AlongLine, range_px: (f64, f64)) -> f64 {
 
 /// Median grey level of a strip.
 fn level(along: &AlongLine, range_px: (f64, f64)) -> Option<f64> {
-    let mut counts = [0_u32; 256];
-    let in_image = along.pixels(range_px, |_, level| counts[usize::from(level)] += 1);
+    /// Grey levels that are passed over together.
+    const TOGETHER: usize = 16;
+    // Two counts of each level: a pixel is mostly as grey as the one before it, and would wait for its count.
+    let mut counts = [[0_u16; 256]; 2];
+    let in_image = along.levels(range_px, |levels| {
+        for (i, level) in levels.iter().enumerate() {
+            counts[i % 2][usize::from(*level)] += 1;
+        }
+    });
     if in_image <= MIN_STRIP_PIXELS {
         return None;
     }
     let mut left = in_image as u32 / 2;
-    counts
-        .iter()
-        .position(|n| {
-            if *n > left {
-                true
-            } else {
-                left -= n;
-                false
-            }
+    let count = |level: usize| u32::from(counts[0][level]) + u32::from(counts[1][level]);
+    let mut first = 0;
+    while first < 256 - TOGETHER {
+        let together: u32 = (first..first + TOGETHER).map(count).sum();
+        if together > left {
+            break;
+        }
+        (first, left) = (first + TOGETHER, left - together);
+    }
+    (first..256)
+        .find(|level| {
+            let n = count(*level);
+            let found = n > left;
+            left -= n.min(left);
+            found
         })
-        .map(|l| l as f64)
+        .map(|level| level as f64)
 }
 
 /// Log of the step 2 px beside the line over the step on it: high for a soft edge.
 fn blur(along: &AlongLine) -> f64 {
     let mean = |range| {
         let mut sum = 0.0;
-        let in_image = along.pixels(range, |step, _| sum += f64::from(step.abs()));
+        let in_image = along.steps(range, |steps| steps.iter().for_each(|s| sum += f64::from(s.abs())));
         if in_image > 0 { sum / in_image as f64 } else { 0.0 }
     };
     let [on, from, to] = BLUR_PX;
@@ -328,3 +348,6 @@ pub(crate) fn meet_all(ends: &Ends) -> Option<[Point2<f64>; 4]> {
     }
     Some(corners)
 }
+
+#[cfg(test)]
+mod tests;

@@ -48,6 +48,12 @@ impl Fixed {
         let (u, v) = ((self.u >> BITS) as usize, (self.v >> BITS) as usize);
         (u < width && v < height).then(|| v * width + u)
     }
+
+    /// The same of a point that is known to lie in the image.
+    #[inline]
+    pub(crate) fn index(self, width: usize) -> usize {
+        ((self.v >> BITS) as usize).wrapping_mul(width).wrapping_add((self.u >> BITS) as usize)
+    }
 }
 
 #[cfg(test)]

@@ -51,6 +51,19 @@ impl Gradients<'_> {
         Some([*self.gx.get(i)?, *self.gy.get(i)?])
     }
 
+    /// Whether a point lies in the image.
+    #[inline]
+    pub(crate) fn holds(&self, p: Fixed) -> bool {
+        p.pixel(self.width(), self.height()).is_some()
+    }
+
+    /// Gradient at the nearest pixel of a point that is known to lie in the image.
+    #[inline]
+    pub(crate) fn within(&self, p: Fixed) -> [f32; 2] {
+        let i = p.index(self.width());
+        [self.gx[i], self.gy[i]]
+    }
+
     /// The step across a line with this normal at the nearest pixel, 0 where the gradient does not point along the
     /// normal to within about 35 degrees; none outside the image.
     #[inline]

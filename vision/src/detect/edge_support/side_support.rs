@@ -201,46 +201,62 @@ impl Across {
     /// step height. The gradient must point along the normal to within about 35 degrees.
     fn strongest(&self, g: &Gradients, foot: &Point2<f64>) -> (bool, Option<(f64, f64)>) {
         let from = -(self.reach as i64) - 1;
+        let (mut gx, mut gy) = ([f32::NAN; MAX_ACROSS], [f32::NAN; MAX_ACROSS]);
+        let cells = gx.iter_mut().zip(&mut gy).take(2 * self.reach + 3);
         if self.between_pixels {
-            self.among(|i| {
+            for (i, (gx, gy)) in cells.enumerate() {
                 let p = foot + self.normal * (i as i64 + from) as f64;
-                g.sample(p.x, p.y)
-            })
+                [*gx, *gy] = g.sample(p.x, p.y).unwrap_or([f32::NAN; 2]);
+            }
         } else {
-            let start = Fixed::point(foot).on(self.step, from);
-            self.among(|i| g.nearest(start.on(self.step, i as i64)))
+            let mut at = Fixed::point(foot).on(self.step, from);
+            // A straight line lies in the image if both its ends do.
+            if g.holds(at) && g.holds(at.on(self.step, -2 * from)) {
+                for (gx, gy) in cells {
+                    [*gx, *gy] = g.within(at);
+                    at = at.on(self.step, 1);
+                }
+            } else {
+                for (gx, gy) in cells {
+                    [*gx, *gy] = g.nearest(at).unwrap_or([f32::NAN; 2]);
+                    at = at.on(self.step, 1);
+                }
+            }
         }
+        self.among(&gx, &gy)
     }
 
-    /// [`Self::strongest`] among the gradients at steps of a pixel; none outside the image.
+    /// [`Self::strongest`] among the gradients at steps of a pixel; NaN outside the image.
     #[inline]
-    fn among(&self, gradient: impl Fn(usize) -> Option<[f32; 2]>) -> (bool, Option<(f64, f64)>) {
-        let mut steps = [f32::NAN; MAX_ACROSS];
+    fn among(&self, gx: &[f32; MAX_ACROSS], gy: &[f32; MAX_ACROSS]) -> (bool, Option<(f64, f64)>) {
+        let (mut steps, mut heights) = ([f32::NAN; MAX_ACROSS], [-1.0_f32; MAX_ACROSS]);
         let last = 2 * self.reach + 2;
-        let (mut at, mut best) = (0, 0.0_f32);
-        for (i, slot) in steps.iter_mut().enumerate().take(last + 1) {
-            let Some(v) = gradient(i) else { continue };
-            let (step, square) = across(v, self.facing);
+        let gradients = gx.iter().zip(gy).take(last + 1);
+        for ((slot, height), (x, y)) in steps.iter_mut().zip(&mut heights).zip(gradients) {
+            let (step, square) = across([*x, *y], self.facing);
             *slot = step;
-            let follows = step.abs() >= self.min_step && step * step >= MIN_COS * MIN_COS * square;
-            if follows && i != 0 && i != last && (at == 0 || step.abs() > best.abs()) {
-                (at, best) = (i, step);
-            }
+            let follows = (step.abs() >= self.min_step) & (step * step >= MIN_COS * MIN_COS * square);
+            *height = if follows { step.abs() } else { -1.0 };
         }
         if steps[self.reach + 1].is_nan() {
             return (false, None);
         }
+        let (mut at, mut best) = (0, -1.0);
+        for (i, height) in heights.iter().enumerate().take(last).skip(1) {
+            (at, best) = if *height > best { (i, *height) } else { (at, best) };
+        }
         if at == 0 {
             return (true, None);
         }
-        let known = |step: f32| if step.is_nan() { best.abs() } else { step * best.signum() };
-        let (a, b, c) = (known(steps[at - 1]), best.abs(), known(steps[at + 1]));
+        let sign = steps[at].signum();
+        let known = |step: f32| if step.is_nan() { best } else { step * sign };
+        let (a, b, c) = (known(steps[at - 1]), best, known(steps[at + 1]));
         // A gradient that still rises at the end of the reach belongs to another edge.
         let peak = a <= b && c <= b;
         let bend = a - 2.0 * b + c;
         let shift = if bend < 0.0 { (0.5 * (a - c) / bend).clamp(-0.5, 0.5) } else { 0.0 };
         let offset_px = at as f64 - self.reach as f64 - 1.0 + f64::from(shift);
-        (true, peak.then_some((offset_px, f64::from(best))))
+        (true, peak.then_some((offset_px, f64::from(steps[at]))))
     }
 }
 
