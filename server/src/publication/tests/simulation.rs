@@ -2,22 +2,27 @@
 //! store and publication, steps that follow from a seed, and a model that says after each step what must be stored.
 //!
 //! `WAYMARK_SEED=n` runs one seed, `WAYMARK_SEEDS=n` so many. When a caller hangs up between two polls, or a writer is ended,
-//! the moment depends on SQLite's thread: a seed repeats the steps, not these moments. Frames are simulated in
-//! `engine/tests/simulation`.
+//! the moment depends on SQLite's thread: a seed repeats the steps, not these moments. So some stops come from a disk that
+//! fails at a write of the log, which a seed repeats: they fall into any of the commits that a creation has. Frames are
+//! simulated in `engine/tests/simulation`.
 
 use super::{super::*, config};
-use crate::store::{
-    StoreError,
-    kept_answers::{Answer, Creation, answered},
-    landmarks::{self, LandmarkRow},
-    maps,
-    revisions::{self, Precondition, Subject},
-    walls,
+use crate::{
+    config::Config,
+    store::{
+        StoreError,
+        kept_answers::{Answer, Creation, answered},
+        landmarks::{self, LandmarkRow},
+        maps,
+        revisions::{self, Precondition, Subject},
+        walls,
+    },
 };
+use power_cut::{Call, Disk, IoError, OfFile};
 use std::{
     collections::{BTreeMap, BTreeSet},
     panic::AssertUnwindSafe,
-    path::Path,
+    path::{Path, PathBuf},
     time::{Duration, Instant},
 };
 use tempfile::TempDir;
@@ -30,10 +35,17 @@ const STEPS: usize = 60;
 /// Names of landmarks, and keys of their creations.
 const NAMES: usize = 30;
 const EDITORS: usize = 2;
+/// The disk fails at one of so many writes of the log: more than a creation has.
+const LOG_WRITES: usize = 80;
+/// Creations that are asked for until one meets the error.
+const TRIES: usize = 20;
 
 struct World {
     random: Random,
-    data: TempDir,
+    disk: Disk,
+    data: PathBuf,
+    /// Removes the data.
+    _folder: TempDir,
     store: Catalogue,
     tasks: Option<CatalogueTasks>,
     /// Landmarks whose creation was acknowledged.
@@ -55,20 +67,25 @@ fn number_of(walls: &[map::segments::LaserSegment]) -> i64 {
     walls.first().map_or(0, |wall| wall.b.x.round() as i64)
 }
 
-async fn open(data: &Path) -> (Catalogue, CatalogueTasks) {
-    Catalogue::open(&config(data)).await.unwrap()
+/// The settings of a store over a disk that can fail.
+fn over(data: &Path) -> Config {
+    Config { vfs: Some(power_cut::NAME), ..config(data) }
 }
 
 impl World {
     async fn new(seed: u64) -> Self {
         // In memory where there is such a place: what a disk does is another test.
         let memory = Path::new("/dev/shm");
-        let data = if memory.is_dir() { TempDir::new_in(memory) } else { TempDir::new() }.unwrap();
-        let (store, tasks) = open(data.path()).await;
+        let folder = if memory.is_dir() { TempDir::new_in(memory) } else { TempDir::new() }.unwrap();
+        let data = folder.path().canonicalize().unwrap();
+        let disk = Disk::of(&data).unwrap();
+        let (store, tasks) = Catalogue::open(&over(&data)).await.unwrap();
         store.write(|tx| Box::pin(maps::create(tx, "a", DistanceKind::Both, 2))).await.unwrap();
         Self {
             random: Random::new(seed),
+            disk,
             data,
+            _folder: folder,
             store,
             tasks: Some(tasks),
             created: BTreeSet::new(),
@@ -97,7 +114,11 @@ impl World {
             10 => drop(self.hang_up().await),
             _ => {
                 // Three of four stops hit a write, and who asked for it asks again.
-                let asked = if self.below(4) == 0 { None } else { self.hang_up().await };
+                let asked = match self.below(4) {
+                    0 => None,
+                    1 => self.hang_up().await,
+                    _ => self.fail_at_a_write_of_the_log().await,
+                };
                 self.restart().await;
                 if let Some(number) = asked {
                     self.create(number).await;
@@ -122,10 +143,33 @@ impl World {
                 self.unknown.remove(&name);
                 self.created.insert(name);
             }
+            Err(_) if self.disk.failed_calls() > 0 => self.may_be_there(&name),
             // Still at work: the request whose client hung up.
             Err(StoreError::KeyAtWork) => assert!(self.unknown.contains(&name), "{name}: its key is at work"),
             Err(error) => panic!("{name}: {error}"),
         }
+    }
+
+    /// Its client does not know whether it was made.
+    fn may_be_there(&mut self, name: &str) {
+        if !self.created.contains(name) {
+            self.unknown.insert(name.to_owned());
+        }
+    }
+
+    /// Creations until the disk has failed, at one of the next writes of the log; the one that met it.
+    async fn fail_at_a_write_of_the_log(&mut self) -> Option<usize> {
+        let number = 1 + self.below(LOG_WRITES) as u64;
+        let error = IoError { call: Call::Write, file: OfFile::Log, number, is_lasting: true };
+        self.disk.set_error(Some(error));
+        for _ in 0..TRIES {
+            let landmark = self.below(NAMES);
+            self.create(landmark).await;
+            if self.disk.failed_calls() > 0 {
+                return Some(landmark);
+            }
+        }
+        None
     }
 
     /// An editor reads the walls with their revision.
@@ -164,9 +208,7 @@ impl World {
         if self.below(2) == 0 {
             let number = self.below(NAMES);
             let name = format!("l{number}");
-            if !self.created.contains(&name) {
-                self.unknown.insert(name.clone());
-            }
+            self.may_be_there(&name);
             abandon(created(&store, &name), after).await;
             Some(number)
         } else {
@@ -188,10 +230,11 @@ impl World {
             tasks.abort_writer();
             drop(tasks);
         }
+        self.disk.set_error(None);
         // The lock of the data directory goes with the writer's task.
         let mut tries = 0;
         let (store, tasks) = loop {
-            match Catalogue::open(&config(self.data.path())).await {
+            match Catalogue::open(&over(&self.data)).await {
                 Ok(opened) => break opened,
                 Err(error) => {
                     tries += 1;
@@ -284,6 +327,7 @@ fn number(name: &str) -> Option<u64> {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_key_has_one_effect_and_no_update_is_lost_whatever_clients_and_stops_do() {
+    power_cut::install();
     let seeds = match number("WAYMARK_SEED") {
         Some(seed) => seed..seed + 1,
         None => 0..number("WAYMARK_SEEDS").unwrap_or(SEEDS),
