@@ -1,6 +1,7 @@
 //! Claim: whatever the link between a robot and its server does, the robot goes on by itself, gets no answer twice, none out of
 //! order and none to work that began too late; every frame ends in one way, and those that were lost are counted; memory stays
-//! level, and another robot notices nothing. A process of its own: it counts the panics of all threads.
+//! level, and another robot notices nothing. So it is on plain links and on encrypted ones. A process of its own: it counts the
+//! panics of all threads.
 
 use client::{
     Capture, RobotClient, RobotOptions,
@@ -8,7 +9,7 @@ use client::{
     v1::{self, Status},
 };
 use engine::slots::FrameCounts;
-use server::config::Limits;
+use server::config::{RawConfig, RawTls};
 use std::{
     collections::BTreeMap,
     fs, panic,
@@ -19,7 +20,9 @@ use std::{
     time::{Duration, Instant},
 };
 use tests::{
-    Inside, SOON, eventually, http, pictures,
+    Inside, SOON,
+    command::waymark,
+    eventually, http, pictures,
     proxy::{Link, Proxy},
     robots,
 };
@@ -88,7 +91,8 @@ struct Sender {
 impl Sender {
     async fn start(inside: &Inside, endpoint: &str, name: &str, frame: &[u8]) -> Self {
         inside.maps().put_robot(name, MAP).await.expect("robot");
-        let options = RobotOptions { timeout: SOON, ..RobotOptions::new(endpoint, "default", name) };
+        let options = options(inside, name);
+        let options = RobotOptions { timeout: SOON, endpoint: endpoint.to_owned(), ..options };
         let client = Arc::new(RobotClient::connect(&options).await.expect("connected"));
         let (heard, sent, stop) = <(Arc<Mutex<Heard>>, Arc<AtomicU64>, Arc<AtomicBool>)>::default();
         let (mut answers, noted) = (client.answers(), heard.clone());
@@ -132,6 +136,21 @@ impl Sender {
             heard.answers.iter().filter(|(seq, times)| **times != 1 || **seq > sent).collect();
         assert!(wrong.is_empty(), "answered twice, or never sent: {wrong:?}");
     }
+}
+
+/// How a robot connects; with a certificate where the server asks for one.
+fn options(inside: &Inside, name: &str) -> RobotOptions {
+    let endpoint = &inside.server.zenoh_endpoint;
+    if !endpoint.starts_with("tls/") {
+        return RobotOptions::new(endpoint, "default", name);
+    }
+    let out = inside.data().join(format!("folder-of-{name}"));
+    let run = waymark(
+        ["robot", "enrol", name, "--out", out.to_str().expect("a path"), "--server", &inside.url()],
+        SOON,
+    );
+    assert_eq!(run.status, 0, "{run:?}");
+    RobotOptions::from_file(out.join("robot.json")).expect("the robot's file")
 }
 
 fn capture(frame: &[u8]) -> Capture {
@@ -212,7 +231,14 @@ fn sum(metrics: &str, series: &str) -> u64 {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_robot_goes_on_after_every_fault_of_its_link_and_is_told_nothing_stale() {
     count_panics();
-    let inside = Inside::start(Limits::default()).await;
+    for is_encrypted in [false, true] {
+        println!("{} links", if is_encrypted { "encrypted" } else { "plain" });
+        let tls = RawTls { enabled: is_encrypted, ..RawTls::default() };
+        goes_on(Inside::start_with(RawConfig { tls, ..RawConfig::default() }).await).await;
+    }
+}
+
+async fn goes_on(inside: Inside) {
     inside.maps().create_map(&NewMap::new(MAP)).await.expect("map");
     let blocks = pictures::blocks(7, 320, 240);
     let frame = robots::jpeg(&GrayImage::from_fn(320, 240, |u, v| blocks[v * 320 + u]));

@@ -49,26 +49,29 @@ type Numbered = (Link, u64);
 pub struct Proxy {
     /// Where clients connect.
     pub address: SocketAddr,
+    /// `tcp` or `tls`: bytes are passed on as they are.
+    protocol: String,
     link: watch::Sender<Numbered>,
     connections: Arc<AtomicU64>,
     task: JoinHandle<()>,
 }
 
 impl Proxy {
-    /// Starts one before the zenoh endpoint of a server, `tcp/HOST:PORT`.
+    /// Starts one before the zenoh endpoint of a server, `tcp/HOST:PORT` or `tls/HOST:PORT`.
     pub async fn start(endpoint: &str) -> Self {
-        let server = endpoint.strip_prefix("tcp/").expect("a TCP endpoint").to_owned();
+        let (protocol, server) = endpoint.split_once('/').expect("an endpoint");
+        let (protocol, server) = (protocol.to_owned(), server.to_owned());
         let listener = TcpListener::bind("127.0.0.1:0").await.expect("a free port");
         let address = listener.local_addr().expect("its address");
         let link = watch::Sender::new((Link::Up, 0));
         let connections = Arc::<AtomicU64>::default();
         let task = tokio::spawn(accept(listener, server, link.clone(), connections.clone()));
-        Self { address, link, connections, task }
+        Self { address, protocol, link, connections, task }
     }
 
     /// The endpoint for a robot.
     pub fn endpoint(&self) -> String {
-        format!("tcp/{}", self.address)
+        format!("{}/{}", self.protocol, self.address)
     }
 
     /// From now on the link is so.
