@@ -112,7 +112,7 @@ impl Failure {
         }
         match error.downcast_ref::<ClientError>() {
             Some(client) => Self::of_client(client),
-            None => Self::new(Class::Failed, "failed", format!("{error:#}")),
+            None => Self::new(Class::Failed, "failed", with_causes(error)),
         }
     }
 
@@ -147,6 +147,15 @@ impl Failure {
     }
 }
 
+/// An error and its causes in a line. Many errors say their cause themselves: it is not said again.
+fn with_causes(error: &anyhow::Error) -> String {
+    error.chain().map(ToString::to_string).fold(String::new(), |said, cause| match said.as_str() {
+        "" => cause,
+        said if said.ends_with(&cause) => said.to_owned(),
+        said => format!("{said}: {cause}"),
+    })
+}
+
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.sentence)?;
@@ -163,6 +172,19 @@ mod tests {
     fn refused(status: u16, code: &str) -> anyhow::Error {
         let (code, field, detail) = (code.to_owned(), String::new(), "so it is".to_owned());
         ClientError::Refused { status, code, field, detail, more: serde_json::Map::new() }.into()
+    }
+
+    #[test]
+    fn a_cause_is_said_once() {
+        #[derive(Debug, thiserror::Error)]
+        #[error("directory x: {source}")]
+        struct Directory {
+            source: std::io::Error,
+        }
+        let denied = || std::io::Error::other("permission denied");
+        let told = |error: anyhow::Error| Failure::of(&error.context("no start")).to_string();
+        assert_eq!(told(Directory { source: denied() }.into()), "no start: directory x: permission denied");
+        assert_eq!(told(denied().into()), "no start: permission denied");
     }
 
     #[test]
