@@ -120,7 +120,7 @@ impl Row {
         let heights = steps[1..].iter().zip(&self.height[1..]);
         for ((flag, (before, after)), (step, along)) in is_peak.iter_mut().zip(neighbours).zip(heights) {
             let (a, b, c) = (before.abs(), step.abs(), after.abs());
-            *flag = u8::from((b >= MIN_STEP) & (b >= a) & (b > c) & (*along >= 0.0));
+            *flag = u8::from(b >= MIN_STEP && b >= a && b > c && *along >= 0.0);
         }
         for (first, flags) in
             is_peak[..inner.next_multiple_of(FLAGS)].as_chunks::<FLAGS>().0.iter().enumerate()

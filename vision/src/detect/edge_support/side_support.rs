@@ -235,7 +235,7 @@ impl Across {
         for ((slot, height), (x, y)) in steps.iter_mut().zip(&mut heights).zip(gradients) {
             let (step, square) = across([*x, *y], self.facing);
             *slot = step;
-            let follows = (step.abs() >= self.min_step) & (step * step >= MIN_COS * MIN_COS * square);
+            let follows = step.abs() >= self.min_step && step * step >= MIN_COS * MIN_COS * square;
             *height = if follows { step.abs() } else { -1.0 };
         }
         if steps[self.reach + 1].is_nan() {
