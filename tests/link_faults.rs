@@ -238,6 +238,7 @@ async fn a_robot_goes_on_after_every_fault_of_its_link_and_is_told_nothing_stale
     }
 }
 
+#[expect(clippy::print_stdout, reason = "what a fault costs is read in the output of the test")]
 async fn goes_on(inside: Inside) {
     inside.maps().create_map(&NewMap::new(MAP)).await.expect("map");
     let blocks = pictures::blocks(7, 320, 240);
