@@ -11,15 +11,15 @@ use crate::detect::{
 
 /// Most columns of a band, rounded up to whole vectors.
 const MAX_COLUMNS: usize = (2 * REACH_PX.1 as usize + 1).next_multiple_of(FLAGS);
-/// Columns whose flags are looked at together.
+/// Columns whose flags are read as one number.
 const FLAGS: usize = 8;
 
 /// Memory of a row of pixels. Outside the image all is 0.
 pub(super) struct Row {
-    /// Gradient.
+    /// Derivatives along u and v.
     gx: [f32; MAX_COLUMNS],
     gy: [f32; MAX_COLUMNS],
-    /// Its square.
+    /// Squared length of the gradient.
     square: [f32; MAX_COLUMNS],
     /// Height of the step where the gradient points along the normal, to within about 35 degrees; -1 elsewhere.
     height: [f32; MAX_COLUMNS],
@@ -52,9 +52,9 @@ impl Row {
         let gradients = self.gx[..columns].iter().zip(&self.gy[..columns]);
         let results = self.square.iter_mut().zip(&mut self.height);
         for ((slot, (gx, gy)), (square, height)) in steps.iter_mut().zip(gradients).zip(results) {
-            let (step, length) = across([*gx, *gy], normal);
-            (*slot, *square) = (step, length);
-            *height = if step * step >= MIN_COS * MIN_COS * length { step.abs() } else { -1.0 };
+            let (step, squared) = across([*gx, *gy], normal);
+            (*slot, *square) = (step, squared);
+            *height = if step * step >= MIN_COS * MIN_COS * squared { step.abs() } else { -1.0 };
         }
         inside
     }

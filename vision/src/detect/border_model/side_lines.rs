@@ -33,7 +33,7 @@ pub(crate) struct Peak {
     pub(crate) step: f32,
 }
 
-/// The edge points of a band, with what is searched for most in lists of their own.
+/// The edge points of a band. Their positions are in lists of their own, too, so that distances are compared together.
 #[derive(Debug)]
 pub(crate) struct Peaks {
     all: Vec<Peak>,
@@ -73,9 +73,9 @@ impl Peaks {
     }
 }
 
-/// Which rows have an edge point within about a pixel and a half of a line: for each slope, and for each offset.
+/// Which rows have an edge point at an offset from the side, for each slope of a line.
 struct Votes {
-    /// Row by row of a slope.
+    /// A bit for each row that has one; all offsets of the first slope, then those of the next.
     rows: Vec<u64>,
     offsets: usize,
 }
