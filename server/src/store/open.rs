@@ -2,8 +2,8 @@
 //! read back. Errors: a SQLite with the write-ahead-log corruption bug, a damaged file, a second server.
 
 use sqlx::{
-    ConnectOptions, Row, SqliteConnection, SqlitePool,
-    sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePoolOptions, SqliteSynchronous},
+    ConnectOptions, Connection as _, Row, SqliteConnection, SqlitePool,
+    sqlite::{SqliteConnectOptions, SqlitePoolOptions, SqliteSynchronous},
 };
 use std::{
     fs::{File, TryLockError},
@@ -130,31 +130,48 @@ pub(super) async fn open(data: &Path, vfs: Option<&'static str>) -> Result<Opene
     Ok(Opened { writer, reads, lock })
 }
 
-/// The connections, checked, on the present schema.
+/// The connections, checked, on the present schema. After an error the writer is closed before this returns: what
+/// connections of a process share (the index of the log, and where that is) lives as long as one of them is open.
 async fn connect(
     data: &Path,
     vfs: Option<&'static str>,
 ) -> Result<(SqliteConnection, SqlitePool), OpenError> {
     let options = options(&data.join(FILE));
-    let options = options.journal_mode(SqliteJournalMode::Wal).synchronous(SqliteSynchronous::Full);
     let options = if let Some(vfs) = vfs { options.vfs(vfs) } else { options };
     let mut writer = options.clone().create_if_missing(true).connect().await.map_err(OpenError::Open)?;
-    check_version(&mut writer).await?;
-    check_pragmas(&mut writer).await?;
-    check_integrity(&mut writer).await?;
-    migrations::migrator().run(&mut writer).await.map_err(OpenError::Migrate)?;
-    pictures::move_underlays(&mut writer).await.map_err(OpenError::Open)?;
-    history::close_outside(&mut writer).await.map_err(OpenError::Open)?;
+    match prepare(&mut writer, options).await {
+        Ok(reads) => Ok((writer, reads)),
+        Err(error) => {
+            // A dropped connection is closed later, by its thread. This fails only where that has ended.
+            drop(writer.close().await);
+            Err(error)
+        }
+    }
+}
+
+/// Sets what reads or writes the file, checks it and brings it to the present schema; opens the connections that read.
+async fn prepare(
+    writer: &mut SqliteConnection,
+    options: SqliteConnectOptions,
+) -> Result<SqlitePool, OpenError> {
+    let durable = "PRAGMA journal_mode = wal; PRAGMA synchronous = FULL";
+    sqlx::raw_sql(durable).execute(&mut *writer).await.map_err(OpenError::Open)?;
+    check_version(writer).await?;
+    check_pragmas(writer).await?;
+    check_integrity(writer).await?;
+    migrations::migrator().run(&mut *writer).await.map_err(OpenError::Migrate)?;
+    pictures::move_underlays(writer).await.map_err(OpenError::Open)?;
+    history::close_outside(writer).await.map_err(OpenError::Open)?;
     let reads = SqlitePoolOptions::new()
         .max_connections(READERS)
         .acquire_timeout(BUSY_TIMEOUT)
         // A connection is tested when it comes back.
         .test_before_acquire(false)
-        .connect_with(options.read_only(true))
+        .connect_with(options.synchronous(SqliteSynchronous::Full).read_only(true))
         .await
         .map_err(OpenError::Open)?;
     check_pragmas(&mut *reads.acquire().await.map_err(OpenError::Open)?).await?;
-    Ok((writer, reads))
+    Ok(reads)
 }
 
 /// Opens the database on a read-only file system: every write is refused by SQLite. After a clean stop the file alone is
@@ -300,7 +317,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let opened = open(dir.path(), None).await.unwrap();
         opened.reads.close().await;
-        sqlx::Connection::close(opened.writer).await.unwrap();
+        opened.writer.close().await.unwrap();
         drop(opened.lock);
         let path = dir.path().join(FILE);
         let mut bytes = std::fs::read(&path).unwrap();
@@ -310,6 +327,25 @@ mod tests {
         }
         std::fs::write(&path, bytes).unwrap();
         assert!(open(dir.path(), None).await.is_err());
+    }
+
+    #[cfg(target_os = "linux")]
+    #[tokio::test]
+    async fn a_database_that_does_not_open_is_closed() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join(FILE);
+        let mut bytes = b"SQLite format 3\0".to_vec();
+        bytes.resize(8192, 0xa5);
+        std::fs::write(&path, bytes).unwrap();
+        for _ in 0..20 {
+            assert!(connect(dir.path(), None).await.is_err());
+            let open = std::fs::read_dir("/proc/self/fd").unwrap().flatten();
+            let open = open.filter_map(|file| std::fs::read_link(file.path()).ok());
+            assert_eq!(
+                open.filter(|file| file.starts_with(dir.path())).collect::<Vec<_>>(),
+                [path.clone(); 0]
+            );
+        }
     }
 
     #[tokio::test]
