@@ -14,7 +14,7 @@ use std::{
     sync::{Condvar, Mutex, MutexGuard, PoisonError},
     time::{Duration, Instant},
 };
-use turns::Turns;
+use turns::{Turn, Turns};
 
 /// Work that takes memory while it waits.
 pub trait Held {
@@ -132,6 +132,8 @@ struct Slot<T> {
     touched: Instant,
     /// Number of its last turn.
     last_turn: u64,
+    /// The turn of the frame in work, and the number of this camera's turn before it.
+    turn: (Turn, u64),
 }
 
 impl<T> Slot<T> {
@@ -144,6 +146,7 @@ impl<T> Slot<T> {
             order: SequenceTracker::default(),
             touched: now,
             last_turn: 0,
+            turn: (Turn::default(), 0),
         }
     }
 }
@@ -263,7 +266,13 @@ impl<T: Held> Slots<T> {
         state.counts.in_work -= 1;
         match outcome {
             FrameOutcome::Processed => state.counts.processed += 1,
-            FrameOutcome::Expired => state.counts.expired += 1,
+            FrameOutcome::Expired => {
+                state.counts.expired += 1;
+                // Otherwise, with more robots than are served in time, the same ones would be served again and again.
+                let (turn, before) = slot.turn;
+                slot.last_turn = before;
+                state.ready.give_back(&key.robot, turn);
+            }
             FrameOutcome::Rejected(code) => *state.counts.rejected.entry(code).or_default() += 1,
         }
         if slot.waiting.is_some() && !slot.queued {
@@ -276,6 +285,11 @@ impl<T: Held> Slots<T> {
     /// Counts of all frames so far.
     pub fn counts(&self) -> FrameCounts {
         self.lock().counts.clone()
+    }
+
+    /// Frames that wait now.
+    pub fn waiting(&self) -> u64 {
+        self.lock().counts.waiting
     }
 
     /// Frames that were sent and did not arrive, by their numbers.
@@ -333,8 +347,10 @@ impl<T: Held> State<T> {
     fn next(&mut self) -> Option<(SlotKey, T)> {
         while let Some((key, turn)) = self.ready.pop() {
             let Some(slot) = self.slots.get_mut(&key) else { continue };
-            (slot.queued, slot.last_turn) = (false, turn);
+            slot.queued = false;
             if let Some(job) = slot.waiting.take() {
+                slot.turn = (turn, slot.last_turn);
+                slot.last_turn = turn.number;
                 (slot.in_work, slot.work_bytes) = (true, job.held_bytes());
                 self.counts.waiting -= 1;
                 self.counts.in_work += 1;

@@ -150,6 +150,29 @@ fn a_robot_with_many_cameras_has_one_share() {
     whole(&slots.counts());
 }
 
+/// Of three robots one frame a round is in time: each robot's in turn. Of cameras of one robot the same holds.
+#[test]
+fn a_frame_that_expired_was_no_turn() {
+    for keys in [["r1", "r2", "r3"].map(|robot| key(robot, "front")), ["a", "b", "c"].map(|c| key("r1", c))] {
+        let slots = Slots::new(4, BYTES);
+        let mut processed = BTreeMap::new();
+        for round in 1..=9 {
+            for key in &keys {
+                slots.offer(key.clone(), (1, round), 1, Instant::now()).unwrap();
+            }
+            for place in 0..keys.len() {
+                let (key, _) = slots.try_take().expect("every frame has a turn");
+                let is_first = place == 0;
+                slots.finish(&key, if is_first { FrameOutcome::Processed } else { FrameOutcome::Expired });
+                *processed.entry(key).or_insert(0) += u32::from(is_first);
+            }
+            assert_eq!(slots.try_take(), None);
+        }
+        assert!(processed.values().all(|frames| *frames == 3), "{processed:?}");
+        whole(&slots.counts());
+    }
+}
+
 #[test]
 fn frames_beyond_the_memory_for_them_are_refused() {
     let slots = Slots::new(64, 1_000);

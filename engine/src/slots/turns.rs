@@ -4,6 +4,13 @@ use super::SlotKey;
 use protos::Name;
 use std::collections::{BTreeMap, BTreeSet};
 
+/// Number of a robot's turn, and of the one before; 0 for none.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Turn {
+    pub(super) number: u64,
+    pub(super) before: u64,
+}
+
 /// Slots with a waiting frame and none in work. The robot whose last turn was longest ago is next, and of its cameras the one
 /// whose last turn was: a robot that has always something to do gains nothing on one whose next frame is on its way.
 #[derive(Debug, Default)]
@@ -23,19 +30,28 @@ impl Turns {
         self.cameras.entry(robot).or_default().insert((last_turn, camera));
     }
 
-    /// The next slot, and the number of this turn.
-    pub(super) fn pop(&mut self) -> Option<(SlotKey, u64)> {
+    /// The next slot, and its robot's turn.
+    pub(super) fn pop(&mut self) -> Option<(SlotKey, Turn)> {
         let (_, robot) = self.robots.pop_first()?;
         let cameras = self.cameras.get_mut(&robot)?;
         let (_, camera) = cameras.pop_first()?;
         self.turn += 1;
-        self.of_robots.insert(robot.clone(), self.turn);
+        let before = self.of_robots.insert(robot.clone(), self.turn).unwrap_or_default();
         if cameras.is_empty() {
             self.cameras.remove(&robot);
         } else {
             self.robots.insert((self.turn, robot.clone()));
         }
-        Some((SlotKey { robot, camera }, self.turn))
+        Some((SlotKey { robot, camera }, Turn { number: self.turn, before }))
+    }
+
+    /// A turn came to nothing: the robot's next frame has the place that this one had. Not where it has had another turn since.
+    pub(super) fn give_back(&mut self, robot: &Name, turn: Turn) {
+        let Some(last) = self.of_robots.get_mut(robot).filter(|last| **last == turn.number) else { return };
+        if self.robots.remove(&(*last, robot.clone())) {
+            self.robots.insert((turn.before, robot.clone()));
+        }
+        *last = turn.before;
     }
 
     /// Nothing is ready any more.
