@@ -42,6 +42,7 @@ pub mod frame_context;
 pub mod frame_tap;
 pub mod histogram;
 pub mod frame_times;
+pub mod search_policy;
 pub mod heartbeats;
 pub mod vitals;
 pub mod workers;

@@ -115,6 +115,6 @@ pub fn engine(maps: &[Arc<MapSnapshot>]) -> Engine {
         relocalisers: Arc::default(),
         frame_tap: Arc::new(crate::frame_tap::NoTap),
         times: Arc::default(),
-        search_every_frame: true,
+        search: crate::search_policy::SearchPolicy::Every,
     }
 }

@@ -20,6 +20,7 @@ use super::{
     motion::{FrameStamp, MotionTracker, PriorPose},
     panics::Edge,
     relocalise::{RelocalisationInput, RelocalisationUpdate, Relocalisers, hypothesis_wire},
+    search_policy::SearchPolicy,
     slots::{FrameOutcome, SlotKey, Slots},
     snapshot::{MapSnapshot, Snapshots},
     vitals::Vitals,
@@ -67,8 +68,8 @@ pub struct Engine {
     pub frame_tap: Arc<dyn FrameTap>,
     /// How long frames take.
     pub times: Arc<FrameTimes>,
-    /// Whether every frame is searched for all landmarks of its map.
-    pub search_every_frame: bool,
+    /// Which frames are searched for all landmarks of their map.
+    pub search: SearchPolicy,
 }
 
 /// A frame after its analysis.
@@ -230,8 +231,8 @@ impl Engine {
         Ok(AnsweredFrame { answer, basis, map, evaluation: Some(evaluation), relocalised })
     }
 
-    /// Answers a frame by the expected landmarks alone, where the schedule asks for no search of the map. `None` where it asks
-    /// for one, or where the result calls for one: nothing found, a contradiction, or a missing landmark that is surely in
+    /// Answers a frame by the expected landmarks alone, where policy and schedule ask for no search of the map. `None` where
+    /// they ask for one, or where the result calls for one: nothing found, a contradiction, or a missing landmark that is surely in
     /// view. Frames of robots that gather are always searched: they show objects that are on no map.
     fn expected_only(
         &self,
@@ -242,9 +243,8 @@ impl Engine {
         times: &mut StageTimes,
     ) -> Option<(v1::Answer, FrameEvaluation)> {
         let is_spared = |p: &&PriorPose| p.plan.guided && p.plan.global.is_none();
-        let may_spare = !self.search_every_frame && frame.is_whole();
-        let prior = prior.filter(is_spared).filter(|_| may_spare)?;
-        if self.frame_tap.is_wanted(key) {
+        let prior = prior.filter(is_spared).filter(|_| frame.is_whole())?;
+        if !self.search.may_spare(self.slots.waiting()) || self.frame_tap.is_wanted(key) {
             return None;
         }
         let nothing = FrameAnalysis { quads: Vec::new() };

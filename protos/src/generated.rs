@@ -468,7 +468,7 @@ pub struct Answer {
     #[prost(string, repeated, tag = "17")]
     pub guided_landmarks: ::prost::alloc::vec::Vec<::prost::alloc::string::String>,
     /// Landmarks were looked for only where the robot's pose expects them: nothing was detected, and nothing named by the
-    /// picture alone. Never set unless the server is told to spare searches (its setting `search_every_frame`).
+    /// picture alone. By default only while frames wait (the server's setting `search_frames`).
     #[prost(bool, tag = "18")]
     pub only_expected: bool,
     /// With gate_reprojection and gate_inconsistent: which number does not fit, and by how much.

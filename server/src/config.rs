@@ -7,6 +7,7 @@
 mod addresses;
 mod backup;
 mod error;
+mod frame_search;
 mod limits;
 mod memory;
 mod ros2;
@@ -16,6 +17,7 @@ mod tls;
 pub use backup::BackupSettings;
 pub(crate) use backup::MAX_KEPT;
 pub use error::ConfigError;
+pub use frame_search::{BUSY_FRAMES_PER_WORKER, FrameSearch};
 pub use limits::Limits;
 pub use memory::MemoryShare;
 pub use ros2::{
@@ -64,10 +66,9 @@ pub struct RawConfig {
     pub server_name: String,
     /// Vision threads; 0 takes one per core.
     pub workers: usize,
-    /// Searches every frame for all landmarks of its map. Otherwise, while a robot's pose is supported and the landmarks that
-    /// it expects are found, every third frame of a camera; the others are answered by the expected landmarks alone and say
-    /// so (`Answer.only_expected`).
-    pub search_every_frame: bool,
+    /// When frames are searched for all landmarks of their map. The others are answered by the expected landmarks alone and
+    /// say so (`Answer.only_expected`).
+    pub search_frames: FrameSearch,
     /// Allows plain-text listeners beyond loopback.
     pub insecure: bool,
     /// Encryption, of HTTP and of robots' connections.
@@ -94,7 +95,7 @@ impl Default for RawConfig {
             fleet: "default".into(),
             server_name: String::new(),
             workers: 0,
-            search_every_frame: true,
+            search_frames: FrameSearch::default(),
             insecure: false,
             tls: RawTls::default(),
             router: RawRouter::default(),
@@ -140,8 +141,8 @@ pub struct Config {
     pub server_name: Option<Name>,
     /// Vision threads, at least 1.
     pub workers: usize,
-    /// Whether every frame is searched for all landmarks of its map.
-    pub search_every_frame: bool,
+    /// When frames are searched for all landmarks of their map.
+    pub search_frames: FrameSearch,
     /// Encryption; `None`: there is none.
     pub tls: Option<Tls>,
     /// Backups.
@@ -245,7 +246,7 @@ impl TryFrom<RawConfig> for Config {
             fleet,
             server_name,
             workers: if raw.workers == 0 { cores } else { raw.workers },
-            search_every_frame: raw.search_every_frame,
+            search_frames: raw.search_frames,
             tls,
             backup: backup::checked(raw.backup)?,
             ros2: ros2::checked(raw.ros2)?,

@@ -292,7 +292,7 @@ fn engine(
         relocalisers: Arc::default(),
         frame_tap: Arc::new(frame_tap),
         times: Arc::default(),
-        search_every_frame: config.search_every_frame,
+        search: config.search_frames.policy(config.workers),
     };
     (engine, recorded)
 }

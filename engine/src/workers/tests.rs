@@ -208,10 +208,10 @@ struct RestingRobot {
 }
 
 impl RestingRobot {
-    fn new(search_every_frame: bool) -> Self {
+    fn new(search: SearchPolicy) -> Self {
         let mut scene = scene::Scene::new();
         let map = scene.taught();
-        let engine = Engine { search_every_frame, ..scene::engine(std::slice::from_ref(&map)) };
+        let engine = Engine { search, ..scene::engine(std::slice::from_ref(&map)) };
         let stops = scene.stops(5, 1).into_iter().map(|(_, readings)| readings).collect();
         Self { engine, stops, intrinsics: scene.intrinsics(), seq: 0 }
     }
@@ -263,7 +263,7 @@ impl RestingRobot {
 
 #[test]
 fn two_frames_of_three_are_answered_by_expected_landmarks_where_searches_are_spared() {
-    let mut robot = RestingRobot::new(false);
+    let mut robot = RestingRobot::new(SearchPolicy::Scheduled);
     let answers: Vec<_> = (0..7).map(|_| robot.frame(0)).collect();
     let spared: Vec<bool> = answers.iter().map(|a| a.only_expected).collect();
     assert_eq!(spared, [false, true, true, false, true, true, false]);
@@ -274,14 +274,29 @@ fn two_frames_of_three_are_answered_by_expected_landmarks_where_searches_are_spa
         assert!(named, "{answer:?}");
     }
     assert!(robot.off_m(0) < 0.1, "{}", robot.off_m(0));
-    let mut every = RestingRobot::new(true);
+    let mut every = RestingRobot::new(SearchPolicy::Every);
     assert!((0..4).all(|_| !every.frame(0).only_expected));
+}
+
+/// Frames of another camera, which nothing takes, are what waits.
+#[test]
+fn searches_are_spared_only_while_enough_frames_wait() {
+    let mut robot = RestingRobot::new(SearchPolicy::UnlessWaiting(2));
+    let intake = intake(&robot.engine, Duration::from_mins(1));
+    let spared = |robot: &mut RestingRobot| (0..5).map(|_| robot.frame(0).only_expected).collect::<Vec<_>>();
+    assert_eq!(spared(&mut robot), [false; 5]);
+    intake.receive(key(1), message(1, 768)).unwrap();
+    assert_eq!(spared(&mut robot), [false; 5]);
+    intake.receive(key(2), message(1, 768)).unwrap();
+    assert_eq!(spared(&mut robot), [true, true, false, true, true]);
+    while robot.engine.slots.try_take().is_some() {}
+    assert_eq!(spared(&mut robot), [false; 5]);
 }
 
 /// No expected landmark is found: the frame is searched at once, and the third contradiction replaces the pose.
 #[test]
 fn a_robot_that_was_carried_away_is_found_out_although_searches_are_spared() {
-    let mut robot = RestingRobot::new(false);
+    let mut robot = RestingRobot::new(SearchPolicy::Scheduled);
     for _ in 0..3 {
         robot.frame(0);
     }

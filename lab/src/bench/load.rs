@@ -45,9 +45,10 @@ pub(super) struct Args {
     /// Distinct frames along the drive.
     #[arg(long, default_value_t = 64, value_parser = clap::value_parser!(u32).range(2..=1000))]
     frames: u32,
-    /// Expected landmarks alone answer two of three frames of robots with a known pose.
-    #[arg(long)]
-    guided: bool,
+    /// When frames are searched for all landmarks, the server's setting `search_frames`: otherwise expected landmarks alone
+    /// answer them.
+    #[arg(long, default_value = "unless_busy", value_parser = ["every", "unless_busy", "scheduled"])]
+    search_frames: String,
     /// Age beyond which no work begins on a frame, ms.
     #[arg(long, default_value_t = 500)]
     deadline_ms: u32,
@@ -93,7 +94,7 @@ async fn measured(args: &Args) -> anyhow::Result<()> {
     let program = args.program.clone().unwrap_or(beside);
     let settings = [
         ("WAYMARK_LIMITS__FRAME_DEADLINE_MS", args.deadline_ms.to_string()),
-        ("WAYMARK_SEARCH_EVERY_FRAME", (!args.guided).to_string()),
+        ("WAYMARK_SEARCH_FRAMES", args.search_frames.clone()),
         ("WAYMARK_WORKERS", args.workers.to_string()),
         ("WAYMARK_LIMITS__LANDMARKS", "2000".to_owned()),
     ];
