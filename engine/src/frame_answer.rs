@@ -26,6 +26,15 @@ use vision::{
 
 /// The answer to one image without a robot: an uploaded photograph.
 pub fn answer_to_photograph(image: &GrayImage, camera: Option<&Intrinsics>, map: &MapSnapshot) -> v1::Answer {
+    analyse_photograph(image, camera, map).0
+}
+
+/// The same with the analysis that the answer rests on: quad by quad in the same order.
+pub fn analyse_photograph(
+    image: &GrayImage,
+    camera: Option<&Intrinsics>,
+    map: &MapSnapshot,
+) -> (v1::Answer, FrameAnalysis) {
     let (started, mut times) = (Instant::now(), StageTimes::start());
     let analysis = analyse_frame(image, camera, map, &mut times);
     let mut answer = answer(&analysis, map);
@@ -37,7 +46,7 @@ pub fn answer_to_photograph(image: &GrayImage, camera: Option<&Intrinsics>, map:
     }
     answer.timings = times.finish();
     answer.latency_ms = started.elapsed().as_secs_f64() * 1e3;
-    answer
+    (answer, analysis)
 }
 
 /// Status and quads, without echo, times and robot pose.

@@ -15,6 +15,7 @@ pub(crate) mod placement;
 pub(crate) mod pose;
 pub(crate) mod mapping;
 pub(crate) mod modalities;
+pub(crate) mod outside;
 pub(crate) mod recognition;
 pub(crate) mod visibility;
 
@@ -36,6 +37,16 @@ pub(crate) enum Command {
     /// Starts a server of its own in a temporary folder. A landmark taught from one picture is learnt from views
     /// generated from it (warped, dimmed, blurred).
     Recognition(recognition::Args),
+    /// Worlds made by others, with exact truth: quads, names and poses, each landmark taught from one picture.
+    ///
+    /// A world is a folder in the evaluation format with the camera of every picture beside it (world.json,
+    /// docs/EVALUATION.md). Its landmarks are taught with true size and place; its pictures are recognised as
+    /// photographs are, without a prior. For example:
+    ///   waymark-lab evaluate outside ../shared/data/photoreal/01 ../shared/data/photoreal/02
+    ///   waymark-lab evaluate outside worlds --misses
+    ///   waymark-lab evaluate outside worlds --strangers --json
+    #[command(verbatim_doc_comment)]
+    Outside(Box<outside::Args>),
     /// Recognition over the view angle: H^r, C^r and gradient similarity over their thresholds, and the decision.
     ///
     /// Landmarks are rendered posters (and photographs, with --photographs), taught as a robot would teach them.
@@ -116,6 +127,7 @@ pub(crate) fn run(command: &Command) -> anyhow::Result<()> {
     match command {
         Command::Detection(args) => detection::run(args),
         Command::Recognition(args) => recognition::run(args),
+        Command::Outside(args) => outside::run(args),
         Command::Viewpoint(args) => experiment::viewpoint::run(args),
         Command::Scale(args) => experiment::scale::run(args),
         Command::Illumination(args) => experiment::illumination::run(args),

@@ -184,9 +184,13 @@ async fn teach(truth: &Truth, args: &Args, maps: &MapClient, report: &mut Report
 }
 
 fn belongs(labelled: &Corners, quad: &QuadAnswer) -> bool {
-    let Some(corners) = quad_corners(quad) else { return false };
-    let (a, b) = (labelled.points(), corners.points());
-    polygon::iou(a, b) >= IOU_SAME || polygon::intersection_area(a, b) >= INNER_SHARE * corners.area_px2()
+    quad_corners(quad).is_some_and(|corners| is_on(labelled, &corners))
+}
+
+/// Whether a quad of an answer shows a labelled one or an inner border of it.
+pub(crate) fn is_on(labelled: &Corners, quad: &Corners) -> bool {
+    let (a, b) = (labelled.points(), quad.points());
+    polygon::iou(a, b) >= IOU_SAME || polygon::intersection_area(a, b) >= INNER_SHARE * quad.area_px2()
 }
 
 fn score(truth: &Truth, image: &TruthImage, answer: &Answer, args: &Args, report: &mut Report) {

@@ -143,7 +143,7 @@ fn best<'a>(labelled: &Corners, found: &'a [Quad]) -> (f64, Option<&'a Quad>) {
 }
 
 /// Whether it is a labelled quad, an inner border of one, or another real quad that the set lists.
-fn is_real(found: &Corners, image: &TruthImage) -> bool {
+pub(crate) fn is_real(found: &Corners, image: &TruthImage) -> bool {
     let area_px2 = found.area_px2();
     let same = |o: &Corners| polygon::iou(o.points(), found.points()) >= IOU_SAME;
     let inner = |o: &Corners| {
@@ -162,7 +162,7 @@ fn named(found: &Corners, reviewed: &[ReviewedQuad]) -> FalseQuad {
 }
 
 /// Mean distance of the four corners, for the best of the four start corners.
-fn corner_error_px(labelled: &Corners, found: &Corners) -> f64 {
+pub(crate) fn corner_error_px(labelled: &Corners, found: &Corners) -> f64 {
     (0..4)
         .map(|shift| {
             let pairs = labelled.points().iter().zip(found.rotated(shift).points().to_owned());

@@ -1,0 +1,171 @@
+//! `waymark-lab evaluate outside`: worlds that nobody here made. Teaches each landmark from its one frontal picture, then
+//! recognises every picture as the server does a photograph, and compares quads, names and poses with the truth.
+
+mod world;
+mod teach;
+mod recognise;
+mod poses;
+mod score;
+mod report;
+mod table;
+mod draw;
+mod peer;
+
+use anyhow::Context as _;
+use cli::{parameters::ParameterArgs, screen};
+use engine::snapshot::MapSnapshot;
+use report::Report;
+use score::{PictureScore, View};
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+use teach::Teacher;
+use vision::{detect::DetectParams, params::Params};
+use world::{CameraSigmas, World};
+
+/// `waymark-lab evaluate outside`.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
+    /// Worlds: folders with a truth.json that has `teach`, and a world.json where poses are known. A folder without a
+    /// truth.json stands for its sub-folders that have one, by name.
+    #[arg(required = true)]
+    folders: Vec<PathBuf>,
+    /// One JSON object instead of tables.
+    #[arg(long)]
+    json: bool,
+    /// Name every full view without a name, and why, every wrong name and every false quad.
+    #[arg(long)]
+    misses: bool,
+    /// Teach each world and show it the pictures of the next one: every name is wrong.
+    #[arg(long)]
+    strangers: bool,
+    /// State no standard deviations of the cameras, so that the server takes usual ones (0.5 % of the focal length).
+    /// Default: they are stated to be exact, as they are.
+    #[arg(long)]
+    usual_camera: bool,
+    /// Draw the pictures with a full view without a name, a wrong name or a false quad into this folder.
+    #[arg(long, value_name = "DIR")]
+    draw: Option<PathBuf>,
+    /// Put OpenCV's SIFT with RANSAC on the same pictures beside it, where Python has OpenCV.
+    #[arg(long, conflicts_with = "strangers")]
+    peer: bool,
+    /// The Python that has OpenCV.
+    #[arg(long, default_value = "python3", value_name = "PROGRAM")]
+    python: PathBuf,
+    #[command(flatten)]
+    parameters: ParameterArgs,
+}
+
+pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
+    let sigmas = if args.usual_camera { CameraSigmas::Absent } else { CameraSigmas::Exact };
+    let worlds = worlds(&args.folders, sigmas)?;
+    anyhow::ensure!(!args.strangers || worlds.len() > 1, "--strangers needs two worlds or more");
+    let detect = args.parameters.parameters()?;
+    let teacher = Teacher::start()?;
+    let maps = worlds.iter().enumerate().map(|(i, world)| Ok(with(&detect, &*teacher.teach(world, i)?)));
+    let maps: Vec<MapSnapshot> = maps.collect::<anyhow::Result<_>>()?;
+    let (mut scores, mut unreadable) = (Vec::new(), 0);
+    for (i, map) in maps.iter().enumerate() {
+        let shown = if args.strangers { &worlds[(i + 1) % worlds.len()] } else { &worlds[i] };
+        unreadable += of_world(shown, map, args.draw.as_deref(), &mut scores)?;
+    }
+    teacher.stop();
+    if args.misses {
+        scores.iter().for_each(name_misses);
+    }
+    let mut report = Report::new(worlds.len(), &scores, unreadable);
+    if args.peer {
+        match peer::beside(&args.python, &worlds) {
+            Ok(peer) => report.peer = Some(peer),
+            Err(reason) => screen::complain(&format!("without OpenCV: {reason}")),
+        }
+    }
+    screen::say(&if args.json { serde_json::to_string(&report)? } else { table::table(&report) });
+    Ok(())
+}
+
+/// All worlds that the folders stand for.
+fn worlds(folders: &[PathBuf], sigmas: CameraSigmas) -> anyhow::Result<Vec<World>> {
+    let mut paths = Vec::new();
+    for folder in folders {
+        if folder.join("truth.json").exists() {
+            paths.push(folder.clone());
+            continue;
+        }
+        let entries =
+            std::fs::read_dir(folder).with_context(|| format!("cannot read {}", folder.display()))?;
+        let mut within = entries.map(|entry| Ok(entry?.path())).collect::<std::io::Result<Vec<_>>>()?;
+        within.retain(|path| path.join("truth.json").exists());
+        anyhow::ensure!(!within.is_empty(), "{} holds no truth.json", folder.display());
+        within.sort();
+        paths.extend(within);
+    }
+    paths.iter().map(|path| read(path, sigmas)).collect()
+}
+
+fn read(path: &Path, sigmas: CameraSigmas) -> anyhow::Result<World> {
+    let world = World::read(path, sigmas)?;
+    anyhow::ensure!(!world.truth.teach.is_empty(), "{} has nothing to teach", path.display());
+    Ok(world)
+}
+
+/// The map, recognised with these parameters of the detector.
+fn with(detect: &DetectParams, map: &MapSnapshot) -> MapSnapshot {
+    let params = Params { detect: detect.clone(), ..Params::clone(&map.params) };
+    MapSnapshot { params: Arc::new(params), ..map.clone() }
+}
+
+/// Scores all pictures of a world; the number of those that cannot be read.
+fn of_world(
+    world: &World,
+    map: &MapSnapshot,
+    drawn_into: Option<&Path>,
+    scores: &mut Vec<PictureScore>,
+) -> anyhow::Result<usize> {
+    let mut unreadable = 0;
+    let progress = screen::progress(world.truth.images.len(), "recognising");
+    for image in world.truth.images.iter().filter(|image| !image.whole_image) {
+        progress.inc(1);
+        let recognised = match recognise::recognise(&image.path, world.cameras.get(&image.file), map) {
+            Ok(recognised) => recognised,
+            Err(error) => {
+                unreadable += 1;
+                screen::complain(&format!("{error:#}"));
+                continue;
+            }
+        };
+        let score = score::score(world, image, map, &recognised);
+        if let Some(folder) = drawn_into {
+            draw::draw(folder, &score, &recognised)?;
+        }
+        scores.push(score);
+    }
+    progress.finish_and_clear();
+    Ok(unreadable)
+}
+
+fn name_misses(score: &PictureScore) {
+    let at = |corners: &vision::geometry::Corners| {
+        let centre = corners.points().iter().fold([0.0; 2], |s, p| [s[0] + 0.25 * p.x, s[1] + 0.25 * p.y]);
+        format!("at ({:.0}, {:.0})", centre[0], centre[1])
+    };
+    let of = format!("{}/{}", score.world, score.file);
+    for label in score.labels.iter().filter(|l| l.view == View::Full && !l.is_named()) {
+        let name = label.landmark.as_deref().unwrap_or("a distractor");
+        let (side, angle) = (label.side_px, label.angle_rad.map_or(f64::NAN, f64::to_degrees));
+        screen::complain(&format!(
+            "{of}: {name} {} not named, side {side:.0} px, angle {angle:.0} deg: {} ({})",
+            at(&label.corners),
+            label.miss.reason,
+            label.miss.detail
+        ));
+    }
+    for wrong in &score.wrong {
+        let is = wrong.is.as_deref().unwrap_or("nothing labelled");
+        screen::complain(&format!("{of}: WRONG {} {} is {is}", wrong.named, at(&wrong.corners)));
+    }
+    for corners in score.false_quads.iter().flatten() {
+        screen::complain(&format!("{of}: false quad {}", at(corners)));
+    }
+}

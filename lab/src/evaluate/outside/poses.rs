@@ -1,0 +1,85 @@
+//! Poses against the truth: of the camera in the map, and of each named landmark in the camera frame.
+
+use super::world::{CameraTruth, LandmarkTruth};
+use nalgebra::{Matrix3, Matrix6, Vector6};
+use protos::{convert::geometry::pose3, v1};
+use vision::{
+    geometry::Corners,
+    pose::{LandmarkPose, reprojection::pixel},
+};
+
+/// A camera pose against the truth.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct CameraScore {
+    pub(super) position_m: f64,
+    pub(super) direction_rad: f64,
+    /// Of the position, 3 expected.
+    pub(super) nees: f64,
+}
+
+/// A landmark's pose in the camera frame against the truth.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct MeasurementScore {
+    /// Of its centre.
+    pub(super) position_m: f64,
+    pub(super) direction_rad: f64,
+    /// Of the centre, 3 expected, and of the whole pose, 6 expected.
+    pub(super) nees_3: f64,
+    pub(super) nees_6: f64,
+    /// Largest distance of a corner of the answer from where the pose puts it.
+    pub(super) reprojection_px: f64,
+    /// The same over the stated standard deviation of that corner.
+    pub(super) reprojection_sigmas: f64,
+    /// Two solutions fit, and the better one was taken.
+    pub(super) is_ambiguous: bool,
+}
+
+/// `None` where the answer's numbers are no pose.
+pub(super) fn camera_score(pose: &v1::CameraPose, truth: &CameraTruth) -> Option<CameraScore> {
+    let map_from_camera = pose3(pose.map_from_camera.as_ref()?).ok()?;
+    let true_pose = truth.camera_from_world.inverse();
+    let error = true_pose.translation.vector - map_from_camera.translation.vector;
+    let covariance = Matrix6::from_row_slice(pose.covariance.get(..36)?);
+    let of_position: Matrix3<f64> = covariance.fixed_view::<3, 3>(3, 3).into_owned();
+    Some(CameraScore {
+        position_m: error.norm(),
+        direction_rad: map_from_camera.rotation.angle_to(&true_pose.rotation),
+        nees: error.dot(&of_position.cholesky()?.solve(&error)),
+    })
+}
+
+/// The landmark's best pose; `corners` are those of the answer, the landmark's top-left first.
+pub(super) fn measurement_score(
+    pose: &LandmarkPose,
+    corners: &Corners,
+    landmark: &LandmarkTruth,
+    camera: &CameraTruth,
+) -> Option<MeasurementScore> {
+    let (best, measured) = (&pose.best, &pose.measured);
+    let found = &best.camera_from_landmark;
+    let true_pose = camera.camera_from_world * landmark.world_from_landmark;
+    let shift = true_pose.translation.vector - found.translation.vector;
+    let turn = (true_pose.rotation * found.rotation.inverse()).scaled_axis();
+    let error = Vector6::new(turn.x, turn.y, turn.z, shift.x, shift.y, shift.z);
+    let of_position: Matrix3<f64> = best.covariance.fixed_view::<3, 3>(3, 3).into_owned();
+    let (half_width, half_height) = (0.5 * measured.size.width_m, 0.5 * measured.size.height_m);
+    let (mut reprojection_px, mut reprojection_sigmas) = (0.0_f64, 0.0_f64);
+    for (i, (right, up)) in [(-1.0, 1.0), (1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)].into_iter().enumerate() {
+        let at = nalgebra::Vector3::new(0.0, right * half_width, up * half_height);
+        let expected = pixel(found, &at, &measured.camera)?;
+        let seen = measured.camera.undistort(&corners.points()[i])?;
+        let residual = seen - expected;
+        reprojection_px = reprojection_px.max(residual.norm());
+        let squared = residual.dot(&measured.covariance_px2[i].cholesky()?.solve(&residual));
+        reprojection_sigmas = reprojection_sigmas.max(squared.sqrt());
+    }
+    Some(MeasurementScore {
+        position_m: shift.norm(),
+        direction_rad: turn.norm(),
+        nees_3: shift.dot(&of_position.cholesky()?.solve(&shift)),
+        nees_6: error.dot(&best.covariance.cholesky()?.solve(&error)),
+        reprojection_px,
+        reprojection_sigmas,
+        is_ambiguous: pose.ambiguous,
+    })
+}
