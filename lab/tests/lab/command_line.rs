@@ -11,7 +11,7 @@ use tests::{
 };
 
 /// Options that each command must name in its help.
-const OPTIONS: [(&str, &[&str]); 26] = [
+const OPTIONS: [(&str, &[&str]); 27] = [
     (
         "evaluate navigation",
         &["--drives", "--posters", "--length-m", "--rate-hz", "--seed", "--json", "--plot"],
@@ -32,6 +32,20 @@ const OPTIONS: [(&str, &[&str]); 26] = [
             "--views",
             "--seed",
             "<SETS>",
+        ],
+    ),
+    (
+        "evaluate outside",
+        &[
+            "--usual-camera",
+            "--strangers",
+            "--peer",
+            "--python",
+            "--draw",
+            "--misses",
+            "--json",
+            "--set",
+            "<FOLDERS>",
         ],
     ),
     ("evaluate modalities", &["--runs", "--drives", "--seed", "--json", "--plot"]),

@@ -2,6 +2,7 @@
 
 mod command_line;
 mod evaluate;
+mod outside;
 mod plot;
 mod plot_map;
 mod real_pictures;

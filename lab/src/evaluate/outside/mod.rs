@@ -10,6 +10,7 @@ mod report;
 mod table;
 mod draw;
 mod peer;
+mod strangers;
 
 use anyhow::Context as _;
 use cli::{parameters::ParameterArgs, screen};
@@ -37,7 +38,8 @@ pub(crate) struct Args {
     /// Name every full view without a name, and why, every wrong name and every false quad.
     #[arg(long)]
     misses: bool,
-    /// Teach each world and show it the pictures of the next one: every name is wrong.
+    /// Teach each world and show it the pictures of the next one: every name is wrong, but on a landmark that shows
+    /// the same picture (lab/reviewed/same-pictures.json).
     #[arg(long)]
     strangers: bool,
     /// State no standard deviations of the cameras, so that the server takes usual ones (0.5 % of the focal length).
@@ -63,11 +65,14 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     anyhow::ensure!(!args.strangers || worlds.len() > 1, "--strangers needs two worlds or more");
     let detect = args.parameters.parameters()?;
     let teacher = Teacher::start()?;
-    let maps = worlds.iter().enumerate().map(|(i, world)| Ok(with(&detect, &*teacher.teach(world, i)?)));
+    let maps =
+        worlds.iter().enumerate().map(|(i, world)| Ok(detecting_with(&detect, &*teacher.teach(world, i)?)));
     let maps: Vec<MapSnapshot> = maps.collect::<anyhow::Result<_>>()?;
     let (mut scores, mut unreadable) = (Vec::new(), 0);
     for (i, map) in maps.iter().enumerate() {
-        let shown = if args.strangers { &worlds[(i + 1) % worlds.len()] } else { &worlds[i] };
+        let next = &worlds[(i + 1) % worlds.len()];
+        let strangers = args.strangers.then(|| strangers::as_strangers(next, &worlds[i])).transpose()?;
+        let shown = strangers.as_ref().unwrap_or(&worlds[i]);
         unreadable += of_world(shown, map, args.draw.as_deref(), &mut scores)?;
     }
     teacher.stop();
@@ -111,7 +116,7 @@ fn read(path: &Path, sigmas: CameraSigmas) -> anyhow::Result<World> {
 }
 
 /// The map, recognised with these parameters of the detector.
-fn with(detect: &DetectParams, map: &MapSnapshot) -> MapSnapshot {
+fn detecting_with(detect: &DetectParams, map: &MapSnapshot) -> MapSnapshot {
     let params = Params { detect: detect.clone(), ..Params::clone(&map.params) };
     MapSnapshot { params: Arc::new(params), ..map.clone() }
 }

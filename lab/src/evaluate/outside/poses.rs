@@ -1,11 +1,14 @@
 //! Poses against the truth: of the camera in the map, and of each named landmark in the camera frame.
 
 use super::world::{CameraTruth, LandmarkTruth};
-use nalgebra::{Matrix3, Matrix6, Vector6};
+use nalgebra::{Isometry3, Matrix3, Matrix3x6, Matrix6, Vector6};
 use protos::{convert::geometry::pose3, v1};
 use vision::{
     geometry::Corners,
-    pose::{LandmarkPose, reprojection::pixel},
+    pose::{
+        LandmarkPose, PoseSolution,
+        reprojection::{cross, pixel},
+    },
 };
 
 /// A camera pose against the truth.
@@ -13,8 +16,12 @@ use vision::{
 pub(super) struct CameraScore {
     pub(super) position_m: f64,
     pub(super) direction_rad: f64,
-    /// Of the position, 3 expected.
+    /// Of the position, 3 expected: as stated, with the error that a place by hand is taken to have.
     pub(super) nees: f64,
+    /// Of the position by the covariance of the landmark's pose alone: places are exact here.
+    pub(super) nees_of_view: Option<f64>,
+    /// Standard deviation of the position that this covariance states, root of the trace.
+    pub(super) stated_m: Option<f64>,
 }
 
 /// A landmark's pose in the camera frame against the truth.
@@ -34,18 +41,49 @@ pub(super) struct MeasurementScore {
     pub(super) is_ambiguous: bool,
 }
 
-/// `None` where the answer's numbers are no pose.
-pub(super) fn camera_score(pose: &v1::CameraPose, truth: &CameraTruth) -> Option<CameraScore> {
+/// `None` where the answer's numbers are no pose. `seen` is the landmark that gives the pose, as it was seen.
+pub(super) fn camera_score(
+    pose: &v1::CameraPose,
+    truth: &CameraTruth,
+    seen: Option<(&LandmarkPose, &LandmarkTruth)>,
+) -> Option<CameraScore> {
     let map_from_camera = pose3(pose.map_from_camera.as_ref()?).ok()?;
     let true_pose = truth.camera_from_world.inverse();
     let error = true_pose.translation.vector - map_from_camera.translation.vector;
     let covariance = Matrix6::from_row_slice(pose.covariance.get(..36)?);
     let of_position: Matrix3<f64> = covariance.fixed_view::<3, 3>(3, 3).into_owned();
+    let of_view = seen.map(|(seen, landmark)| position_covariance(seen, landmark, &map_from_camera));
     Some(CameraScore {
         position_m: error.norm(),
         direction_rad: map_from_camera.rotation.angle_to(&true_pose.rotation),
         nees: error.dot(&of_position.cholesky()?.solve(&error)),
+        nees_of_view: of_view.and_then(|c| Some(error.dot(&c.cholesky()?.solve(&error)))),
+        stated_m: of_view.map(|c| c.trace().sqrt()),
     })
+}
+
+/// Covariance of the camera's position (map frame) by the landmark's pose in the camera frame, of the solution that
+/// gives this pose of the camera.
+fn position_covariance(
+    seen: &LandmarkPose,
+    landmark: &LandmarkTruth,
+    map_from_camera: &Isometry3<f64>,
+) -> Matrix3<f64> {
+    let distance = |s: &PoseSolution| {
+        let camera = landmark.world_from_landmark * s.camera_from_landmark.inverse();
+        (camera.translation.vector - map_from_camera.translation.vector).norm()
+    };
+    let solution = match &seen.second {
+        Some(second) if distance(second) < distance(&seen.best) => second,
+        _ => &seen.best,
+    };
+    // The position is -R^T t in the landmark frame: by the rotation vector R^T [t]x, by the translation -R^T.
+    let turn = map_from_camera.rotation.to_rotation_matrix().into_inner();
+    let by_rotation = turn * cross(&solution.camera_from_landmark.translation.vector);
+    let mut by_seen = Matrix3x6::zeros();
+    by_seen.fixed_columns_mut::<3>(0).copy_from(&by_rotation);
+    by_seen.fixed_columns_mut::<3>(3).copy_from(&-turn);
+    by_seen * solution.covariance * by_seen.transpose()
 }
 
 /// The landmark's best pose; `corners` are those of the answer, the landmark's top-left first.

@@ -2,6 +2,7 @@
 
 use super::world::CameraTruth;
 use anyhow::Context as _;
+use cli::clock::Clock;
 use engine::{decode::ImageLimits, frame_answer::analyse_photograph, picture, snapshot::MapSnapshot};
 use protos::v1;
 use std::path::Path;
@@ -21,6 +22,8 @@ pub(super) struct Recognised {
     /// Quad by quad in the order of `analysis`.
     pub(super) answer: v1::Answer,
     pub(super) analysis: FrameAnalysis,
+    /// Processor time of recognition, on one thread.
+    pub(super) ms: f64,
 }
 
 impl Recognised {
@@ -39,8 +42,10 @@ pub(super) fn recognise(
     let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
     let image = picture::decode(&bytes, ImageLimits::UPLOAD)
         .map_err(|refused| anyhow::anyhow!("{}: {}", path.display(), refused.detail))?;
+    let clock = Clock::start();
     let (answer, analysis) = analyse_photograph(&image, camera.map(|c| &c.intrinsics), map);
+    let ms = clock.ms();
     let mut shown = detect(&image, &map.params.detect, &mut NoTrace);
     shown.retain(|quad| quad.kind == QuadKind::Full);
-    Ok(Recognised { image, shown, answer, analysis })
+    Ok(Recognised { image, shown, answer, analysis, ms })
 }

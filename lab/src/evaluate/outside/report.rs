@@ -74,7 +74,12 @@ pub(super) struct CameraFigures {
     /// All given poses.
     pub(super) position_m: Errors,
     pub(super) direction_deg: Errors,
+    /// As stated: with the error that a place by hand is taken to have.
     pub(super) nees: Nees,
+    /// By the covariance of the landmark's pose alone: places are exact here.
+    pub(super) nees_of_view: Nees,
+    /// Standard deviation of the position by that covariance.
+    pub(super) stated_m: Errors,
     /// Why pictures have no pose.
     pub(super) refusals: BTreeMap<String, usize>,
 }
@@ -112,7 +117,7 @@ pub(super) struct Report {
     pub(super) wrong_names: usize,
     pub(super) camera: CameraFigures,
     pub(super) measurements: MeasurementFigures,
-    /// Median time of recognition on one thread.
+    /// Median processor time of recognition on one thread.
     pub(super) ms_per_picture: Option<f64>,
     /// Why full views have no name, most frequent first.
     pub(super) missed: Vec<(String, usize)>,
@@ -244,6 +249,8 @@ fn camera(scores: &[PictureScore]) -> CameraFigures {
         position_m: Errors::of(given().map(|s| s.position_m)),
         direction_deg: Errors::of(given().map(|s| s.direction_rad.to_degrees())),
         nees: Nees::of(3, given().map(|s| s.nees)),
+        nees_of_view: Nees::of(3, given().filter_map(|s| s.nees_of_view)),
+        stated_m: Errors::of(given().filter_map(|s| s.stated_m)),
         refusals,
     }
 }

@@ -3,7 +3,7 @@
 use super::{
     poses::{CameraScore, MeasurementScore, camera_score, measurement_score},
     recognise::Recognised,
-    world::World,
+    world::{LandmarkTruth, World},
 };
 use crate::evaluate::{
     detection::score::{corner_error_px, is_real},
@@ -12,12 +12,13 @@ use crate::evaluate::{
 };
 use client::{
     quad_corners,
-    v1::{QuadAnswer, Verdict},
+    v1::{self, QuadAnswer, Verdict},
 };
 use engine::snapshot::MapSnapshot;
 use vision::{
     detect::QuadKind,
     geometry::{Corners, polygon},
+    pose::LandmarkPose,
 };
 
 /// Overlap from which a border is that of a labelled quad, and the stricter one.
@@ -98,6 +99,7 @@ pub(super) struct PictureScore {
     pub(super) false_quads: Option<Vec<Corners>>,
     pub(super) wrong: Vec<WrongName>,
     pub(super) pose: PoseOutcome,
+    /// Processor time of recognition.
     pub(super) ms: f64,
 }
 
@@ -112,8 +114,9 @@ pub(super) fn score(world: &World, image: &TruthImage, map: &MapSnapshot, r: &Re
     let shown = || r.shown.iter().map(|quad| quad.corners_px);
     let pose = match world.cameras.get(&image.file) {
         None => PoseOutcome::NoTruth,
-        Some(camera) => match r.answer.camera_pose.as_ref().and_then(|pose| camera_score(pose, camera)) {
-            Some(score) => PoseOutcome::Given(score),
+        Some(camera) => match r.answer.camera_pose.as_ref() {
+            Some(pose) => camera_score(pose, camera, decisive(world, pose, r))
+                .map_or_else(|| PoseOutcome::Refused("no_pose".to_owned()), PoseOutcome::Given),
             None => PoseOutcome::Refused(r.answer.camera_pose_refusal.clone()),
         },
     };
@@ -125,7 +128,7 @@ pub(super) fn score(world: &World, image: &TruthImage, map: &MapSnapshot, r: &Re
         false_quads: image.quads_complete.then(|| shown().filter(is_false).collect()),
         wrong: wrong_names(world, image, r),
         pose,
-        ms: r.answer.latency_ms,
+        ms: r.ms,
     }
 }
 
@@ -175,6 +178,18 @@ fn label(
         measurement,
         miss: if named.is_some() { Miss::default() } else { miss(quad, map, r) },
     })
+}
+
+/// The landmark that gives the camera's pose, as it was seen and as it hangs.
+fn decisive<'a>(
+    world: &'a World,
+    pose: &v1::CameraPose,
+    r: &'a Recognised,
+) -> Option<(&'a LandmarkPose, &'a LandmarkTruth)> {
+    let name = pose.landmarks.first()?;
+    let (i, ..) =
+        unique(r).find(|(i, quad, _)| quad.landmark == *name && r.analysis.quads[*i].pose.is_ok())?;
+    Some((r.analysis.quads[i].pose.as_ref().ok()?, world.landmarks.get(name)?))
 }
 
 /// Quads of the answer with one name, by their place in it.

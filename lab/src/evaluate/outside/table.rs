@@ -107,13 +107,16 @@ fn poses(out: &mut String, r: &Report) {
         out,
         "  camera poses: {} of {} pictures with a full view; none: {}\n\
          \x20   position, cm (median / 90 % / worst): {}\n    direction, deg: {}\n\
-         \x20   NEES of the position (mean / without the largest 1 % / median): {}",
+         \x20   NEES of the position (mean / without the largest 1 % / median): {}; with places of 1 cm by hand: {}\n\
+         \x20   stated standard deviation of the position, cm: {}",
         c.pictures_with_pose,
         c.pictures,
         refusals.join(", "),
         errors(&c.position_m, 100.0, 1),
         errors(&c.direction_deg, 1.0, 2),
-        nees(&c.nees)
+        nees(&c.nees_of_view),
+        nees(&c.nees),
+        errors(&c.stated_m, 100.0, 1)
     );
     let _ = writeln!(
         out,
