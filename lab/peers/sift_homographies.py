@@ -1,5 +1,5 @@
-"""OpenCV's SIFT with votes and RANSAC, one thread: frontal pictures of the landmarks in; for each frame asked for by its
-path, the landmarks with enough inliers, each with the border that its homography gives, and processor time out."""
+"""OpenCV's SIFT with votes and RANSAC, one thread: frontal pictures of the landmarks in; for each frame asked for by
+its path, the landmarks with enough inliers, each with the border of its homography, and processor time out."""
 import json
 import sys
 import time

@@ -42,9 +42,9 @@ pub(crate) enum Command {
     /// A world is a folder in the evaluation format with the camera of every picture beside it (world.json,
     /// docs/EVALUATION.md). Its landmarks are taught with true size and place; its pictures are recognised as
     /// photographs are, without a prior. For example:
-    ///   waymark-lab evaluate outside ../shared/data/photoreal/01 ../shared/data/photoreal/02
-    ///   waymark-lab evaluate outside worlds --misses
-    ///   waymark-lab evaluate outside worlds --strangers --json
+    ///   waymark-lab evaluate outside photoreal/01 photoreal/02 --draw missed
+    ///   waymark-lab evaluate outside photoreal/01 --misses --peer
+    ///   waymark-lab evaluate outside photoreal --strangers --json
     #[command(verbatim_doc_comment)]
     Outside(Box<outside::Args>),
     /// Recognition over the view angle: H^r, C^r and gradient similarity over their thresholds, and the decision.

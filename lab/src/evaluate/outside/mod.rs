@@ -1,5 +1,5 @@
-//! `waymark-lab evaluate outside`: worlds that nobody here made. Teaches each landmark from its one frontal picture, then
-//! recognises every picture as the server does a photograph, and compares quads, names and poses with the truth.
+//! `waymark-lab evaluate outside`: worlds that nobody here made. Teaches each landmark from its one frontal picture,
+//! then recognises every picture as the server does a photograph, and compares quads, names and poses with the truth.
 
 mod world;
 mod teach;
@@ -27,6 +27,7 @@ use world::{CameraSigmas, World};
 
 /// `waymark-lab evaluate outside`.
 #[derive(Debug, clap::Args)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a switch of the command")]
 pub(crate) struct Args {
     /// Worlds: folders with a truth.json that has `teach`, and a world.json where poses are known. A folder without a
     /// truth.json stands for its sub-folders that have one, by name.

@@ -1,5 +1,4 @@
-//! OpenCV's SIFT with RANSAC on the same pictures, one landmark after the other: a landmark is named from ten inliers of
-//! a homography on.
+//! OpenCV's SIFT with RANSAC on the same pictures: a landmark is named from ten inliers of a homography on.
 
 use super::{
     score::{View, view},

@@ -80,8 +80,8 @@ pub(super) struct CameraFigures {
     pub(super) nees_of_view: Nees,
     /// Standard deviation of the position by that covariance.
     pub(super) stated_m: Errors,
-    /// Why pictures have no pose.
-    pub(super) refusals: BTreeMap<String, usize>,
+    /// Why pictures have no pose, by the word.
+    pub(super) refusals: Vec<(String, usize)>,
 }
 
 /// Poses of named landmarks in the camera frame, with the stated camera; their place plays no part.
@@ -232,7 +232,7 @@ fn camera(scores: &[PictureScore]) -> CameraFigures {
             PoseOutcome::NoTruth | PoseOutcome::Refused(_) => None,
         })
     };
-    let mut refusals = BTreeMap::new();
+    let mut refusals: BTreeMap<String, usize> = BTreeMap::new();
     for score in scores {
         if let PoseOutcome::Refused(word) = &score.pose {
             let word = if word.is_empty() { "nothing_recognised" } else { word };
@@ -251,7 +251,7 @@ fn camera(scores: &[PictureScore]) -> CameraFigures {
         nees: Nees::of(3, given().map(|s| s.nees)),
         nees_of_view: Nees::of(3, given().filter_map(|s| s.nees_of_view)),
         stated_m: Errors::of(given().filter_map(|s| s.stated_m)),
-        refusals,
+        refusals: refusals.into_iter().collect(),
     }
 }
 
@@ -278,4 +278,25 @@ fn missed(scores: &[PictureScore]) -> Vec<(String, usize)> {
     let mut counts: Vec<(String, usize)> = counts.into_iter().map(|(r, n)| (r.to_owned(), n)).collect();
     counts.sort_by(|a, b| b.1.cmp(&a.1).then_with(|| a.0.cmp(&b.0)));
     counts
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_percent_of_the_largest_is_left_out_and_at_least_one_value() {
+        let nees = Nees::of(3, (1..=200).map(f64::from));
+        assert_eq!((nees.mean, nees.mean_without_largest), (Some(100.5), Some(99.5)));
+        let few = Nees::of(3, [2.0, 100.0, 4.0].into_iter());
+        assert_eq!((few.mean_without_largest, few.median), (Some(3.0), Some(4.0)));
+        let none = Nees::of(3, std::iter::empty());
+        assert_eq!((none.mean, none.mean_without_largest), (None, None));
+    }
+
+    #[test]
+    fn errors_are_sorted_before_they_are_named() {
+        let errors = Errors::of([3.0, 1.0, 9.0, 2.0].into_iter());
+        assert_eq!((errors.median, errors.most, errors.worst), (Some(2.5), Some(9.0), Some(9.0)));
+    }
 }

@@ -1,5 +1,5 @@
-//! A world as strangers to the landmarks of another one. Names mean nothing between worlds; the same picture may hang in
-//! both, so landmarks that show it are listed.
+//! A world as strangers to the landmarks of another one. Names mean nothing between worlds; the same picture may hang
+//! in both, so landmarks that show it are listed.
 
 use super::world::World;
 use serde::Deserialize;

@@ -1,7 +1,9 @@
 //! The report for people.
 
-use super::report::{Errors, Group, Nees, Report};
-use std::fmt::Write as _;
+use super::{
+    peer::PeerReport,
+    report::{Errors, Group, Nees, Report},
+};
 
 /// A share, or a line where nothing was counted.
 fn share(value: Option<f64>) -> String {
@@ -45,90 +47,84 @@ fn group(name: &str, g: &Group) -> String {
 }
 
 pub(super) fn table(r: &Report) -> String {
-    let mut out = format!("{} worlds, {} pictures, {} unreadable\n", r.worlds, r.pictures, r.unreadable);
-    let _ = writeln!(
-        out,
-        "  {:<22}{:>6}   shown at IoU    asked at IoU    corners, px    named   answer, px\n  {:<22}{:>6}   0.70   0.85    0.70   0.85    med.   90 %           med.   90 %",
-        "full views", "views", "", ""
-    );
-    let named =
+    let mut lines = vec![
+        format!("{} worlds, {} pictures, {} unreadable", r.worlds, r.pictures, r.unreadable),
+        format!(
+            "  {:<22}{:>6}   shown at IoU    asked at IoU    corners, px    named   answer, px",
+            "full views", "views"
+        ),
+        format!("{:<30}   0.70   0.85    0.70   0.85    med.   90 %           med.   90 %", ""),
+    ];
+    let sums =
         [("all", &r.all), ("without doors, windows", &r.pictures_and_boards), ("poster and canvas", &r.flat)];
-    for (name, g) in named {
-        let _ = writeln!(out, "{}", group(name, g));
-    }
-    let by = r.by_kind.iter().map(|(n, g)| (n, g));
-    for (name, g) in by.chain(r.by_shortest_side.iter().chain(&r.by_view_angle).map(|(n, g)| (n, g))) {
-        let _ = writeln!(out, "{}", group(name, g));
-    }
-    let _ = writeln!(
-        out,
-        "  false quads: {} ({} a picture); asked: {} a picture\n  cut or hidden: {} of {} named\n  wrong names: {}",
+    lines.extend(sums.map(|(name, g)| group(name, g)));
+    lines.extend(r.by_kind.iter().map(|(name, g)| group(name, g)));
+    lines.extend(r.by_shortest_side.iter().chain(&r.by_view_angle).map(|(name, g)| group(name, g)));
+    lines.push(format!(
+        "  false quads: {} ({} a picture); asked: {} a picture",
         r.false_quads,
         number(r.false_per_picture, 1.0, 2),
-        number(r.asked_per_picture, 1.0, 1),
-        r.partial.named,
-        r.partial.views,
-        r.wrong_names
-    );
-    poses(&mut out, r);
-    let missed: Vec<String> = r.missed.iter().map(|(reason, n)| format!("{reason} {n}")).collect();
-    let _ = write!(
-        out,
-        "  full views without a name: {}\n  time a picture: {} ms",
-        missed.join(", "),
-        number(r.ms_per_picture, 1.0, 1)
-    );
-    if let Some(p) = &r.peer {
-        let _ = write!(
-            out,
-            "\n  OpenCV {} SIFT with RANSAC: named {} of {} full views, {} of {} without doors and windows, {} cut or hidden; \
-             wrong names {}; {} ms",
-            p.version,
-            p.named,
-            p.full_views,
-            p.pictures_and_boards_named,
-            p.pictures_and_boards,
-            p.partial_named,
-            p.wrong_names,
-            number(p.ms_per_picture, 1.0, 1)
-        );
-    }
-    out
+        number(r.asked_per_picture, 1.0, 1)
+    ));
+    lines.push(format!("  cut or hidden: {} of {} named", r.partial.named, r.partial.views));
+    lines.push(format!("  wrong names: {}", r.wrong_names));
+    poses(&mut lines, r);
+    lines.push(format!("  full views without a name: {}", counts(&r.missed)));
+    lines.push(format!("  time a picture: {} ms", number(r.ms_per_picture, 1.0, 1)));
+    lines.extend(r.peer.as_ref().map(peer));
+    lines.join("\n")
 }
 
-fn poses(out: &mut String, r: &Report) {
+/// Words with how often each was counted.
+fn counts<'a>(all: impl IntoIterator<Item = &'a (String, usize)>) -> String {
+    let all: Vec<String> = all.into_iter().map(|(word, n)| format!("{word} {n}")).collect();
+    if all.is_empty() { "none".to_owned() } else { all.join(", ") }
+}
+
+fn poses(lines: &mut Vec<String>, r: &Report) {
     let (c, m) = (&r.camera, &r.measurements);
     if c.pictures == 0 {
-        let _ = writeln!(out, "  no true poses");
+        lines.push("  no true poses".to_owned());
         return;
     }
-    let refusals: Vec<String> = c.refusals.iter().map(|(word, n)| format!("{word} {n}")).collect();
-    let _ = writeln!(
-        out,
-        "  camera poses: {} of {} pictures with a full view; none: {}\n\
-         \x20   position, cm (median / 90 % / worst): {}\n    direction, deg: {}\n\
-         \x20   NEES of the position (mean / without the largest 1 % / median): {}; with places of 1 cm by hand: {}\n\
-         \x20   stated standard deviation of the position, cm: {}",
-        c.pictures_with_pose,
-        c.pictures,
-        refusals.join(", "),
-        errors(&c.position_m, 100.0, 1),
-        errors(&c.direction_deg, 1.0, 2),
-        nees(&c.nees_of_view),
-        nees(&c.nees),
-        errors(&c.stated_m, 100.0, 1)
-    );
-    let _ = writeln!(
-        out,
-        "  landmarks in the camera frame, {} of them ambiguous\n    position, cm: {}\n    direction, deg: {}\n\
-         \x20   NEES of the position: {}\n    NEES of the pose: {}\n\
-         \x20   reprojection of the pose at the answer's corners, px: {}\n    worse than 3 sigma: {}",
-        m.ambiguous,
-        errors(&m.position_m, 100.0, 1),
-        errors(&m.direction_deg, 1.0, 2),
-        nees(&m.nees_3),
-        nees(&m.nees_6),
-        errors(&m.reprojection_px, 1.0, 2),
-        share(m.misfit)
-    );
+    let (given, of) = (c.pictures_with_pose, c.pictures);
+    lines.extend([
+        format!(
+            "  camera poses: {given} of {of} pictures with a full view; no pose: {}",
+            counts(&c.refusals)
+        ),
+        format!("    position, cm (median / 90 % / worst): {}", errors(&c.position_m, 100.0, 1)),
+        format!("    direction, deg: {}", errors(&c.direction_deg, 1.0, 2)),
+        format!(
+            "    NEES of the position (mean / without the largest 1 % / median): {}",
+            nees(&c.nees_of_view)
+        ),
+        format!("    NEES as stated, with the errors of places by hand: {}", nees(&c.nees)),
+        format!("    stated standard deviation of the position, cm: {}", errors(&c.stated_m, 100.0, 1)),
+        format!("  landmarks in the camera frame, {} of them ambiguous", m.ambiguous),
+        format!("    position, cm: {}", errors(&m.position_m, 100.0, 1)),
+        format!("    direction, deg: {}", errors(&m.direction_deg, 1.0, 2)),
+        format!("    NEES of the position: {}", nees(&m.nees_3)),
+        format!("    NEES of the pose: {}", nees(&m.nees_6)),
+        format!(
+            "    reprojection at the answer's corners, px: {}; worse than 3 sigma: {}",
+            errors(&m.reprojection_px, 1.0, 2),
+            share(m.misfit).trim()
+        ),
+    ]);
+}
+
+fn peer(p: &PeerReport) -> String {
+    format!(
+        "  OpenCV {} SIFT with RANSAC: named {} of {} full views, {} of {} without doors and windows, {} cut or hidden; \
+         wrong names {}; {} ms",
+        p.version,
+        p.named,
+        p.full_views,
+        p.pictures_and_boards_named,
+        p.pictures_and_boards,
+        p.partial_named,
+        p.wrong_names,
+        number(p.ms_per_picture, 1.0, 1)
+    )
 }

@@ -178,3 +178,41 @@ fn rigid(rotation: &Matrix3<f64>, translation: Vector3<f64>) -> Result<Isometry3
     let turn = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix(rotation));
     Ok(Isometry3::from_parts(Translation3::from(translation), turn))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use map::place::{LandmarkPlace, PlaceSigmas};
+
+    /// Corners of a landmark that is placed by hand.
+    fn corners(place: &LandmarkPlace) -> [[f64; 3]; 4] {
+        [(-1.0, 1.0), (1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)].map(|(right, up)| {
+            let at = Vector3::new(0.0, 0.5 * right * place.size.width_m, 0.5 * up * place.size.height_m);
+            (place.map_from_landmark() * nalgebra::Point3::from(at)).into()
+        })
+    }
+
+    #[test]
+    fn a_landmark_comes_back_from_its_corners_at_any_turn() {
+        let size = LandmarkSize { width_m: 0.6, height_m: 0.9 };
+        let at = Vector3::new(2.0, -5.0, 1.5);
+        for (theta, roll, tilt) in [(0.4, 0.0, 0.0), (-2.8, 0.1, 0.3), (1.2, -0.2, 1.0)] {
+            let mut place = LandmarkPlace::by_hand(at, theta, size, PlaceSigmas::default()).unwrap();
+            (place.roll_rad, place.tilt_rad) = (roll, tilt);
+            let made = landmark_truth(&corners(&place)).unwrap();
+            let (size, stated) = made.size_and_place();
+            assert!((size.width_m - 0.6).abs() < 1e-9 && (size.height_m - 0.9).abs() < 1e-9);
+            let expected = [2.0, -5.0, 1.5, theta, roll, tilt];
+            let found =
+                [stated.x_m, stated.y_m, stated.z_m, stated.theta_rad, stated.roll_rad, stated.tilt_rad];
+            assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-9), "{found:?}");
+        }
+    }
+
+    #[test]
+    fn a_mirrored_pose_is_no_pose() {
+        let rows = |sign: f64| [[1.0, 0.0, 0.0, 2.0], [0.0, sign, 0.0, 3.0], [0.0, 0.0, 1.0, 4.0]];
+        assert_eq!(isometry(&rows(1.0)).unwrap().translation.vector, Vector3::new(2.0, 3.0, 4.0));
+        assert!(isometry(&rows(-1.0)).is_err() && isometry(&rows(1.0)[..2]).is_err());
+    }
+}
