@@ -96,7 +96,7 @@ impl PeerReport {
         for label in image.quads.iter().filter(|l| l.landmark.is_some()) {
             let right = usize::from(named.iter().any(|n| is_of(label, n)));
             let is_picture =
-                label.class.as_deref().is_some_and(|kind| super::report::PICTURES.contains(&kind));
+                label.class.as_deref().is_some_and(|kind| super::score::PICTURES.contains(&kind));
             match view(label) {
                 Some(View::Full) => {
                     self.full_views += 1;

@@ -1,7 +1,7 @@
 //! The figures of all pictures together. Shares and errors are `null` where nothing was counted.
 
 use super::peer::PeerReport;
-use super::score::{FOUND, FOUND_WELL, LabelScore, PictureScore, PoseOutcome, View};
+use super::score::{FOUND, FOUND_WELL, LabelScore, PICTURES, PictureScore, PoseOutcome, View};
 use crate::evaluate::statistics::{median, quantile};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -16,8 +16,6 @@ const MISFIT_SIGMAS: f64 = 3.0;
 const SIDES_PX: [u32; 4] = [30, 50, 100, 200];
 /// Lower ends of the groups by view angle, degrees.
 const ANGLES_DEG: [u32; 4] = [0, 30, 50, 60];
-/// Kinds without doors and windows, which hardly differ from one another.
-pub(super) const PICTURES: [&str; 4] = ["poster", "canvas", "framed", "board"];
 /// Kinds whose border lies in one plane with the picture.
 const FLAT: [&str; 2] = ["poster", "canvas"];
 

@@ -21,6 +21,8 @@ use vision::{
     pose::LandmarkPose,
 };
 
+/// Kinds without doors and windows, which hardly differ from one another.
+pub(super) const PICTURES: [&str; 4] = ["poster", "canvas", "framed", "board"];
 /// Overlap from which a border is that of a labelled quad, and the stricter one.
 pub(super) const FOUND: f64 = 0.7;
 pub(super) const FOUND_WELL: f64 = 0.85;
