@@ -186,6 +186,8 @@ fn a_wrong_world_is_refused_with_its_field() {
         ("/frames/1/camera_from_world/0/0", json!(3.0), "frames[1].camera_from_world"),
         ("/frames/0/fx", json!(-1.0), "frames[0].fx"),
         ("/landmarks/2/corners/1/2", json!(9.0), "landmarks[2].corners"),
+        ("/frames", json!([]), "frames: none is of frame-00.png"),
+        ("/landmarks", json!([]), "landmarks: none is "),
     ] {
         world.poses = stated.clone();
         *world.poses.pointer_mut(path).expect("a field") = value;

@@ -159,10 +159,11 @@ fn name_misses(score: &PictureScore) {
     let of = format!("{}/{}", score.world, score.file);
     for label in score.labels.iter().filter(|l| l.view == View::Full && !l.is_named()) {
         let name = label.landmark.as_deref().unwrap_or("a distractor");
-        let (side, angle) = (label.side_px, label.angle_rad.map_or(f64::NAN, f64::to_degrees));
+        let angle = label.angle_rad.map_or(String::new(), |a| format!(", angle {:.0} deg", a.to_degrees()));
         screen::complain(&format!(
-            "{of}: {name} {} not named, side {side:.0} px, angle {angle:.0} deg: {} ({})",
+            "{of}: {name} {} not named, side {:.0} px{angle}: {} ({})",
             at(&label.corners),
+            label.side_px,
             label.miss.reason,
             label.miss.detail
         ));

@@ -1,7 +1,7 @@
 //! OpenCV's SIFT with RANSAC on the same pictures: a landmark is named from ten inliers of a homography on.
 
 use super::{
-    score::{View, view},
+    score::{PICTURES, View, view},
     world::World,
 };
 use crate::{
@@ -95,8 +95,7 @@ impl PeerReport {
         };
         for label in image.quads.iter().filter(|l| l.landmark.is_some()) {
             let right = usize::from(named.iter().any(|n| is_of(label, n)));
-            let is_picture =
-                label.class.as_deref().is_some_and(|kind| super::score::PICTURES.contains(&kind));
+            let is_picture = label.class.as_deref().is_some_and(|kind| PICTURES.contains(&kind));
             match view(label) {
                 Some(View::Full) => {
                     self.full_views += 1;

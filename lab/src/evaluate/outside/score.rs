@@ -33,7 +33,7 @@ const MAX_ANGLE_DEG: f64 = 70.0;
 /// What can be asked of a labelled quad.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum View {
-    /// Wholly in view, large and steep enough.
+    /// Wholly in view, large enough and near enough to its normal.
     Full,
     /// Cut by the image border, or hidden in part.
     Partial,
@@ -136,10 +136,10 @@ pub(super) fn score(world: &World, image: &TruthImage, map: &MapSnapshot, r: &Re
 
 /// What can be asked of it; `None` where it is too small or too oblique.
 pub(super) fn view(quad: &TruthQuad) -> Option<View> {
-    let large = quad.corners.min_side_px() >= MIN_SIDE_PX;
-    let steep = quad.view_angle_rad.is_none_or(|angle| angle.to_degrees() <= MAX_ANGLE_DEG);
+    let is_large = quad.corners.min_side_px() >= MIN_SIDE_PX;
+    let is_near_normal = quad.view_angle_rad.is_none_or(|angle| angle.to_degrees() <= MAX_ANGLE_DEG);
     match quad.state {
-        _ if !large || !steep => None,
+        _ if !is_large || !is_near_normal => None,
         QuadState::Full => quad.counted.then_some(View::Full),
         QuadState::Truncated | QuadState::Occluded => Some(View::Partial),
     }
@@ -203,12 +203,8 @@ fn unique(r: &Recognised) -> impl Iterator<Item = (usize, &QuadAnswer, Corners)>
 }
 
 fn wrong_names(world: &World, image: &TruthImage, r: &Recognised) -> Vec<WrongName> {
-    let on = |corners: &Corners| {
-        let there: Vec<&TruthQuad> = image.quads.iter().filter(|l| is_on(&l.corners, corners)).collect();
-        there
-    };
     let wrong = |(_, answer, corners): (usize, &QuadAnswer, Corners)| {
-        let there = on(&corners);
+        let there: Vec<&TruthQuad> = image.quads.iter().filter(|l| is_on(&l.corners, &corners)).collect();
         let is_right = |l: &&TruthQuad| {
             l.landmark.as_ref().is_some_and(|l| world.truth.same_landmark(l, &answer.landmark))
         };

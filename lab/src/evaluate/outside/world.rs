@@ -105,7 +105,22 @@ impl World {
                 frame.intrinsics(sigmas).map_err(|problem| wrong(format!("frames[{i}].fx"), problem))?;
             cameras.insert(frame.file.clone(), CameraTruth { camera_from_world: pose, intrinsics });
         }
-        Ok(Self { truth, landmarks, cameras })
+        let world = Self { truth, landmarks, cameras };
+        world.complete().map_err(|(field, problem)| wrong(field.to_owned(), problem))?;
+        Ok(world)
+    }
+
+    /// Every picture has a camera and every taught landmark a pose: figures without them would leave out in silence.
+    fn complete(&self) -> Result<(), (&'static str, String)> {
+        let mut shown = self.truth.images.iter().filter(|image| !image.whole_image);
+        if let Some(image) = shown.find(|image| !self.cameras.contains_key(&image.file)) {
+            return Err(("frames", format!("none is of {}, which truth.json shows", image.file)));
+        }
+        let mut taught = self.truth.teach.iter();
+        if let Some((_, name)) = taught.find(|(_, name)| !self.landmarks.contains_key(name)) {
+            return Err(("landmarks", format!("none is {name}, which truth.json teaches")));
+        }
+        Ok(())
     }
 }
 
