@@ -1,10 +1,13 @@
-//! Picture files in, grey images out, and the other way round for the demo's robots.
+//! Picture files in, pictures out, and the other way round for the demo's robots.
 
 use anyhow::Context as _;
 use engine::decode::{ImageLimits, decode_upload};
 use image::ImageEncoder as _;
 use std::{fs::File, io::Read as _, path::Path};
-use vision::{detect::DetectParams, frame::GrayImage};
+use vision::{
+    detect::DetectParams,
+    frame::{GrayImage, Picture},
+};
 
 /// Quality of the demo's JPEG frames: a VGA frame stays below one zenoh batch.
 const JPEG_QUALITY: u8 = 85;
@@ -20,8 +23,13 @@ pub enum PictureError {
     Refused(String),
 }
 
-/// Reads and decodes a PNG or JPEG file. No more of it is read than the upload limit allows.
+/// The grey levels of a PNG or JPEG file, see [`read_picture`].
 pub fn read(path: &Path) -> Result<GrayImage, PictureError> {
+    Ok(read_picture(path)?.into_grey())
+}
+
+/// Reads and decodes a PNG or JPEG file, in colour if it has any. No more of it is read than the upload limit allows.
+pub fn read_picture(path: &Path) -> Result<Picture, PictureError> {
     let limits = ImageLimits::UPLOAD;
     let mut bytes = Vec::new();
     // One byte more than allowed is enough for the decoder to refuse it.

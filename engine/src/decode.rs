@@ -1,9 +1,12 @@
-//! Decodes images. In: encoded bytes. Out: a checked grey image within limits of bytes and pixels. Nothing else calls the
-//! decoders: the size is read from the header and checked before any pixel is unpacked, and metadata is ignored. JPEG gives
-//! luma directly; the colours of PNG and of raw pixels are weighted as JPEG weights them, so that all give the same grey.
+//! Decodes images. In: encoded bytes. Out: a checked picture, grey or in colour, within limits of bytes and pixels. Nothing
+//! else calls the decoders: the size is read from the header and checked before any pixel is unpacked, and metadata is
+//! ignored. The grey level of JPEG is its luma; the colours of PNG and of raw pixels are weighted as JPEG weights them, so
+//! that all give the same grey.
 
+mod colour;
 pub mod mosaic;
 
+use colour::{from_rgb, from_ycbcr, plane};
 use image::{ColorType, ImageDecoder, Limits, codecs::png::PngDecoder};
 use mosaic::mosaic;
 use protos::{
@@ -11,7 +14,7 @@ use protos::{
     convert::{EncodedImage, Encoding, Pixels},
 };
 use std::io::Cursor;
-use vision::frame::{GrayImage, MAX_SIDE_PX};
+use vision::frame::{MAX_SIDE_PX, Picture};
 use zune_jpeg::{
     JpegDecoder,
     zune_core::{bytestream::ZCursor, colorspace::ColorSpace, options::DecoderOptions},
@@ -21,6 +24,8 @@ use zune_jpeg::{
 pub const MAX_JPEG_SCANS: usize = 64;
 /// Memory that a PNG may take for each pixel: 16-bit RGBA.
 const PNG_BYTES_PER_PX: usize = 8;
+/// Memory that a decoded picture takes for each pixel: grey and three planes of colour.
+pub const PICTURE_BYTES_PER_PX: usize = 1 + vision::frame::COLOUR_PLANES;
 /// Bytes before the first chunk of a PNG.
 const PNG_SIGNATURE_BYTES: usize = 8;
 /// Memory for a PNG's rows, palette and metadata besides its pixels.
@@ -45,38 +50,38 @@ impl ImageLimits {
     pub const UPLOAD: Self = Self { bytes: 16 << 20, pixels: vision::frame::MAX_AREA_PX };
 }
 
-/// The grey image of a frame; of quads, their [`mosaic()`]. Errors: over the limits, not of the claimed encoding and size, or
+/// The picture of a frame; of quads, their [`mosaic()`]. Errors: over the limits, not of the claimed encoding and size, or
 /// not decodable.
-pub fn decode_frame(frame: &CheckedFrame, limits: ImageLimits) -> Result<GrayImage, Rejection> {
+pub fn decode_frame(frame: &CheckedFrame, limits: ImageLimits) -> Result<Picture, Rejection> {
     let claimed = (frame.width_px as usize, frame.height_px as usize);
     match &frame.pixels {
         Pixels::Image(image) => decode_image(image, claimed, limits),
         Pixels::Quads(quads) => {
             check_size(claimed, limits)?;
-            mosaic(quads, claimed, limits)
+            Ok(mosaic(quads, claimed, limits)?.into())
         }
     }
 }
 
-/// A grey image of a claimed size. Errors: those of [`decode_frame`].
+/// A picture of a claimed size. Errors: those of [`decode_frame`].
 pub(super) fn decode_image(
     EncodedImage { encoding, bytes }: &EncodedImage,
     claimed: (usize, usize),
     limits: ImageLimits,
-) -> Result<GrayImage, Rejection> {
+) -> Result<Picture, Rejection> {
     check_bytes(bytes, limits)?;
     check_size(claimed, limits)?;
     match encoding {
-        Encoding::Gray8 => gray(claimed, bytes.to_vec()),
-        Encoding::Rgb8 => gray(claimed, from_rgb(bytes)),
-        Encoding::Bgr8 => gray(claimed, from_bgr(bytes)),
+        Encoding::Gray8 => Ok(plane(claimed, bytes.to_vec())?.into()),
+        Encoding::Rgb8 => from_rgb::<3>(claimed, bytes, [0, 1, 2]),
+        Encoding::Bgr8 => from_rgb::<3>(claimed, bytes, [2, 1, 0]),
         Encoding::Jpeg => jpeg(bytes, Some(claimed), limits),
         Encoding::Png => png(bytes, Some(claimed), limits),
     }
 }
 
-/// The grey image of an uploaded file, JPEG or PNG by its first bytes. Errors: over the limits, or not decodable.
-pub fn decode_upload(bytes: &[u8], limits: ImageLimits) -> Result<GrayImage, Rejection> {
+/// The picture of an uploaded file, JPEG or PNG by its first bytes. Errors: over the limits, or not decodable.
+pub fn decode_upload(bytes: &[u8], limits: ImageLimits) -> Result<Picture, Rejection> {
     check_bytes(bytes, limits)?;
     match sniff(bytes) {
         Some(Encoding::Jpeg) => jpeg(bytes, None, limits),
@@ -96,7 +101,7 @@ pub fn sniff(bytes: &[u8]) -> Option<Encoding> {
     }
 }
 
-fn jpeg(bytes: &[u8], claimed: Option<(usize, usize)>, limits: ImageLimits) -> Result<GrayImage, Rejection> {
+fn jpeg(bytes: &[u8], claimed: Option<(usize, usize)>, limits: ImageLimits) -> Result<Picture, Rejection> {
     if sniff(bytes) != Some(Encoding::Jpeg) {
         return Err(Rejection::new(Code::WrongEncoding, "image", "claimed as JPEG, but it is none"));
     }
@@ -105,23 +110,27 @@ fn jpeg(bytes: &[u8], claimed: Option<(usize, usize)>, limits: ImageLimits) -> R
         .set_strict_mode(true)
         .set_max_width(MAX_SIDE_PX)
         .set_max_height(MAX_SIDE_PX)
-        .jpeg_set_max_scans(MAX_JPEG_SCANS)
-        .jpeg_set_out_colorspace(ColorSpace::Luma);
+        .jpeg_set_max_scans(MAX_JPEG_SCANS);
     let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes), options);
     decoder.decode_headers().map_err(|e| bad("JPEG", &e))?;
     let size = decoder.dimensions().ok_or_else(|| bad("JPEG", &"no size in its header"))?;
     check_claim(size, claimed)?;
     check_size(size, limits)?;
-    if matches!(decoder.input_colorspace(), Some(ColorSpace::YCbCr | ColorSpace::Luma)) {
-        return gray(size, decoder.decode().map_err(|e| bad("JPEG", &e))?);
+    // Luma is taken as it is in the file. Rare colour spaces (RGB, CMYK) go through RGB.
+    let space = match decoder.input_colorspace() {
+        Some(space @ (ColorSpace::YCbCr | ColorSpace::Luma)) => space,
+        _ => ColorSpace::RGB,
+    };
+    decoder.set_options(options.jpeg_set_out_colorspace(space));
+    let pixels = decoder.decode().map_err(|e| bad("JPEG", &e))?;
+    match space {
+        ColorSpace::Luma => Ok(plane(size, pixels)?.into()),
+        ColorSpace::YCbCr => from_ycbcr(size, &pixels),
+        _ => from_rgb::<3>(size, &pixels, [0, 1, 2]),
     }
-    // Rare colour spaces (RGB, CMYK) go through RGB.
-    decoder.set_options(options.jpeg_set_out_colorspace(ColorSpace::RGB));
-    let rgb = decoder.decode().map_err(|e| bad("JPEG", &e))?;
-    gray(size, from_rgb(&rgb))
 }
 
-fn png(bytes: &[u8], claimed: Option<(usize, usize)>, limits: ImageLimits) -> Result<GrayImage, Rejection> {
+fn png(bytes: &[u8], claimed: Option<(usize, usize)>, limits: ImageLimits) -> Result<Picture, Rejection> {
     if sniff(bytes) != Some(Encoding::Png) {
         return Err(Rejection::new(Code::WrongEncoding, "image", "claimed as PNG, but it is none"));
     }
@@ -144,7 +153,7 @@ fn png(bytes: &[u8], claimed: Option<(usize, usize)>, limits: ImageLimits) -> Re
     let colours = decoder.color_type();
     let mut raw = vec![0; size.0 * size.1 * usize::from(colours.bytes_per_pixel())];
     decoder.read_image(&mut raw).map_err(|e| bad("PNG", &e))?;
-    gray(size, to_gray(&raw, colours)?)
+    of_png(size, &raw, colours)
 }
 
 /// The decoder panics on a palette that is no whole number of colours (png 0.18.1).
@@ -165,45 +174,25 @@ fn check_palette(bytes: &[u8]) -> Result<(), Rejection> {
     Ok(())
 }
 
-/// Colours to grey; transparency is ignored.
-fn to_gray(raw: &[u8], colours: ColorType) -> Result<Vec<u8>, Rejection> {
+/// Pixels of a PNG as a picture; transparency is ignored.
+fn of_png(size: (usize, usize), raw: &[u8], colours: ColorType) -> Result<Picture, Rejection> {
     // 16-bit samples come in native byte order: the high byte is the 8-bit sample.
-    let high = |sample: &[u8]| (u16::from_ne_bytes([sample[0], sample[1]]) >> 8) as u8;
-    Ok(match colours {
-        ColorType::L8 => raw.to_vec(),
-        ColorType::La8 => raw.chunks_exact(2).map(|p| p[0]).collect(),
-        ColorType::Rgb8 => from_rgb(raw),
-        ColorType::Rgba8 => raw.chunks_exact(4).map(|p| luma(p[0], p[1], p[2])).collect(),
-        ColorType::L16 => raw.chunks_exact(2).map(high).collect(),
-        ColorType::La16 => raw.chunks_exact(4).map(high).collect(),
-        ColorType::Rgb16 => {
-            raw.chunks_exact(6).map(|p| luma(high(p), high(&p[2..]), high(&p[4..]))).collect()
-        }
-        ColorType::Rgba16 => {
-            raw.chunks_exact(8).map(|p| luma(high(p), high(&p[2..]), high(&p[4..]))).collect()
-        }
-        other => return Err(bad("PNG", &format!("colours {other:?} are not supported"))),
-    })
-}
-
-/// Grey of pixels of red, green and blue.
-fn from_rgb(pixels: &[u8]) -> Vec<u8> {
-    pixels.chunks_exact(3).map(|p| luma(p[0], p[1], p[2])).collect()
-}
-
-/// Grey of pixels of blue, green and red.
-fn from_bgr(pixels: &[u8]) -> Vec<u8> {
-    pixels.chunks_exact(3).map(|p| luma(p[2], p[1], p[0])).collect()
-}
-
-/// ITU-R BT.601 luma, the Y of JPEG, in 16-bit fixed point (the weights add up to 65 536).
-fn luma(r: u8, g: u8, b: u8) -> u8 {
-    ((19_595 * u32::from(r) + 38_470 * u32::from(g) + 7_471 * u32::from(b) + 32_768) >> 16) as u8
-}
-
-/// An image of pixels. Error: not as many as the size says.
-pub(super) fn gray((width, height): (usize, usize), data: Vec<u8>) -> Result<GrayImage, Rejection> {
-    GrayImage::new(width, height, data).map_err(|e| Rejection::new(Code::BadImage, "image", e.to_string()))
+    let high = usize::from(cfg!(target_endian = "little"));
+    let wide = [high, high + 2, high + 4];
+    let grey = |bytes: usize, place: usize| {
+        Ok(plane(size, raw.chunks_exact(bytes).map(|pixel| pixel[place]).collect())?.into())
+    };
+    match colours {
+        ColorType::L8 => grey(1, 0),
+        ColorType::La8 => grey(2, 0),
+        ColorType::L16 => grey(2, high),
+        ColorType::La16 => grey(4, high),
+        ColorType::Rgb8 => from_rgb::<3>(size, raw, [0, 1, 2]),
+        ColorType::Rgba8 => from_rgb::<4>(size, raw, [0, 1, 2]),
+        ColorType::Rgb16 => from_rgb::<6>(size, raw, wide),
+        ColorType::Rgba16 => from_rgb::<8>(size, raw, wide),
+        other => Err(bad("PNG", &format!("colours {other:?} are not supported"))),
+    }
 }
 
 fn check_bytes(bytes: &[u8], limits: ImageLimits) -> Result<(), Rejection> {

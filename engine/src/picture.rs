@@ -1,4 +1,4 @@
-//! Uploaded pictures. In: bytes of a file. Out: a grey image, upright by the orientation that the file states. Also grey
+//! Uploaded pictures. In: bytes of a file. Out: a picture, upright by the orientation that the file states. Also grey
 //! images to PNG, for pages. [`super::decode`] decodes and holds the limits.
 
 use super::decode::{self, ImageLimits};
@@ -7,9 +7,9 @@ use image::{
     codecs::{jpeg::JpegDecoder, png::PngEncoder},
     metadata::Orientation,
 };
-use protos::{Code, Rejection, convert::Encoding};
+use protos::{Rejection, convert::Encoding};
 use std::io::Cursor;
-use vision::frame::GrayImage;
+use vision::frame::{GrayImage, Picture};
 
 /// `png` or `jpeg`, by the first bytes.
 pub fn kind(bytes: &[u8]) -> Option<&'static str> {
@@ -21,11 +21,11 @@ pub fn kind(bytes: &[u8]) -> Option<&'static str> {
 }
 
 /// Decodes an uploaded picture and turns it upright. Errors: those of [`decode::decode_upload`].
-pub fn decode(bytes: &[u8], limits: ImageLimits) -> Result<GrayImage, Rejection> {
-    let gray = decode::decode_upload(bytes, limits)?;
+pub fn decode(bytes: &[u8], limits: ImageLimits) -> Result<Picture, Rejection> {
+    let picture = decode::decode_upload(bytes, limits)?;
     match orientation(bytes) {
-        Orientation::NoTransforms => Ok(gray),
-        orientation => turned(&gray, orientation),
+        Orientation::NoTransforms => Ok(picture),
+        orientation => Ok(picture.map(|plane| turned(plane, orientation))),
     }
 }
 
@@ -39,15 +39,17 @@ fn orientation(bytes: &[u8]) -> Orientation {
     }
 }
 
-fn turned(gray: &GrayImage, orientation: Orientation) -> Result<GrayImage, Rejection> {
-    let bad = || Rejection::new(Code::BadImage, "image", "it cannot be turned upright");
-    let (width, height) = (gray.width() as u32, gray.height() as u32);
-    let buffer = image::GrayImage::from_raw(width, height, gray.data().to_vec()).ok_or_else(bad)?;
-    let mut image = DynamicImage::ImageLuma8(buffer);
-    image.apply_orientation(orientation);
-    let turned = image.into_luma8();
-    let (width, height) = (turned.width() as usize, turned.height() as usize);
-    GrayImage::new(width, height, turned.into_raw()).map_err(|_size| bad())
+fn turned(plane: &GrayImage, orientation: Orientation) -> GrayImage {
+    let (width, height) = (plane.width() as u32, plane.height() as u32);
+    let turned = image::GrayImage::from_raw(width, height, plane.data().to_vec()).and_then(|buffer| {
+        let mut image = DynamicImage::ImageLuma8(buffer);
+        image.apply_orientation(orientation);
+        let turned = image.into_luma8();
+        let (width, height) = (turned.width() as usize, turned.height() as usize);
+        GrayImage::new(width, height, turned.into_raw()).ok()
+    });
+    // A turned plane has as many pixels as before, so there is always one.
+    turned.unwrap_or_else(|| plane.clone())
 }
 
 /// A grey picture as PNG.
@@ -61,31 +63,41 @@ pub fn png(width: usize, height: usize, grey: &[u8]) -> Result<Vec<u8>, image::I
 mod tests {
     use super::*;
 
+    fn jpeg(pixel: fn(u32) -> [u8; 3]) -> Vec<u8> {
+        let mut jpeg = Cursor::new(Vec::new());
+        let image = image::RgbImage::from_fn(32, 16, |x, _| image::Rgb(pixel(x)));
+        image.write_to(&mut jpeg, image::ImageFormat::Jpeg).unwrap();
+        jpeg.into_inner()
+    }
+
     #[test]
     fn a_phone_held_upright_gives_an_upright_picture() {
-        let mut jpeg = Cursor::new(Vec::new());
-        image::RgbImage::from_fn(32, 16, |x, _| image::Rgb([(x * 8) as u8; 3]))
-            .write_to(&mut jpeg, image::ImageFormat::Jpeg)
-            .unwrap();
-        let jpeg = jpeg.into_inner();
-        let plain = decode(&jpeg, ImageLimits::UPLOAD).unwrap();
-        assert_eq!((plain.width(), plain.height()), (32, 16));
         // An Exif segment with orientation 6: turn by a quarter, clockwise.
-        let tiff = b"Exif\0\0MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0";
-        let mut noted = vec![0xff, 0xd8, 0xff, 0xe1, 0, (tiff.len() + 2) as u8];
-        noted.extend(tiff);
-        noted.extend(&jpeg[2..]);
-        let upright = decode(&noted, ImageLimits::UPLOAD).unwrap();
+        let noted = |jpeg: &[u8]| {
+            let tiff = b"Exif\0\0MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0";
+            let head = [0xff, 0xd8, 0xff, 0xe1, 0, (tiff.len() + 2) as u8];
+            [&head[..], tiff, &jpeg[2..]].concat()
+        };
+        let grey = jpeg(|x| [(x * 8) as u8; 3]);
+        let plain = decode(&grey, ImageLimits::UPLOAD).unwrap();
+        assert_eq!((plain.width(), plain.height()), (32, 16));
+        let upright = decode(&noted(&grey), ImageLimits::UPLOAD).unwrap();
         assert_eq!((upright.width(), upright.height()), (16, 32));
-        assert!(upright.at(8, 31) > upright.at(8, 0));
-        assert_eq!(kind(&noted), Some("jpeg"));
+        assert!(upright.grey().at(8, 31) > upright.grey().at(8, 0));
+        assert_eq!(kind(&noted(&grey)), Some("jpeg"));
+        // Every plane is turned.
+        let red = noted(&jpeg(|x| [(x * 8) as u8, 100, 100]));
+        let upright = decode(&red, ImageLimits::UPLOAD).unwrap();
+        let [red, ..] = upright.colour().unwrap();
+        assert_eq!((red.width(), red.height()), (16, 32));
+        assert!(red.at(8, 31) > 200 && red.at(8, 0) < 50);
     }
 
     #[test]
     fn png_comes_back() {
         let grey: Vec<u8> = (0..12).map(|i| i * 20).collect();
         let bytes = png(4, 3, &grey).unwrap();
-        assert_eq!(decode(&bytes, ImageLimits::UPLOAD).unwrap().data(), grey);
+        assert_eq!(decode(&bytes, ImageLimits::UPLOAD).unwrap().grey().data(), grey);
         assert_eq!(kind(&bytes), Some("png"));
         assert_eq!(kind(b"GIF89a"), None);
     }

@@ -331,7 +331,8 @@ pub struct QuadAnswer {
     /// The two solutions cannot be told apart by image error alone.
     #[prost(bool, tag = "12")]
     pub pose_ambiguous: bool,
-    /// Why no pose followed from a unique landmark: empty, no_intrinsics, no_size, degenerate.
+    /// Why no pose followed from a unique landmark: empty, no_intrinsics, no_size, degenerate, reprojection (the corners fit
+    /// no pose of a landmark of this size), border_unclear (two borders fit about equally well).
     #[prost(string, tag = "13")]
     pub pose_refusal: ::prost::alloc::string::String,
     /// Present where points decided.

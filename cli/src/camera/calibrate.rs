@@ -106,7 +106,7 @@ fn views_of_images(images: &[PathBuf], size: LandmarkSize) -> anyhow::Result<Vie
     let mut image_px = None;
     for path in detect::files(images)? {
         let name = path.display().to_string();
-        let image = pictures::read(&path).with_context(|| name.clone())?;
+        let image = pictures::read_picture(&path).with_context(|| name.clone())?;
         let here = [image.width(), image.height()];
         anyhow::ensure!(*image_px.get_or_insert(here) == here, "{name}: not as large as the first picture");
         match largest(&detect(&image, &DetectParams::default(), &mut NoTrace)) {

@@ -14,7 +14,7 @@ use std::{
 };
 use vision::{
     detect::{DetectParams, Quad, detect},
-    frame::GrayImage,
+    frame::Picture,
 };
 
 /// `waymark detect`.
@@ -69,8 +69,8 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let images = files(&args.images)?;
     // Lines of results on a terminal show how far it is; a bar would only disturb them.
     for path in &images {
-        let gray = match pictures::read(path) {
-            Ok(gray) => gray,
+        let picture = match pictures::read_picture(path) {
+            Ok(picture) => picture,
             Err(error) => {
                 screen::complain(&format!("waymark: {}: {error}", path.display()));
                 status = ExitCode::FAILURE;
@@ -78,10 +78,10 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<ExitCode> {
             }
         };
         let mut stopwatch = Stopwatch::start();
-        let quads = detect(&gray, &params, &mut stopwatch);
-        show(path, &gray, &quads, stopwatch, args.json)?;
+        let quads = detect(&picture, &params, &mut stopwatch);
+        show(path, &picture, &quads, stopwatch, args.json)?;
         if let Some(drawings) = &mut drawings {
-            drawings.add(path, &gray, &params)?;
+            drawings.add(path, &picture, &params)?;
         }
     }
     Ok(status)
@@ -108,9 +108,9 @@ pub(crate) fn files(named: &[PathBuf]) -> anyhow::Result<Vec<PathBuf>> {
     Ok(all)
 }
 
-fn show(path: &Path, gray: &GrayImage, quads: &[Quad], watch: Stopwatch, json: bool) -> anyhow::Result<()> {
+fn show(path: &Path, picture: &Picture, quads: &[Quad], watch: Stopwatch, json: bool) -> anyhow::Result<()> {
     let name = path.display().to_string();
-    let (width, height) = (gray.width(), gray.height());
+    let (width, height) = (picture.width(), picture.height());
     if json {
         let quads = quads.iter().map(quad_line).collect();
         let line = Line { image: name, width, height, quads, timings_ms: watch.ms };
@@ -137,12 +137,12 @@ impl<'a> Drawings<'a> {
         Ok(Self { folder, stems: BTreeMap::new() })
     }
 
-    fn add(&mut self, path: &Path, gray: &GrayImage, params: &DetectParams) -> anyhow::Result<()> {
+    fn add(&mut self, path: &Path, picture: &Picture, params: &DetectParams) -> anyhow::Result<()> {
         let stem = path.file_stem().map_or("image".into(), |s| s.to_string_lossy().into_owned());
         let count = self.stems.entry(stem.clone()).or_default();
         *count += 1;
         let stem = if *count > 1 { format!("{stem}_{count}") } else { stem };
-        draw::write(self.folder, &stem, &Record::of(gray, params))
+        draw::write(self.folder, &stem, &Record::of(picture, params))
     }
 }
 

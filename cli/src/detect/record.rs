@@ -9,14 +9,14 @@ use vision::{
         relaxation::similarity::SegmentPair,
         segments::{chains::EdgeChain, edge_segments::EdgeSegment},
     },
-    frame::GrayImage,
+    frame::{GrayImage, Picture},
     trace::Trace,
 };
 
 /// The stages of one image. All but the quads are in pixels of `work`.
 #[derive(Debug, Clone)]
 pub(crate) struct Record {
-    /// The image that the stages worked on: reduced, where the working scale is.
+    /// The picture that the stages worked on, in grey: reduced, where the working scale is.
     pub(crate) work: GrayImage,
     /// How many pixels of the image make one of `work`.
     pub(crate) factor: usize,
@@ -31,9 +31,9 @@ pub(crate) struct Record {
 
 impl Record {
     /// Detects once more and records everything.
-    pub(crate) fn of(image: &GrayImage, params: &DetectParams) -> Self {
+    pub(crate) fn of(picture: &Picture, params: &DetectParams) -> Self {
         let mut record = Self {
-            work: image.clone(),
+            work: picture.grey().clone(),
             factor: 1,
             edges: EdgeMap::default(),
             chains: vec![],
@@ -43,11 +43,11 @@ impl Record {
             seeds: vec![],
             quads: vec![],
         };
-        detect(image, params, &mut record);
+        detect(picture, params, &mut record);
         // Both ways of grouping have their own scale; the edges say which it was.
         let width = record.edges.width().max(1);
-        record.factor = (image.width() / width).max(1);
-        record.work = pyramid::reduce(image, record.factor);
+        record.factor = (picture.width() / width).max(1);
+        record.work = pyramid::reduce(picture.grey(), record.factor);
         record
     }
 }

@@ -1,7 +1,8 @@
-//! The image of a frame of which a robot sent quads alone. In: patches. Out: an image of the frame's size with their pixels,
-//! plain elsewhere, so that what follows is the same as for a whole frame.
+//! The image of a frame of which a robot sent quads alone. In: patches. Out: a grey image of the frame's size with their
+//! pixels, plain elsewhere, so that what follows is the same as for a whole frame. Colour serves the detection, which the
+//! robot has done.
 
-use super::{ImageLimits, decode_image};
+use super::{ImageLimits, colour::plane, decode_image};
 use protos::{Rejection, convert::CheckedQuad};
 use vision::frame::GrayImage;
 
@@ -18,14 +19,14 @@ pub fn mosaic(
     for (i, CheckedQuad { patch, .. }) in quads.iter().enumerate() {
         let claimed = (patch.width_px as usize, patch.height_px as usize);
         let pixels = decode_image(&patch.image, claimed, limits);
-        let pixels = pixels.map_err(|r| r.inside(&format!("quads[{i}].patch")))?;
+        let pixels = pixels.map_err(|r| r.inside(&format!("quads[{i}].patch")))?.into_grey();
         let (left, top) = (patch.left_px as usize, patch.top_px as usize);
         for (row, line) in (top..).zip(pixels.data().chunks_exact(claimed.0)) {
             let from = row * width + left;
             data[from..from + claimed.0].copy_from_slice(line);
         }
     }
-    super::gray((width, height), data)
+    plane((width, height), data)
 }
 
 #[cfg(test)]

@@ -26,7 +26,7 @@ fn frame(encoding: v1::ImageEncoding, width_px: u32, height_px: u32, image: Vec<
     CheckedFrame::try_from(wire).unwrap()
 }
 
-fn refused(result: Result<GrayImage, Rejection>) -> (Code, String) {
+fn refused(result: Result<Picture, Rejection>) -> (Code, String) {
     let r = result.unwrap_err();
     (r.code, r.field)
 }
@@ -37,10 +37,10 @@ fn jpeg_and_png_of_one_picture_give_the_same_grey() {
     let png = decode_upload(&as_png(&raw, 64, 48, ExtendedColorType::Rgb8), ImageLimits::UPLOAD).unwrap();
     let jpeg = decode_upload(&as_jpeg(&raw, 64, 48, ExtendedColorType::Rgb8), ImageLimits::UPLOAD).unwrap();
     assert_eq!((png.width(), png.height()), (64, 48));
-    let worst = png.data().iter().zip(jpeg.data()).map(|(a, b)| a.abs_diff(*b)).max().unwrap();
+    let worst = png.grey().data().iter().zip(jpeg.grey().data()).map(|(a, b)| a.abs_diff(*b)).max().unwrap();
     assert!(worst <= 4, "{worst} levels apart");
     // Against the weights in floating point.
-    for (p, y) in raw.chunks_exact(3).zip(png.data()) {
+    for (p, y) in raw.chunks_exact(3).zip(png.grey().data()) {
         let exact = 0.299 * f64::from(p[0]) + 0.587 * f64::from(p[1]) + 0.114 * f64::from(p[2]);
         assert!((exact - f64::from(*y)).abs() < 0.51);
     }
@@ -50,24 +50,24 @@ fn jpeg_and_png_of_one_picture_give_the_same_grey() {
 fn every_depth_and_colour_of_png_is_read() {
     let grey: Vec<u8> = (0..12).map(|i| i * 20).collect();
     let l8 = as_png(&grey, 4, 3, ExtendedColorType::L8);
-    assert_eq!(decode_upload(&l8, ImageLimits::UPLOAD).unwrap().data(), grey);
+    assert_eq!(decode_upload(&l8, ImageLimits::UPLOAD).unwrap().grey().data(), grey);
     let la8: Vec<u8> = grey.iter().flat_map(|g| [*g, 9]).collect();
     let la8 = as_png(&la8, 4, 3, ExtendedColorType::La8);
-    assert_eq!(decode_upload(&la8, ImageLimits::UPLOAD).unwrap().data(), grey);
+    assert_eq!(decode_upload(&la8, ImageLimits::UPLOAD).unwrap().grey().data(), grey);
     let wide: Vec<u8> = grey.iter().flat_map(|g| u16::from_be_bytes([*g, 77]).to_ne_bytes()).collect();
     let l16 = as_png(&wide, 4, 3, ExtendedColorType::L16);
-    assert_eq!(decode_upload(&l16, ImageLimits::UPLOAD).unwrap().data(), grey);
+    assert_eq!(decode_upload(&l16, ImageLimits::UPLOAD).unwrap().grey().data(), grey);
     let rgba: Vec<u8> = grey.iter().flat_map(|g| [*g, *g, *g, 0]).collect();
     let rgba = as_png(&rgba, 4, 3, ExtendedColorType::Rgba8);
-    assert_eq!(decode_upload(&rgba, ImageLimits::UPLOAD).unwrap().data(), grey);
+    assert_eq!(decode_upload(&rgba, ImageLimits::UPLOAD).unwrap().grey().data(), grey);
     let rgb16: Vec<u8> = wide.chunks_exact(2).flat_map(|s| s.repeat(3)).collect();
     let rgb16 = as_png(&rgb16, 4, 3, ExtendedColorType::Rgb16);
-    assert_eq!(decode_upload(&rgb16, ImageLimits::UPLOAD).unwrap().data(), grey);
+    assert_eq!(decode_upload(&rgb16, ImageLimits::UPLOAD).unwrap().grey().data(), grey);
 }
 
 /// Every level of each colour, and mixtures.
 #[test]
-fn raw_colour_gives_the_grey_of_the_same_png() {
+fn raw_colour_gives_the_planes_of_the_same_png() {
     let rgb: Vec<u8> = (0..64 * 48_u32)
         .flat_map(|i| [(i % 256) as u8, (i * 7 / 3 % 256) as u8, (i * i % 251) as u8])
         .collect();
@@ -75,8 +75,64 @@ fn raw_colour_gives_the_grey_of_the_same_png() {
     let png = as_png(&rgb, 64, 48, ExtendedColorType::Rgb8);
     let decode = |encoding, image| decode_frame(&frame(encoding, 64, 48, image), ImageLimits::FRAME).unwrap();
     let expected = decode(v1::ImageEncoding::Png, png);
-    assert_eq!(decode(v1::ImageEncoding::Rgb8, rgb), expected);
+    let planes = expected.colour().unwrap().each_ref().map(|plane| plane.data().to_vec());
+    for (place, plane) in planes.iter().enumerate() {
+        assert!(plane.iter().eq(rgb.iter().skip(place).step_by(3)));
+    }
+    assert_eq!(decode(v1::ImageEncoding::Rgb8, rgb.clone()), expected);
     assert_eq!(decode(v1::ImageEncoding::Bgr8, bgr), expected);
+    let with_alpha = |high: u8| -> Vec<u8> {
+        let sample =
+            |s: u8| if high == 0 { vec![s] } else { u16::from_be_bytes([s, high]).to_ne_bytes().to_vec() };
+        rgb.chunks_exact(3).flat_map(|p| [p[0], p[1], p[2], 7].into_iter().flat_map(sample)).collect()
+    };
+    for (colours, raw) in
+        [(ExtendedColorType::Rgba8, with_alpha(0)), (ExtendedColorType::Rgba16, with_alpha(77))]
+    {
+        let image = as_png(&raw, 64, 48, colours);
+        assert_eq!(decode(v1::ImageEncoding::Png, image), expected, "{colours:?}");
+    }
+}
+
+#[test]
+fn a_colour_jpeg_gives_the_colours_and_the_luma_that_it_has() {
+    let raw = rgb(64, 48);
+    let file = as_jpeg(&raw, 64, 48, ExtendedColorType::Rgb8);
+    let picture = decode_upload(&file, ImageLimits::UPLOAD).unwrap();
+    let planes = picture.colour().unwrap();
+    let worst = raw.chunks_exact(3).enumerate().flat_map(|(i, pixel)| {
+        let (u, v) = (i % 64, i / 64);
+        planes.iter().zip(pixel).map(move |(plane, level)| plane.at(u, v).abs_diff(*level))
+    });
+    let worst = worst.max().unwrap();
+    assert!(worst <= 12, "{worst} levels apart");
+    // Grey is luma, bit for bit, as a decoder gives it that leaves the colours out.
+    let options = DecoderOptions::default().jpeg_set_out_colorspace(ColorSpace::Luma);
+    let luma = JpegDecoder::new_with_options(ZCursor::new(&file[..]), options).decode().unwrap();
+    assert_eq!(picture.grey().data(), luma);
+}
+
+#[test]
+fn grey_files_and_colour_files_of_grey_give_grey_pictures() {
+    let grey: Vec<u8> = (0..64 * 48_u32).map(|i| (i % 64 * 3) as u8).collect();
+    let tripled: Vec<u8> = grey.iter().flat_map(|g| [*g; 3]).collect();
+    let (l8, rgb8) = (ExtendedColorType::L8, ExtendedColorType::Rgb8);
+    let files = [as_png(&grey, 64, 48, l8), as_png(&tripled, 64, 48, rgb8), as_jpeg(&grey, 64, 48, l8)];
+    for file in files.iter().chain([&as_jpeg(&tripled, 64, 48, rgb8)]) {
+        let picture = decode_upload(file, ImageLimits::UPLOAD).unwrap();
+        assert!(picture.colour().is_none());
+        assert_eq!(picture.bytes(), 64 * 48);
+    }
+    let raw = decode_frame(&frame(v1::ImageEncoding::Rgb8, 64, 48, tripled), ImageLimits::FRAME).unwrap();
+    assert_eq!(raw.grey().data(), grey);
+    assert!(raw.colour().is_none());
+}
+
+/// What `memory_ceiling_mb` counts on.
+#[test]
+fn a_colour_picture_takes_four_bytes_a_pixel() {
+    let picture = decode_upload(&as_jpeg(&rgb(64, 48), 64, 48, ExtendedColorType::Rgb8), ImageLimits::UPLOAD);
+    assert_eq!(picture.unwrap().bytes(), PICTURE_BYTES_PER_PX * 64 * 48);
 }
 
 /// The server's own limits hold for raw frames as for others.
@@ -99,7 +155,7 @@ fn frames_must_be_what_they_claim() {
     };
     assert_eq!(decode(v1::ImageEncoding::Jpeg, 40, 30, &jpeg).unwrap().width(), 40);
     assert_eq!(decode(v1::ImageEncoding::Png, 40, 30, &png).unwrap().height(), 30);
-    assert_eq!(decode(v1::ImageEncoding::Gray8, 3, 2, &[7; 6]).unwrap().data(), [7; 6]);
+    assert_eq!(decode(v1::ImageEncoding::Gray8, 3, 2, &[7; 6]).unwrap().grey().data(), [7; 6]);
     let wrong = |w, h| refused(decode(v1::ImageEncoding::Jpeg, w, h, &jpeg));
     assert_eq!(wrong(41, 30), (Code::SizeMismatch, "width_px".into()));
     assert_eq!(wrong(40, 31), (Code::SizeMismatch, "height_px".into()));
@@ -171,7 +227,7 @@ fn damaged_bytes_never_panic() {
                 let mut damaged = whole.clone();
                 damaged[at] = value;
                 match decode_upload(&damaged, ImageLimits::UPLOAD) {
-                    Ok(image) => assert_eq!(image.data().len(), image.width() * image.height()),
+                    Ok(image) => assert_eq!(image.grey().data().len(), image.width() * image.height()),
                     Err(refused) => assert!(!refused.detail.is_empty(), "{at}: {value}"),
                 }
             }

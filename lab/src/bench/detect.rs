@@ -15,7 +15,7 @@ use vision::{
         edges::edge_map,
         segments::{chains, edge_segments},
     },
-    frame::GrayImage,
+    frame::Picture,
     trace::{NoTrace, Stage, Trace},
 };
 
@@ -24,14 +24,19 @@ const EDGES: &str = "edges";
 const SEGMENTS: &str = "frame to segments";
 const QUADS: &str = "frame to quads";
 const PAPER: &str = "frame to quads, the paper's grouping";
+/// The same of a picture in colour.
+const COLOUR_EDGES: &str = "edges, in colour";
+const COLOUR_QUADS: &str = "frame to quads, in colour";
 
-/// Waymark's operation, the peer's, and the largest ratio aimed at, if any.
-const RATIOS: [(&str, &str, Option<f64>); 5] = [
+/// Waymark's operation, what it is compared with (a peer's, or another of Waymark's), and the largest ratio aimed at, if any.
+const RATIOS: [(&str, &str, Option<f64>); 7] = [
     (QUADS, "LSD", Some(0.25)),
     (QUADS, "ArUco", Some(0.6)),
     (SEGMENTS, "LSD", None),
     (SEGMENTS, "EDLines", None),
     (EDGES, "Canny", None),
+    (COLOUR_EDGES, EDGES, None),
+    (COLOUR_QUADS, QUADS, Some(1.3)),
 ];
 
 /// `waymark-lab bench detect`.
@@ -183,8 +188,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn peers(args: &Args, frames: &[GrayImage], folder: &std::path::Path) -> Option<Peers> {
-    match Peers::start(&args.python, frames, folder) {
+fn peers(args: &Args, frames: &[Picture], folder: &std::path::Path) -> Option<Peers> {
+    let grey: Vec<_> = frames.iter().map(|frame| frame.grey().clone()).collect();
+    match Peers::start(&args.python, &grey, folder) {
         Ok(peers) => Some(peers),
         Err(why) => {
             screen::complain(&format!("OpenCV is left out: {why}. To have it: {HINT}"));
@@ -193,14 +199,16 @@ fn peers(args: &Args, frames: &[GrayImage], folder: &std::path::Path) -> Option<
     }
 }
 
-/// Times Waymark's operations on one picture, each after a warm-up run. Returns the number of quads.
+/// Times Waymark's operations on one picture in grey, each after a warm-up run; on its colours, too, if it has any.
+/// Returns the number of quads.
 fn time_ours(
-    frame: &GrayImage,
+    picture: &Picture,
     params: &DetectParams,
     i: usize,
     ours: &mut Times,
     stages: &mut Times,
 ) -> usize {
+    let frame = picture.grey();
     let mut timed = |name: &str, work: &mut dyn FnMut()| {
         work();
         let clock = Clock::start();
@@ -222,6 +230,12 @@ fn time_ours(
     timed(PAPER, &mut || {
         black_box(detect_with(&mut memory, black_box(frame), &paper, &mut NoTrace));
     });
+    if picture.colour().is_some() {
+        timed(COLOUR_EDGES, &mut || edge_map::edges_into(black_box(picture), &params.edges, &mut edge_map));
+        timed(COLOUR_QUADS, &mut || {
+            black_box(detect_with(&mut memory, black_box(picture), params, &mut NoTrace));
+        });
+    }
     let mut clock = StageClock { last: Clock::start(), ms: BTreeMap::new() };
     detect_with(&mut memory, frame, params, &mut clock);
     for (stage, ms) in clock.ms {
@@ -232,7 +246,7 @@ fn time_ours(
 
 fn ratios(ours: &BTreeMap<String, Cost>, theirs: &BTreeMap<String, Cost>) -> Vec<Ratio> {
     let ratio = |(mine, peer, limit): (&str, &str, Option<f64>)| {
-        let (a, b) = (ours.get(mine)?, theirs.get(peer)?);
+        let (a, b) = (ours.get(mine)?, theirs.get(peer).or_else(|| ours.get(peer))?);
         let value = a.median_ms / b.median_ms;
         Some(Ratio { ours: mine.into(), peer: peer.into(), value, limit })
     };

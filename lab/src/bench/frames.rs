@@ -1,12 +1,12 @@
-//! Pictures to time detection on, all 640 x 480: robots' and visitors' photographs where the data is at hand, else
-//! rendered views.
+//! Pictures to time detection on, all 640 x 480, in colour where they have it: robots' and visitors' photographs where
+//! the data is at hand, else rendered views.
 
 use anyhow::Context as _;
 use cli::pictures;
-use image::{GrayImage as Buffer, imageops};
+use image::{GrayImage as Buffer, Luma, imageops};
 use sim::views::{Views, ViewsParams};
 use std::path::{Path, PathBuf};
-use vision::frame::GrayImage;
+use vision::frame::{GrayImage, Picture};
 
 const WIDTH: u32 = 640;
 const HEIGHT: u32 = 480;
@@ -18,7 +18,7 @@ const DATA: &str = "../shared/data";
 /// Pictures, and where they come from.
 pub(super) struct Frames {
     pub(super) from: String,
-    pub(super) frames: Vec<GrayImage>,
+    pub(super) frames: Vec<Picture>,
 }
 
 impl Frames {
@@ -34,15 +34,15 @@ impl Frames {
         let sources = if named.is_empty() { &sets } else { named };
         if sources.is_empty() {
             let params = ViewsParams { seed, views: count, ..ViewsParams::default() };
-            let frames = Views::new(&params).map(|view| view.image).collect();
+            let frames = Views::new(&params).map(|view| view.image.into()).collect();
             return Ok(Self { from: "rendered corridors".into(), frames });
         }
         let mut frames = Vec::new();
         for (i, source) in sources.iter().enumerate() {
             let share = count / sources.len() + usize::from(i < count % sources.len());
             for path in evenly(&below(source)?, share) {
-                let gray = pictures::read(path).with_context(|| path.display().to_string())?;
-                frames.push(vga(&gray)?);
+                let picture = pictures::read_picture(path).with_context(|| path.display().to_string())?;
+                frames.push(picture.map(vga));
             }
         }
         anyhow::ensure!(!frames.is_empty(), "no pictures to time on");
@@ -76,15 +76,14 @@ fn evenly<T>(items: &[T], count: usize) -> impl Iterator<Item = &T> {
     (0..count).map(move |i| &items[(2 * i + 1) * items.len() / (2 * count)])
 }
 
-/// The middle of the picture in the shape of a frame, as much as there is, brought to 640 x 480.
-fn vga(image: &GrayImage) -> anyhow::Result<GrayImage> {
-    let (width, height) = (image.width() as u32, image.height() as u32);
-    let buffer =
-        Buffer::from_raw(width, height, image.data().to_vec()).context("an image's size fits its data")?;
+/// The middle of a plane in the shape of a frame, as much as there is, brought to 640 x 480.
+fn vga(plane: &GrayImage) -> GrayImage {
+    let (width, height) = (plane.width() as u32, plane.height() as u32);
+    let buffer = Buffer::from_fn(width, height, |u, v| Luma([plane.at(u as usize, v as usize)]));
     let (w, h) = (width.min(height * WIDTH / HEIGHT).max(1), height.min(width * HEIGHT / WIDTH).max(1));
     let middle = imageops::crop_imm(&buffer, (width - w) / 2, (height - h) / 2, w, h).to_image();
     let frame = imageops::resize(&middle, WIDTH, HEIGHT, imageops::FilterType::Triangle);
-    Ok(GrayImage::new(WIDTH as usize, HEIGHT as usize, frame.into_raw())?)
+    GrayImage::from_fn(WIDTH as usize, HEIGHT as usize, |u, v| frame.get_pixel(u as u32, v as u32).0[0])
 }
 
 #[cfg(test)]
@@ -106,7 +105,7 @@ mod tests {
             let bright_middle = GrayImage::from_fn(w, h, |u, v| {
                 if u.abs_diff(w / 2) * 4 < w && v.abs_diff(h / 2) * 4 < h { 250 } else { 10 }
             });
-            let out = vga(&bright_middle).unwrap();
+            let out = vga(&bright_middle);
             assert_eq!((out.width(), out.height()), (640, 480));
             assert!(out.data()[240 * 640 + 320].abs_diff(250) < 2, "{w} x {h}");
         }

@@ -125,11 +125,12 @@ impl Data {
         min_side_px: f64,
     ) -> anyhow::Result<()> {
         let group = part as usize;
-        let gray = pictures::read(&image.path).with_context(|| image.path.display().to_string())?;
-        let factor = pyramid::working_factor(&gray, params.quads.working_side_px);
-        let work = pyramid::reduce(&gray, factor);
+        let picture =
+            pictures::read_picture(&image.path).with_context(|| image.path.display().to_string())?;
+        let factor = pyramid::working_factor(&picture, params.quads.working_side_px);
+        let work = picture.map(|plane| pyramid::reduce(plane, factor));
         let (rated, edges) = scored_quads(&work, params, &mut NoTrace);
-        let g = Gradients { image: &work, gx: edges.gx(), gy: edges.gy() };
+        let g = Gradients { image: work.grey(), gx: edges.gx(), gy: edges.gy() };
         let found = suppress_overlaps(rated.clone(), &params.quads);
         for quad in image.quads.iter().filter(|q| q.counts()) {
             let Some(label) = quad.corners.scaled(1.0 / factor as f64) else { continue };

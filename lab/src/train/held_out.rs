@@ -161,8 +161,9 @@ pub(super) fn evaluated(
     for (image, part) in set.images() {
         progress.inc(1);
         let Some(params) = params.get(part) else { continue };
-        let gray = pictures::read(&image.path).with_context(|| image.path.display().to_string())?;
-        scores.push(score(image, &gray, params, MIN_SIDE_PX, reviewed.quads(&image.file)));
+        let picture =
+            pictures::read_picture(&image.path).with_context(|| image.path.display().to_string())?;
+        scores.push(score(image, &picture, params, MIN_SIDE_PX, reviewed.quads(&image.file)));
     }
     progress.finish_and_clear();
     Ok(sums(title, &scores))

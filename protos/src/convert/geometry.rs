@@ -142,7 +142,7 @@ pub fn intrinsics(wire: &v1::Intrinsics) -> Result<Intrinsics, Rejection> {
             let code = if value.is_finite() { Code::OutOfRange } else { Code::NotFinite };
             Rejection::new(code, field, error.to_string())
         }
-        FrameError::Size { .. } | FrameError::Length { .. } => {
+        FrameError::Size { .. } | FrameError::Length { .. } | FrameError::Planes { .. } => {
             Rejection::new(Code::OutOfRange, "", error.to_string())
         }
     })

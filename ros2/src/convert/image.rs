@@ -1,4 +1,4 @@
-//! Images as grey rows, and the compression of compressed ones.
+//! Images as rows of grey levels or colours, and the compression of compressed ones.
 //!
 //! Source: `ros2/common_interfaces sensor_msgs/include/sensor_msgs/image_encodings.hpp`;
 //! `ros-perception/image_transport_plugins compressed_image_transport/src`.
@@ -22,10 +22,10 @@ pub enum PixelLayout {
         /// Bytes of a pixel.
         bytes: usize,
     },
-    /// `yuv422` (`uyvy`) and `yuv422_yuy2` (`yuyv`): two bytes a pixel, luma at this place.
-    Luma {
-        /// Place of the luma.
-        place: usize,
+    /// `yuv422` (`uyvy`) and `yuv422_yuy2` (`yuyv`): two bytes a pixel, luma and one of Cb and Cr, which two pixels share.
+    Yuv422 {
+        /// Place of the luma in a pixel, 0 or 1.
+        luma: usize,
     },
 }
 
@@ -39,8 +39,8 @@ impl PixelLayout {
             "bgr8" | "8UC3" => colour([2, 1, 0], 3),
             "rgba8" => colour([0, 1, 2], 4),
             "bgra8" | "8UC4" => colour([2, 1, 0], 4),
-            "yuv422" | "uyvy" => Some(Self::Luma { place: 1 }),
-            "yuv422_yuy2" | "yuyv" => Some(Self::Luma { place: 0 }),
+            "yuv422" | "uyvy" => Some(Self::Yuv422 { luma: 1 }),
+            "yuv422_yuy2" | "yuyv" => Some(Self::Yuv422 { luma: 0 }),
             _ => None,
         }
     }
@@ -48,18 +48,18 @@ impl PixelLayout {
     fn bytes(self) -> usize {
         match self {
             Self::Gray8 => 1,
-            Self::Gray16 { .. } | Self::Luma { .. } => 2,
+            Self::Gray16 { .. } | Self::Yuv422 { .. } => 2,
             Self::Colour { bytes, .. } => bytes,
         }
     }
 
-    /// Luma as JPEG has it (ITU-R BT.601), in the fixed point of the server's decoder (`engine/src/decode.rs`): a raw image
-    /// gives the grey of its PNG.
+    /// Luma as JPEG has it (ITU-R BT.601), in the fixed point of the server's decoder (`vision/src/frame/picture.rs`): a raw
+    /// image gives the grey of its PNG.
     fn gray(self, pixel: &[u8]) -> u8 {
         match self {
             Self::Gray8 => pixel[0],
             Self::Gray16 { is_big_endian } => pixel[usize::from(!is_big_endian)],
-            Self::Luma { place } => pixel[place],
+            Self::Yuv422 { luma } => pixel[luma],
             Self::Colour { places, .. } => {
                 let [r, g, b] = places.map(|place| u32::from(pixel[place]));
                 ((19_595 * r + 38_470 * g + 7_471 * b + 32_768) >> 16) as u8
@@ -143,9 +143,44 @@ impl<'a> ImageRows<'a> {
     /// Grey pixels, row-major without padding: at most as many as there are bytes.
     pub fn to_gray8(&self) -> Vec<u8> {
         let bytes = self.layout.bytes();
-        let rows = self.data.chunks(self.step).map(|row| &row[..self.width * bytes]);
-        rows.flat_map(|row| row.chunks_exact(bytes).map(|pixel| self.layout.gray(pixel))).collect()
+        self.rows().flat_map(|row| row.chunks_exact(bytes).map(|pixel| self.layout.gray(pixel))).collect()
     }
+
+    /// Pixels of red, green and blue, row-major without padding; none of a grey image.
+    pub fn to_rgb8(&self) -> Option<Vec<u8>> {
+        let bytes = self.layout.bytes();
+        match self.layout {
+            PixelLayout::Gray8 | PixelLayout::Gray16 { .. } => None,
+            PixelLayout::Colour { places, .. } => {
+                let pixels = self.rows().flat_map(|row| row.chunks_exact(bytes));
+                Some(pixels.flat_map(|pixel| places.map(|place| pixel[place])).collect())
+            }
+            PixelLayout::Yuv422 { luma } => {
+                let pairs = self.rows().flat_map(|row| row.chunks(2 * bytes));
+                Some(pairs.flat_map(|pair| rgb_of_pair(pair, luma)).collect())
+            }
+        }
+    }
+
+    fn rows(&self) -> impl Iterator<Item = &'a [u8]> {
+        let row_bytes = self.width * self.layout.bytes();
+        self.data.chunks(self.step).map(move |row| &row[..row_bytes])
+    }
+}
+
+/// No colour, as Cb or Cr.
+const NO_CHROMA: u8 = 128;
+
+/// Red, green and blue of two pixels that share Cb and Cr, or of a last one without Cr. As of JPEG (ITU-R BT.601, full
+/// range), so that the grey of the colours is the luma.
+fn rgb_of_pair(pair: &[u8], luma: usize) -> impl Iterator<Item = u8> {
+    let chroma =
+        |pixel: usize| f32::from(pair.get(2 * pixel + 1 - luma).copied().unwrap_or(NO_CHROMA)) - 128.0;
+    let (cb, cr) = (chroma(0), chroma(1));
+    let levels = pair.chunks_exact(2).map(move |pixel| f32::from(pixel[luma]));
+    let colours = move |y: f32| [y + 1.402 * cr, y - 0.344_136 * cb - 0.714_136 * cr, y + 1.772 * cb];
+    // Casts saturate.
+    levels.flat_map(move |y| colours(y).map(|level| level.round() as u8))
 }
 
 /// How a compressed image is compressed.
@@ -195,6 +230,27 @@ mod tests {
         assert_eq!(gray(&image("bgr8", 1, 1, 3, &[0, 0, 255]))[0], red[1]);
         assert_eq!(gray(&image("bgra8", 1, 1, 4, &[0, 0, 255, 255]))[0], red[2]);
         assert_eq!(gray(&image("rgba8", 1, 1, 4, &[255, 255, 255, 0])), [255]);
+    }
+
+    #[test]
+    fn colours_stay_and_padding_is_left_out() {
+        let rgb = |encoding, width, step, data: &[u8]| {
+            ImageRows::of(&image(encoding, width, 2, step, data)).unwrap().to_rgb8()
+        };
+        assert_eq!(rgb("rgb8", 1, 4, &[1, 2, 3, 99, 4, 5, 6]), Some(vec![1, 2, 3, 4, 5, 6]));
+        assert_eq!(rgb("bgr8", 1, 3, &[3, 2, 1, 6, 5, 4]), Some(vec![1, 2, 3, 4, 5, 6]));
+        assert_eq!(rgb("bgra8", 1, 4, &[3, 2, 1, 9, 6, 5, 4, 9]), Some(vec![1, 2, 3, 4, 5, 6]));
+        assert_eq!(rgb("mono8", 1, 1, &[1, 2]), None);
+        assert_eq!(rgb("mono16", 1, 2, &[1, 2, 3, 4]), None);
+        // Cb 128, Cr 228 of two pixels: red above luma by 140, green below by 71; held to 0 to 255.
+        let row = [128, 100, 228, 150];
+        let pixels = [240, 29, 100, 255, 79, 150];
+        assert_eq!(rgb("uyvy", 2, 4, &row.repeat(2)), Some(pixels.repeat(2)));
+        let row = [100, 128, 150, 228];
+        assert_eq!(rgb("yuv422_yuy2", 2, 4, &row.repeat(2)), Some(pixels.repeat(2)));
+        // Three columns: the last pixel has Cb alone.
+        let row = [128, 100, 228, 150, 128, 60];
+        assert_eq!(rgb("yuv422", 3, 6, &row.repeat(2)).unwrap()[6..9], [60, 60, 60]);
     }
 
     #[test]

@@ -83,6 +83,10 @@ fn intrinsics_wire(model: &CameraModel) -> v1::Intrinsics {
     wire
 }
 
+/// Raw images of more pixels travel as grey. So many in colour, 1.6 MB, 20 times a second are what a robot may send by the
+/// server's defaults (`limits.robot_bytes_per_s`); larger ones are better sent compressed.
+const MAX_COLOUR_PX: u32 = 960 * 540;
+
 /// Pixels as they go on the wire.
 pub(super) struct Pixels {
     encoding: v1::ImageEncoding,
@@ -91,15 +95,17 @@ pub(super) struct Pixels {
 }
 
 impl Pixels {
-    /// Of a raw image. The only place that chooses how raw pixels travel: all as grey.
+    /// Of a raw image. The only place that chooses how raw pixels travel: in colour up to [`MAX_COLOUR_PX`], else as grey.
     pub(super) fn of_raw(topic: &str, image: &Image<'_>) -> Result<Self, Problem> {
         let rows = ImageRows::of(image);
         let rows = rows.map_err(|fault| Problem::Image { topic: topic.to_owned(), fault })?;
-        Ok(Self {
-            encoding: v1::ImageEncoding::Gray8,
-            size: (image.width, image.height),
-            bytes: Bytes::from(rows.to_gray8()),
-        })
+        let size = (image.width, image.height);
+        let is_small = u64::from(image.width) * u64::from(image.height) <= u64::from(MAX_COLOUR_PX);
+        let (encoding, bytes) = match is_small.then(|| rows.to_rgb8()).flatten() {
+            Some(pixels) => (v1::ImageEncoding::Rgb8, pixels),
+            None => (v1::ImageEncoding::Gray8, rows.to_gray8()),
+        };
+        Ok(Self { encoding, size, bytes: Bytes::from(bytes) })
     }
 
     /// Of a JPEG or PNG file, which stays as it is.

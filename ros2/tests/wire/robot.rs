@@ -167,6 +167,27 @@ fn an_image_becomes_a_frame_with_all_that_is_known() {
 }
 
 #[test]
+fn a_raw_image_travels_in_colour_up_to_its_bound() {
+    let travels = |width: u32, height: u32| {
+        let (step, data) = (3 * width, vec![9; 3 * (width * height) as usize]);
+        let raw = Image {
+            header: header(1500, OPTICAL),
+            height,
+            width,
+            encoding: "bgr8",
+            is_bigendian: 0,
+            step,
+            data: &data,
+        };
+        let taken = robot().take(IMAGE, &AnyMessage::Image(raw));
+        let [(frame, _)] = frames(&taken)[..] else { panic!("{taken:?}") };
+        (frame.encoding(), frame.image.len())
+    };
+    assert_eq!(travels(960, 540), (v1::ImageEncoding::Rgb8, 3 * 960 * 540));
+    assert_eq!(travels(960, 541), (v1::ImageEncoding::Gray8, 960 * 541));
+}
+
+#[test]
 fn what_a_frame_lacks_is_said_with_topic_and_age() {
     let mut robot = robot();
     let taken = robot.take(IMAGE, &image(1500));

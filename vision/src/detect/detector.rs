@@ -1,4 +1,4 @@
-//! Grey image in, quads out, best first (method 1 to 3): the stages in order, on one scale or several.
+//! Picture in, quads out, best first (method 1 to 3): the stages in order, on one scale or several.
 
 use crate::{
     detect::{
@@ -26,29 +26,54 @@ use crate::{
         },
         tiling::floor_tiling::{Untiled, untile},
     },
-    frame::GrayImage,
+    frame::PictureRef,
     trace::{Stage, Trace},
 };
 
 /// Most quads of one image, the best first.
 pub const MAX_QUADS: usize = 64;
 
-/// Finds the quads of an image, best first; ties by corners. At most [`MAX_QUADS`]. Same image, same quads.
-pub fn detect(image: &GrayImage, p: &DetectParams, trace: &mut impl Trace) -> Vec<Quad> {
+/// Finds the quads of a picture that people are shown, best first; ties by corners. At most [`MAX_QUADS`]. Same picture,
+/// same quads.
+pub fn detect<'a>(image: impl Into<PictureRef<'a>>, p: &DetectParams, trace: &mut impl Trace) -> Vec<Quad> {
     detect_with(&mut DetectBuffers::default(), image, p, trace)
 }
 
-/// [`detect`], reusing the memory of earlier images.
-pub fn detect_with(
+/// [`detect`], reusing the memory of earlier pictures.
+pub fn detect_with<'a>(
     memory: &mut DetectBuffers,
-    image: &GrayImage,
+    image: impl Into<PictureRef<'a>>,
     p: &DetectParams,
     trace: &mut impl Trace,
 ) -> Vec<Quad> {
-    let mut quads = match p.quads.grouping {
+    let mut quads = grouped(memory, image.into(), p, trace);
+    quads.retain(|quad| p.quads.is_shown(quad));
+    finished(quads, trace)
+}
+
+/// The quads that recognition compares: those of [`detect`], and others that are probably no objects.
+pub fn detect_for_recognition<'a>(
+    memory: &mut DetectBuffers,
+    image: impl Into<PictureRef<'a>>,
+    p: &DetectParams,
+    trace: &mut impl Trace,
+) -> Vec<Quad> {
+    finished(grouped(memory, image.into(), p, trace), trace)
+}
+
+fn grouped(
+    memory: &mut DetectBuffers,
+    image: PictureRef,
+    p: &DetectParams,
+    trace: &mut impl Trace,
+) -> Vec<Quad> {
+    match p.quads.grouping {
         Grouping::Relaxation => by_relaxation(memory, image, p, trace),
         Grouping::Proposals => by_proposals(memory, image, p, trace),
-    };
+    }
+}
+
+fn finished(mut quads: Vec<Quad>, trace: &mut impl Trace) -> Vec<Quad> {
     quads.truncate(MAX_QUADS);
     trace.quads(&quads);
     trace.finished(Stage::Quads);
@@ -58,17 +83,17 @@ pub fn detect_with(
 /// The paper's grouping: pairs by similarity, both relaxations, sets of three sides.
 fn by_relaxation(
     memory: &mut DetectBuffers,
-    image: &GrayImage,
+    image: PictureRef,
     p: &DetectParams,
     trace: &mut impl Trace,
 ) -> Vec<Quad> {
     let (edges, segments) = traced_segments(memory, image, p, trace);
-    let candidates = pairs(&segments, image, &p.similarity);
+    let candidates = pairs(&segments, image.grey(), &p.similarity);
     let matched = match_pairs(&segments, &candidates, p.similarity.min_score, &p.relaxation);
     let pairs: Vec<_> = matched.iter().map(|i| candidates[*i].clone()).collect();
     trace.pairs(&pairs);
     trace.finished(Stage::Pairs);
-    let gradients = Gradients { image, gx: edges.gx(), gy: edges.gy() };
+    let gradients = Gradients { image: image.grey(), gx: edges.gx(), gy: edges.gy() };
     let quads = quads_of_pairs(&segments, &pairs, &gradients, p);
     memory.give_back(edges);
     quads
@@ -77,15 +102,15 @@ fn by_relaxation(
 /// The default detector, on one scale or several. Coordinates of the trace are those of the working scale.
 fn by_proposals(
     memory: &mut DetectBuffers,
-    image: &GrayImage,
+    image: PictureRef,
     p: &DetectParams,
     trace: &mut impl Trace,
 ) -> Vec<Quad> {
     let factor = working_factor(image, p.quads.working_side_px);
-    let reduced = (factor > 1).then(|| reduce(image, factor));
-    let work = reduced.as_ref().unwrap_or(image);
+    let reduced = (factor > 1).then(|| image.map(|plane| reduce(plane, factor)));
+    let work = reduced.as_ref().map_or(image, PictureRef::from);
     let (rated, edges, segments) = proposed(memory, work, p, trace);
-    let gradients = Gradients { image: work, gx: edges.gx(), gy: edges.gy() };
+    let gradients = Gradients { image: work.grey(), gx: edges.gx(), gy: edges.gy() };
     let found: Vec<Quad> = if p.quads.choose_sides {
         suppress_non_maxima(snap_sides(rated, &gradients, &p.quads), &p.quads)
     } else {
@@ -99,7 +124,8 @@ fn by_proposals(
     };
     let mut quads: Vec<Quad> = quads.into_iter().map(|q| refit_corners(q, &gradients, &p.quads)).collect();
     if p.quads.three_sided {
-        let open = leftover(&segments, &quads, &gradients, p);
+        let shown: Vec<Quad> = quads.iter().filter(|quad| p.quads.is_shown(quad)).cloned().collect();
+        let open = leftover(&segments, &shown, &gradients, p);
         // Three-sided quads never replace a full quad.
         quads.truncate(MAX_QUADS);
         let room = MAX_QUADS - quads.len();
@@ -111,26 +137,26 @@ fn by_proposals(
     at_full_size(quads, image, factor, p, memory)
 }
 
-/// All proposals of the default detector on all scales of an image, rated, before suppression; and the finest edge
+/// All proposals of the default detector on all scales of a picture, rated, before suppression; and the finest edge
 /// map.
-pub fn scored_quads(
-    work: &GrayImage,
+pub fn scored_quads<'a>(
+    work: impl Into<PictureRef<'a>>,
     p: &DetectParams,
     trace: &mut impl Trace,
 ) -> (Vec<ScoredQuad>, EdgeMap) {
-    let (rated, edges, _) = proposed(&mut DetectBuffers::default(), work, p, trace);
+    let (rated, edges, _) = proposed(&mut DetectBuffers::default(), work.into(), p, trace);
     (rated, edges)
 }
 
 /// The same with the finest segments.
 fn proposed(
     memory: &mut DetectBuffers,
-    work: &GrayImage,
+    work: PictureRef,
     p: &DetectParams,
     trace: &mut impl Trace,
 ) -> (Vec<ScoredQuad>, EdgeMap, Vec<EdgeSegment>) {
     let (edges, segments) = traced_segments(memory, work, p, trace);
-    let gradients = Gradients { image: work, gx: edges.gx(), gy: edges.gy() };
+    let gradients = Gradients { image: work.grey(), gx: edges.gx(), gy: edges.gy() };
     let seeds = proposals(&segments, &gradients, &p.quads.proposals);
     trace.seeds(&seeds);
     trace.finished(Stage::Pairs);
@@ -141,11 +167,11 @@ fn proposed(
         if work.width() / scale < MIN_LEVEL_SIDE_PX || work.height() / scale < MIN_LEVEL_SIDE_PX {
             break;
         }
-        let level = reduce(work, scale);
-        let edges = memory.edges(&level, &p.edges);
+        let level = work.map(|plane| reduce(plane, scale));
+        let edges = memory.edges((&level).into(), &p.edges);
         let segments = straight_segments(&chains(&edges, &p.chains), &edges, &p.segments);
         let segments = untile(segments, (level.width(), level.height()), &p.tiling).kept;
-        let gradients = Gradients { image: &level, gx: edges.gx(), gy: edges.gy() };
+        let gradients = Gradients { image: level.grey(), gx: edges.gx(), gy: edges.gy() };
         let seeds = proposals(&segments, &gradients, &p.quads.proposals);
         let coarse = rate(&seeds, &gradients, &p.quads);
         rated.extend(coarse.into_iter().filter_map(|r| r.scaled(scale as f64)));
@@ -159,7 +185,7 @@ const MIN_LEVEL_SIDE_PX: usize = 80;
 
 fn traced_segments(
     memory: &mut DetectBuffers,
-    image: &GrayImage,
+    image: PictureRef,
     p: &DetectParams,
     trace: &mut impl Trace,
 ) -> (EdgeMap, Vec<EdgeSegment>) {

@@ -2,7 +2,7 @@
 
 use crate::{
     detect::edges::edge_map::{self, EdgeMap, EdgeParams},
-    frame::GrayImage,
+    frame::PictureRef,
 };
 
 /// Memory of earlier images, for callers with many images: fresh planes cost more than a tenth of the time to
@@ -13,8 +13,8 @@ pub struct DetectBuffers {
 }
 
 impl DetectBuffers {
-    /// The edges of an image, in the memory of the map that was given back last.
-    pub(crate) fn edges(&mut self, image: &GrayImage, p: &EdgeParams) -> EdgeMap {
+    /// The edges of a picture, in the memory of the map that was given back last.
+    pub(crate) fn edges(&mut self, image: PictureRef, p: &EdgeParams) -> EdgeMap {
         let mut map = self.maps.pop().unwrap_or_default();
         edge_map::edges_into(image, p, &mut map);
         map

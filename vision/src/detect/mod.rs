@@ -17,7 +17,7 @@ pub mod detector;
 #[cfg(test)]
 pub(crate) mod tests;
 
-pub use detector::{MAX_QUADS, detect, detect_with, scored_quads};
+pub use detector::{MAX_QUADS, detect, detect_for_recognition, detect_with, scored_quads};
 pub use edge_buffers::{DetectBuffers, MAX_SCALES};
 pub use params::{DetectParams, Grouping, Nested, QuadParams};
 pub use quad::{BORDER_SIGMA_PX, Quad, QuadKind};

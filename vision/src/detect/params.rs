@@ -6,6 +6,7 @@ use crate::detect::{
     },
     edges::edge_map::EdgeParams,
     proposals::quad_proposals::ProposalParams,
+    quad::{Quad, QuadKind},
     relaxation::{labelling::RelaxationParams, similarity::SimilarityParams},
     segments::{bridging::ChainParams, joining::SegmentParams},
     tiling::tiling_params::TilingParams,
@@ -103,8 +104,11 @@ pub struct QuadParams {
         deserialize_with = "checked::<QUAD_FEATURES, _>"
     )]
     pub quad_classifier: Option<Network>,
-    /// Smallest probability that a quad of the default detector is an object.
+    /// Smallest probability that a quad of the default detector is an object, for people: in pictures of what was
+    /// detected, for teaching and gathering, and in answers for quads that no landmark was recognised in.
     pub min_probability: f64,
+    /// The same for quads that recognition compares with the landmarks: an identity confirms what the classifier doubts.
+    pub min_asked_probability: f64,
     /// A quad with at least this probability suppresses conflicting quads before they are classified.
     pub sure_probability: f64,
     /// Whether to report sets of three sides.
@@ -134,6 +138,7 @@ impl Default for QuadParams {
             border_model: None,
             quad_classifier: None,
             min_probability: 0.65,
+            min_asked_probability: 0.02,
             sure_probability: 0.95,
             three_sided: true,
             min_three_sided_closing: 0.5,
@@ -152,6 +157,12 @@ fn checked<'de, const N: usize, D: Deserializer<'de>>(from: D) -> Result<Option<
 }
 
 impl QuadParams {
+    /// Whether `quad` is shown to people by itself.
+    pub fn is_shown(&self, quad: &Quad) -> bool {
+        let is_classified = self.grouping == Grouping::Proposals && self.choose_sides;
+        !is_classified || quad.kind == QuadKind::ThreeSided || quad.score >= self.min_probability
+    }
+
     /// The network that scores the lines of a side.
     pub fn side_network(&self) -> &Network {
         self.border_model.as_ref().unwrap_or_else(|| network_weights::border_model())

@@ -4,11 +4,16 @@
 //! Departs from method 1, which works at full size: time is bounded, and ornate frames are straight at a coarse
 //! scale only.
 
-use crate::{detect::quad::Quad, frame::GrayImage, geometry::corners::Corners};
+use crate::{
+    detect::quad::Quad,
+    frame::{GrayImage, PictureRef},
+    geometry::corners::Corners,
+};
 use nalgebra::Point2;
 
 /// The whole factor that brings the longer side nearest to `side_px`; 1 if it is smaller, or `side_px` is 0.
-pub fn working_factor(image: &GrayImage, side_px: usize) -> usize {
+pub fn working_factor<'a>(image: impl Into<PictureRef<'a>>, side_px: usize) -> usize {
+    let image = image.into();
     let longest = image.width().max(image.height());
     (longest + side_px / 2).checked_div(side_px).unwrap_or(1).max(1)
 }

@@ -26,6 +26,18 @@ pub enum FrameError {
         /// Bytes that width x height ask for.
         expected: usize,
     },
+    /// A colour plane is not as large as the grey image.
+    #[error("a colour plane has {plane_width}x{plane_height} px, the picture {width}x{height}")]
+    Planes {
+        /// Width of the grey image in pixels.
+        width: usize,
+        /// Its height.
+        height: usize,
+        /// Width of the plane.
+        plane_width: usize,
+        /// Its height.
+        plane_height: usize,
+    },
     /// A camera parameter is not finite or not in its range.
     #[error("camera parameter {field} = {value} is out of range")]
     Intrinsics {

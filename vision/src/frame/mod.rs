@@ -1,7 +1,8 @@
-//! What enters the pipeline: a grey image and, when known, the camera's intrinsics. Both are checked here, once;
-//! every later stage may rely on it.
+//! What enters the pipeline: a picture, grey or in colour, and, when known, the camera's intrinsics. Both are checked
+//! here, once; every later stage may rely on it.
 
 mod image;
+mod picture;
 mod lens;
 mod intrinsics;
 mod sigmas;
@@ -9,6 +10,7 @@ mod sigmas;
 pub use image::{FrameError, GrayImage, MAX_AREA_PX, MAX_SIDE_PX};
 pub use intrinsics::{Intrinsics, IntrinsicsSigmas};
 pub use lens::{DistortedPoint, Distortion, MAX_RAY_RAD};
+pub use picture::{COLOUR_PLANES, Picture, PictureRef, luma};
 
 #[cfg(test)]
 mod tests {

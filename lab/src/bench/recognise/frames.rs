@@ -17,7 +17,7 @@ use vision::{
     detect::{DetectBuffers, detect_with},
     model::{LandmarkId, ModelSet},
     params::Params,
-    pipeline::{LandmarkDatabase, analyse_quads},
+    pipeline::{FrameCamera, LandmarkDatabase, analyse_quads},
     recognise::{DistanceKind, Verdict},
     trace::{NoTrace, Stage, Trace},
 };
@@ -126,10 +126,11 @@ impl Timed<'_> {
         let sizes = BTreeMap::new();
         let landmarks =
             LandmarkDatabase { models: self.models, sizes: &sizes, kind: DistanceKind::default() };
+        let camera = FrameCamera::level(Some(&scenes.camera));
         let clock = Clock::start();
         let found = detect_with(memory, frame, &p.detect, &mut NoTrace);
         let mut split = Split { clock: Clock::start(), recognition_ms: 0.0 };
-        let facts = analyse_quads(frame, found, Some(&scenes.camera), landmarks, p, &mut split);
+        let facts = analyse_quads(frame, found, camera, landmarks, p, &mut split);
         let ms = clock.ms();
         let least = &mut self.global.recognition_ms[i];
         *least = least.min(split.recognition_ms);

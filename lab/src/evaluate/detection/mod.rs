@@ -127,8 +127,8 @@ fn evaluate(truth: &Truth, reviewed: &Reviewed, args: &Args, named: &Named) -> R
         if image.whole_image {
             continue; // a crop has no border to find
         }
-        let gray = match files::read(&image.path) {
-            Ok(gray) => gray,
+        let picture = match files::read_picture(&image.path) {
+            Ok(picture) => picture,
             Err(error) => {
                 unreadable += 1;
                 screen::complain(&format!("{}: {error}", image.path.display()));
@@ -136,7 +136,7 @@ fn evaluate(truth: &Truth, reviewed: &Reviewed, args: &Args, named: &Named) -> R
             }
         };
         let reviewed_quads = reviewed.quads(&image.file);
-        let score = score::score(image, &gray, &named.params, args.min_side_px, reviewed_quads);
+        let score = score::score(image, &picture, &named.params, args.min_side_px, reviewed_quads);
         if args.misses {
             name_misses(&score);
         }

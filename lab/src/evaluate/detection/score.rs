@@ -8,7 +8,7 @@ use crate::evaluate::{
 use cli::clock::Clock;
 use vision::{
     detect::{DetectParams, Quad, QuadKind, detect},
-    frame::GrayImage,
+    frame::{GrayImage, PictureRef},
     geometry::{Corners, polygon},
     trace::NoTrace,
 };
@@ -87,16 +87,18 @@ impl ImageScore {
     }
 }
 
-/// Detects on one thread and compares. Quads with a side shorter than `min_side_px` do not count.
-pub(crate) fn score(
+/// Detects on one thread and compares, in colour where the picture has colour. Quads with a side shorter than `min_side_px`
+/// do not count.
+pub(crate) fn score<'a>(
     image: &TruthImage,
-    gray: &GrayImage,
+    picture: impl Into<PictureRef<'a>>,
     params: &DetectParams,
     min_side_px: f64,
     reviewed: &[ReviewedQuad],
 ) -> ImageScore {
+    let picture = picture.into();
     let clock = Clock::start();
-    let mut found = detect(gray, params, &mut NoTrace);
+    let mut found = detect(picture, params, &mut NoTrace);
     let ms = clock.ms();
     // Three-sided sets are for topology only: they neither find nor falsify a quad.
     found.retain(|quad| quad.kind == QuadKind::Full);
@@ -108,7 +110,12 @@ pub(crate) fn score(
     ImageScore {
         file: image.file.clone(),
         stratum: image.stratum.clone(),
-        labels: image.quads.iter().filter(counts).map(|l| label(l, (image, gray), &found)).collect(),
+        labels: image
+            .quads
+            .iter()
+            .filter(counts)
+            .map(|l| label(l, (image, picture.grey()), &found))
+            .collect(),
         found: found.iter().map(|q| q.corners_px).collect(),
         false_quads,
         ms,

@@ -162,7 +162,7 @@ pub(crate) fn load<S: Simd>(s: S, row: &[f32], u: usize) -> S::f32s {
     S::f32s::from_slice(s, &row[u..u + S::f32s::LEN])
 }
 
-/// Working memory of the filter, reused from image to image.
+/// Working memory of the filter of one plane, reused from image to image.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct FilterMemory {
     lines: Vec<Column>,
@@ -196,23 +196,47 @@ pub(crate) fn gradients<S: Simd>(
     [gx, gy]: Planes,
     visitor: &mut impl GradientRows<S>,
 ) {
-    let (width, height) = (image.width(), image.height());
-    let (n, filter) = (width + 2, Deriche::new(alpha));
-    upwards(s, image, &filter, memory);
-    let FilterMemory { plane, first, ring, .. } = memory;
-    for row in ring.iter_mut() {
-        row.resize(n, 0.0);
+    let (width, filter) = (image.width(), PlaneFilter::new(alpha));
+    filter.start(s, image, memory);
+    for v in 0..image.height() {
+        let row = v * width..(v + 1) * width;
+        filter.row(s, v, memory, [&mut gx[row.clone()], &mut gy[row.clone()]]);
+        visitor.row(s, v, [&gx[..row.end], &gy[..row.end]]);
     }
-    let [far, near, _] = ring;
-    filter.above(first, [&plane[..n], &plane[n..2 * n]], [far, near]);
-    for (v, x) in plane.chunks_exact(n).take(height + 1).enumerate() {
-        let [p2, p1, next] = ring;
-        filter.across(s, [x, p1, p2], next);
-        if v > 0 {
-            let at = (v - 1) * width;
-            filter.stencil(s, [p2, p1, next], [&mut gx[at..at + width], &mut gy[at..at + width]]);
-            visitor.row(s, v - 1, [&gx[..at + width], &gy[..at + width]]);
+}
+
+/// The filter of one plane, whose gradient rows are asked for one after the other.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct PlaneFilter(Deriche);
+
+impl PlaneFilter {
+    pub(crate) fn new(alpha: f32) -> Self {
+        Self(Deriche::new(alpha))
+    }
+
+    /// All but the recursion down the columns, of which the rows above the first are prepared.
+    #[inline(always)]
+    pub(crate) fn start<S: Simd>(&self, s: S, image: &GrayImage, memory: &mut FilterMemory) {
+        let n = image.width() + 2;
+        upwards(s, image, &self.0, memory);
+        let FilterMemory { plane, first, ring, .. } = memory;
+        for row in ring.iter_mut() {
+            row.resize(n, 0.0);
         }
+        let [far, near, next] = ring;
+        self.0.above(first, [&plane[..n], &plane[n..2 * n]], [far, near]);
+        self.0.across(s, [&plane[..n], near, far], next);
+        ring.rotate_left(1);
+    }
+
+    /// The gradients of row `v`; rows are asked for from the first to the last, each once.
+    #[inline(always)]
+    pub(crate) fn row<S: Simd>(&self, s: S, v: usize, memory: &mut FilterMemory, out: Planes) {
+        let FilterMemory { plane, ring, .. } = memory;
+        let n = out[0].len() + 2;
+        let [p2, p1, next] = ring;
+        self.0.across(s, [&plane[(v + 1) * n..(v + 2) * n], p1, p2], next);
+        self.0.stencil(s, [p2, p1, next], out);
         ring.rotate_left(1);
     }
 }
@@ -249,4 +273,4 @@ fn upwards<S: Simd>(s: S, image: &GrayImage, filter: &Deriche, memory: &mut Filt
 
 #[cfg(test)]
 #[path = "deriche_tests.rs"]
-mod tests;
+pub(crate) mod tests;

@@ -98,7 +98,7 @@ fn reused_memory_does_not_change_the_planes() {
 }
 
 /// Every instruction set level of this processor, the lowest first.
-fn levels() -> Vec<Level> {
+pub(crate) fn levels() -> Vec<Level> {
     let best = Level::new();
     #[cfg(target_arch = "x86_64")]
     let all = [

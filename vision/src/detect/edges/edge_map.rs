@@ -7,9 +7,10 @@ use crate::{
     detect::edges::{
         deriche::{FilterMemory, gradients},
         maxima::{Maxima, Maximum},
+        strongest_plane::{ColourMemory, colour_gradients},
         thinning::{EDGE, changing_ring_code, keep, thin},
     },
-    frame::GrayImage,
+    frame::PictureRef,
 };
 use fearless_simd::{Level, dispatch};
 use nalgebra::{Point2, Vector2};
@@ -55,6 +56,7 @@ pub struct EdgeMap {
     marks: Vec<u8>,
     pixels: Vec<u32>,
     filter: FilterMemory,
+    colour_filter: ColourMemory,
     maxima: Maxima,
     stack: Vec<u32>,
 }
@@ -160,20 +162,20 @@ fn length(x: f32, y: f32) -> f32 {
     (x * x + y * y).sqrt()
 }
 
-/// The edges of an image: Canny's criteria on Deriche's recursive gradient.
-pub fn edges(image: &GrayImage, p: &EdgeParams) -> EdgeMap {
+/// The edges of a picture: Canny's criteria on Deriche's recursive gradient.
+pub fn edges<'a>(image: impl Into<PictureRef<'a>>, p: &EdgeParams) -> EdgeMap {
     let mut map = EdgeMap::default();
     edges_into(image, p, &mut map);
     map
 }
 
-/// [`edges`], in the memory of an earlier map of any image: about a third faster when it had the same size.
-pub fn edges_into(image: &GrayImage, p: &EdgeParams, map: &mut EdgeMap) {
-    map.fill(Level::new(), image, p, MAX_EDGE_POINTS);
+/// [`edges`], in the memory of an earlier map of any picture: about a third faster when it had the same size.
+pub fn edges_into<'a>(image: impl Into<PictureRef<'a>>, p: &EdgeParams, map: &mut EdgeMap) {
+    map.fill(Level::new(), image.into(), p, MAX_EDGE_POINTS);
 }
 
 impl EdgeMap {
-    fn fill(&mut self, level: Level, image: &GrayImage, p: &EdgeParams, max_points: usize) {
+    fn fill(&mut self, level: Level, image: PictureRef, p: &EdgeParams, max_points: usize) {
         let (width, height) = (image.width(), image.height());
         (self.width, self.height) = (width, height);
         let (gx, gy) = (&mut self.gx, &mut self.gy);
@@ -181,7 +183,13 @@ impl EdgeMap {
         gy.resize(width * height, 0.0);
         self.maxima.restart(width, height, p.low.max(f32::MIN_POSITIVE));
         let (memory, maxima) = (&mut self.filter, &mut self.maxima);
-        dispatch!(level, s => gradients(s, image, p.alpha, memory, [gx, gy], maxima));
+        match image.colour() {
+            None => dispatch!(level, s => gradients(s, image.grey(), p.alpha, memory, [gx, gy], maxima)),
+            Some(planes) => {
+                let memory = &mut self.colour_filter;
+                dispatch!(level, s => colour_gradients(s, planes, p.alpha, memory, [gx, gy], maxima));
+            }
+        }
         let mut found = std::mem::take(&mut self.maxima.found);
         let mut high = p.high;
         if p.noise_factors.iter().any(|f| *f > 0.0) {

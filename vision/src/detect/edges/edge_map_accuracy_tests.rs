@@ -1,5 +1,5 @@
 use super::*;
-use crate::detect::tests::rendering::Noise;
+use crate::{detect::tests::rendering::Noise, frame::GrayImage};
 use nalgebra::Vector2;
 
 /// Size of the pictures; edges pass near the middle.

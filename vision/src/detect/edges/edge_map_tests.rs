@@ -3,6 +3,7 @@ use crate::detect::{
     edges::maxima::BORDER_PX,
     tests::rendering::{flipped, polygon, quarter_turned, rectangle},
 };
+use crate::frame::GrayImage;
 
 #[test]
 fn a_step_between_two_pixels_lies_half_way() {
@@ -111,7 +112,7 @@ fn flat_and_tiny_images_have_no_edges() {
 
 fn within(image: &GrayImage, p: &EdgeParams, max_points: usize) -> EdgeMap {
     let mut map = EdgeMap::default();
-    map.fill(Level::new(), image, p, max_points);
+    map.fill(Level::new(), image.into(), p, max_points);
     map
 }
 

@@ -2,6 +2,7 @@
 
 pub(crate) mod row_transpose;
 pub(crate) mod deriche;
+pub(crate) mod strongest_plane;
 pub(crate) mod maxima;
 pub(crate) mod thinning;
 pub mod edge_map;

@@ -247,7 +247,7 @@ fn three_sided(set: &OpenSet, g: &Gradients, p: &DetectParams) -> Option<Quad> {
         side_clipped: std::array::from_fn(|i| on_border(&points[i]) || on_border(&points[(i + 1) % 4])),
         score: score.clamp(0.0, 1.0),
         kind: QuadKind::ThreeSided,
-        upright_ambiguous: upright_ambiguous(&corners_px),
+        upright_ambiguous: upright_ambiguous(&corners_px, &nalgebra::Vector2::y()),
         alternates: Vec::new(),
     })
 }

@@ -93,7 +93,7 @@ fn name_corners(
         covariance_px2: std::array::from_fn(|i| covariance[(i + shift) % 4]),
         sides,
         clipped,
-        upright_ambiguous: upright_ambiguous(&corners_px),
+        upright_ambiguous: upright_ambiguous(&corners_px, &Vector2::y()),
     })
 }
 
@@ -102,10 +102,11 @@ fn near_border(g: &Gradients, p: &Point2<f64>) -> bool {
     p.x < CLIP_PX || p.y < CLIP_PX || p.x > width - 1.0 - CLIP_PX || p.y > height - 1.0 - CLIP_PX
 }
 
-/// Whether the second most upright choice leans at most 15 degrees more than the given, most upright one.
-pub fn upright_ambiguous(corners: &Corners) -> bool {
-    let best = corners.lean_rad();
-    (1..4).any(|shift| corners.rotated(shift).lean_rad() - best < UPRIGHT_MARGIN_DEG.to_radians())
+/// Whether the second most upright choice leans at most 15 degrees more than the given, most upright one, where
+/// gravity points to `down` in the image.
+pub fn upright_ambiguous(corners: &Corners, down: &Vector2<f64>) -> bool {
+    let best = corners.lean_rad(down);
+    (1..4).any(|shift| corners.rotated(shift).lean_rad(down) - best < UPRIGHT_MARGIN_DEG.to_radians())
 }
 
 /// A side's line, fitted to edge points or not.
@@ -187,9 +188,9 @@ mod tests {
                 .map(|[x, y]: [f64; 2]| Point2::new(50.0 * (c * x - s * y), 50.0 * (s * x + c * y)));
             Corners::from_unordered(points).unwrap()
         };
-        assert!(!upright_ambiguous(&turned(0.0)));
-        assert!(!upright_ambiguous(&turned(35.0)));
-        assert!(upright_ambiguous(&turned(40.0)));
-        assert!(upright_ambiguous(&turned(45.0)));
+        assert!(!upright_ambiguous(&turned(0.0), &Vector2::y()));
+        assert!(!upright_ambiguous(&turned(35.0), &Vector2::y()));
+        assert!(upright_ambiguous(&turned(40.0), &Vector2::y()));
+        assert!(upright_ambiguous(&turned(45.0), &Vector2::y()));
     }
 }

@@ -10,7 +10,7 @@ use crate::{
         quad::{Quad, QuadKind},
         refine::refit::refit_corners,
     },
-    frame::GrayImage,
+    frame::{GrayImage, Picture, PictureRef},
     geometry::corners::Corners,
 };
 use nalgebra::Vector2;
@@ -25,7 +25,7 @@ const MAX_CUT_SHARE: usize = 2;
 /// Refits the four-sided quads of an image whose working scale was `factor` times smaller.
 pub(crate) fn at_full_size(
     quads: Vec<Quad>,
-    image: &GrayImage,
+    image: PictureRef,
     factor: usize,
     p: &DetectParams,
     memory: &mut DetectBuffers,
@@ -37,14 +37,15 @@ pub(crate) fn at_full_size(
     let search = QuadParams { refit_reach_px: reach_px, ..p.quads.clone() };
     let mut left_px = MAX_CUT_SHARE * image.width() * image.height();
     let refitted = |quad: Quad| {
-        let window = Window::around(&quad.corners_px, reach_px.ceil() as usize + MARGIN_PX, image);
+        let margin = reach_px.ceil() as usize + MARGIN_PX;
+        let window = Window::around(&quad.corners_px, margin, (image.width(), image.height()));
         let Some(rest) = left_px.checked_sub(window.area_px()).filter(|_| quad.kind == QuadKind::Full) else {
             return quad;
         };
         left_px = rest;
         let cut = window.cut(image);
-        let map = memory.edges(&cut, &p.edges);
-        let g = Gradients { image: &cut, gx: map.gx(), gy: map.gy() };
+        let map = memory.edges((&cut).into(), &p.edges);
+        let g = Gradients { image: cut.grey(), gx: map.gx(), gy: map.gy() };
         let sharp = window.moved(&quad.corners_px, -1.0).map(|corners_px| {
             let here = Quad { corners_px, alternates: Vec::new(), ..quad.clone() };
             refit_corners(here, &g, &search)
@@ -69,9 +70,9 @@ struct Window {
 }
 
 impl Window {
-    /// The bounding box of the corners, wider by `margin` on all sides, clipped to the image. It touches the image
+    /// The bounding box of the corners, wider by `margin` on all sides, clipped to an image of some size. It touches the image
     /// border only where the quad is near it, so no other quad is taken for clipped.
-    fn around(corners: &Corners, margin: usize, image: &GrayImage) -> Self {
+    fn around(corners: &Corners, margin: usize, (width, height): (usize, usize)) -> Self {
         let span = |at: fn(&nalgebra::Point2<f64>) -> f64, size: usize| {
             let values = corners.points().map(|c| at(&c));
             let low = values.into_iter().fold(f64::INFINITY, f64::min);
@@ -81,8 +82,8 @@ impl Window {
             let to = (high.ceil().max(0.0) as usize).saturating_add(margin + 1).clamp(from + 1, size);
             (from, to - from)
         };
-        let (left, width) = span(|c| c.x, image.width());
-        let (top, height) = span(|c| c.y, image.height());
+        let (left, width) = span(|c| c.x, width);
+        let (top, height) = span(|c| c.y, height);
         Self { left, top, width, height }
     }
 
@@ -90,7 +91,11 @@ impl Window {
         self.width * self.height
     }
 
-    fn cut(&self, image: &GrayImage) -> GrayImage {
+    fn cut(&self, image: PictureRef) -> Picture {
+        image.map(|plane| self.cut_plane(plane))
+    }
+
+    fn cut_plane(&self, image: &GrayImage) -> GrayImage {
         let rows = image.data().chunks_exact(image.width()).skip(self.top).take(self.height);
         let data = rows.flat_map(|row| &row[self.left..self.left + self.width]).copied().collect();
         // A part of an image is never too large for one.
@@ -148,9 +153,10 @@ mod tests {
             corners_px: Corners::new(quad.corners_px.points().map(|c| c + shift)).expect("a quad"),
             ..quad.clone()
         };
-        let window = Window::around(&off.corners_px, 14, &image);
+        let window = Window::around(&off.corners_px, 14, (1280, 960));
         let fit = MAX_CUT_SHARE * 1280 * 960 / window.area_px();
-        let sharp = at_full_size(vec![off.clone(); fit + 1], &image, 2, &p, &mut DetectBuffers::default());
+        let sharp =
+            at_full_size(vec![off.clone(); fit + 1], (&image).into(), 2, &p, &mut DetectBuffers::default());
         assert!(sharp[..fit].iter().all(|q| worst_px(q) < 0.15));
         assert_eq!(sharp[fit], off);
     }
@@ -160,16 +166,16 @@ mod tests {
         let image = GrayImage::from_fn(50, 40, |u, v| (u + 3 * v) as u8);
         let corners = |points: [[f64; 2]; 4]| Corners::new(points.map(Point2::from)).expect("convex");
         let all =
-            Window::around(&corners([[-9.0, -9.0], [90.0, -9.0], [90.0, 90.0], [-9.0, 90.0]]), 3, &image);
+            Window::around(&corners([[-9.0, -9.0], [90.0, -9.0], [90.0, 90.0], [-9.0, 90.0]]), 3, (50, 40));
         assert_eq!(all, Window { left: 0, top: 0, width: 50, height: 40 });
-        assert_eq!(all.cut(&image), image);
+        assert_eq!(all.cut_plane(&image), image);
         let part =
-            Window::around(&corners([[10.2, 9.0], [20.0, 9.0], [20.0, 20.5], [10.2, 20.0]]), 3, &image);
+            Window::around(&corners([[10.2, 9.0], [20.0, 9.0], [20.0, 20.5], [10.2, 20.0]]), 3, (50, 40));
         assert_eq!(part, Window { left: 7, top: 6, width: 17, height: 19 });
-        assert_eq!(part.cut(&image).at(4, 5), image.at(11, 11));
+        assert_eq!(part.cut_plane(&image).at(4, 5), image.at(11, 11));
         // Wholly outside: still a window, of at least a pixel.
         let away =
-            Window::around(&corners([[60.0, 60.0], [70.0, 60.0], [70.0, 70.0], [60.0, 70.0]]), 3, &image);
+            Window::around(&corners([[60.0, 60.0], [70.0, 60.0], [70.0, 70.0], [60.0, 70.0]]), 3, (50, 40));
         assert!(away.area_px() >= 1 && away.left + away.width <= 50 && away.top + away.height <= 40);
     }
 }

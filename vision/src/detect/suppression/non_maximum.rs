@@ -140,7 +140,7 @@ pub fn snap_sides(rated: Vec<ScoredQuad>, g: &Gradients, p: &QuadParams) -> Vec<
 pub fn suppress_non_maxima(mut classified: Vec<ClassifiedQuad>, p: &QuadParams) -> Vec<Quad> {
     let mut result: Vec<Quad> = Vec::new();
     let likely = |s: &ClassifiedQuad| s.quad.score.min(p.sure_probability);
-    classified.retain(|s| s.quad.score >= p.min_probability);
+    classified.retain(|s| s.quad.score >= p.min_asked_probability.min(p.min_probability));
     classified.sort_by(|a, b| likely(b).total_cmp(&likely(a)));
     for quad in classified.into_iter().map(|s| s.quad) {
         let corners = quad.corners_px.points();
@@ -247,7 +247,12 @@ mod tests {
     }
 
     fn params() -> QuadParams {
-        QuadParams { min_probability: 0.5, sure_probability: 0.98, ..QuadParams::default() }
+        QuadParams {
+            min_probability: 0.5,
+            min_asked_probability: 0.5,
+            sure_probability: 0.98,
+            ..QuadParams::default()
+        }
     }
 
     const WINDOW: [f64; 4] = [20.0, 20.0, 120.0, 160.0];

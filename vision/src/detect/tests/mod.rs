@@ -1,5 +1,6 @@
 //! `detect` from end to end on rendered pictures.
 
+mod colour;
 pub(crate) mod fixtures;
 pub(crate) mod rendering;
 pub(crate) mod scenes;
