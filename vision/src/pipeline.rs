@@ -1,15 +1,17 @@
-//! The recognition pipeline: an image, the landmarks of a map and optionally a camera in; quads, verdicts and poses
-//! out.
+//! The recognition pipeline: an image, the landmarks of a map and what is known of the camera in; quads, verdicts and
+//! poses out.
 //!
 //! Calls the stages in order. The map crate computes the robot's pose.
 
 use crate::{
+    border::{BorderError, BorderEstimate, estimate_border},
     detect::{
-        detector::detect_with,
+        detector::detect_for_recognition,
         edge_buffers::DetectBuffers,
         quad::{Quad, QuadKind},
     },
-    frame::{GrayImage, Intrinsics},
+    frame::{GrayImage, Intrinsics, PictureRef},
+    geometry::{corner_covariance::CornerCovariance, corners::Corners},
     model::{landmark_id::LandmarkId, model_set::ModelSet},
     params::Params,
     pose::{
@@ -18,6 +20,7 @@ use crate::{
     },
     recognise::{
         decision::{
+            matched_border::texture_border,
             result::{RecognitionResult, Verdict},
             verdict::recognise,
         },
@@ -25,6 +28,7 @@ use crate::{
     },
     seen_border::SeenBorder,
     trace::{Stage, Trace},
+    up::Up,
 };
 use std::collections::BTreeMap;
 
@@ -47,6 +51,22 @@ pub struct LandmarkDatabase<'a> {
     pub kind: DistanceKind,
 }
 
+/// What is known of the camera of an image.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FrameCamera<'a> {
+    /// Without them, nothing has a pose.
+    pub intrinsics: Option<&'a Intrinsics>,
+    /// From the camera's mounting. Where it is not known, quads are compared in all four rotations.
+    pub up: Option<Up>,
+}
+
+impl<'a> FrameCamera<'a> {
+    /// A camera that is not rolled.
+    pub fn level(intrinsics: Option<&'a Intrinsics>) -> Self {
+        Self { intrinsics, up: Some(Up::level()) }
+    }
+}
+
 /// The quads of one image with their recognition and poses.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FrameAnalysis {
@@ -61,6 +81,8 @@ pub struct QuadAnalysis {
     pub quad: Quad,
     /// The verdict; `None` for quads that were not compared (three-sided, or beyond [`MAX_RECOGNISED_QUADS`]).
     pub recognition: Option<RecognitionResult>,
+    /// The corners that the pose rests on, the landmark's top-left first; `None` without a pose.
+    pub border_px: Option<Corners>,
     /// The landmark in the camera frame, or why not.
     pub pose: Result<LandmarkPose, PoseUnavailable>,
 }
@@ -77,6 +99,9 @@ pub enum PoseUnavailable {
     /// The landmark's size is not known.
     #[error("the size of landmark {} is unknown", .0.0)]
     NoSize(LandmarkId),
+    /// No border that the pose could rest on.
+    #[error(transparent)]
+    Border(#[from] BorderError),
     /// The corners give no pose.
     #[error(transparent)]
     Pose(#[from] PoseError),
@@ -90,36 +115,61 @@ pub struct Pipeline {
 }
 
 impl Pipeline {
-    /// Quads, verdicts and poses of an image.
-    pub fn analyse(
+    /// Quads, verdicts and poses of a picture. Colour serves the detection; what a quad shows is read in grey.
+    pub fn analyse<'a>(
         &mut self,
-        image: &GrayImage,
-        camera: Option<&Intrinsics>,
+        image: impl Into<PictureRef<'a>>,
+        camera: FrameCamera<'_>,
         landmarks: LandmarkDatabase<'_>,
         p: &Params,
         trace: &mut impl Trace,
     ) -> FrameAnalysis {
-        let quads = detect_with(&mut self.buffers, image, &p.detect, trace);
-        analyse_quads(image, quads, camera, landmarks, p, trace)
+        let image = image.into();
+        let quads = detect_for_recognition(&mut self.buffers, image, &p.detect, trace);
+        analyse(image, quads, camera, landmarks, BorderBy::Picture, (p, trace))
     }
+}
+
+/// What the border of a pose is estimated from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum BorderBy {
+    /// The whole picture: texture and the edges beside it.
+    Picture,
+    /// The quads as given: the picture may end at their borders.
+    Quads,
 }
 
 /// [`Pipeline::analyse`] from given quads: found elsewhere, or drawn by hand.
 pub fn analyse_quads(
     image: &GrayImage,
     quads: Vec<Quad>,
-    camera: Option<&Intrinsics>,
+    camera: FrameCamera<'_>,
     landmarks: LandmarkDatabase<'_>,
     p: &Params,
     trace: &mut impl Trace,
 ) -> FrameAnalysis {
+    analyse(image.into(), quads, camera, landmarks, BorderBy::Quads, (p, trace))
+}
+
+fn analyse(
+    image: PictureRef<'_>,
+    quads: Vec<Quad>,
+    camera: FrameCamera<'_>,
+    landmarks: LandmarkDatabase<'_>,
+    by: BorderBy,
+    (p, trace): (&Params, &mut impl Trace),
+) -> FrameAnalysis {
+    let FrameCamera { intrinsics, up } = camera;
+    let quads: Vec<Quad> = quads.into_iter().map(|q| q.named_by(up.as_ref(), intrinsics)).collect();
     let mut asked = 0;
     let mut verdict = |quad: &Quad| {
         asked += usize::from(quad.kind == QuadKind::Full);
         (quad.kind == QuadKind::Full && asked <= MAX_RECOGNISED_QUADS)
-            .then(|| recognise(image, quad, landmarks.models, landmarks.kind, p))
+            .then(|| recognise(image.grey(), quad, landmarks.models, landmarks.kind, p))
     };
-    let verdicts: Vec<Option<RecognitionResult>> = quads.iter().map(&mut verdict).collect();
+    let mut quads = quads;
+    let mut verdicts: Vec<Option<RecognitionResult>> = quads.iter().map(&mut verdict).collect();
+    recognise_turned(image.grey(), (&mut quads, &mut verdicts), landmarks, p);
     trace.finished(Stage::Recognition);
     let quads = quads
         .into_iter()
@@ -128,12 +178,45 @@ pub fn analyse_quads(
             if let Some(verdict) = &mut verdict {
                 turn_to_recognised(&mut quad, verdict);
             }
-            let pose = pose(&quad, verdict.as_ref(), camera, landmarks.sizes, p);
-            QuadAnalysis { quad, recognition: verdict, pose }
+            let border = border(image, &quad, verdict.as_ref(), intrinsics, landmarks.sizes, (by, p));
+            let border_px = border.as_ref().ok().map(|(border, ..)| border.corners_px);
+            let pose = border.and_then(|(border, size, camera)| {
+                Ok(landmark_pose(&border.corners_px, border.covariance_px2, size, camera)?)
+            });
+            QuadAnalysis { quad, recognition: verdict, border_px, pose }
         })
+        .filter(|analysis| p.detect.quads.is_shown(&analysis.quad) || is_recognised(analysis))
         .collect();
     trace.finished(Stage::Poses);
     FrameAnalysis { quads }
+}
+
+/// Whether it is a landmark, or may be one.
+fn is_recognised(analysis: &QuadAnalysis) -> bool {
+    analysis.recognition.as_ref().is_some_and(|v| v.verdict != Verdict::Unknown)
+}
+
+/// Where no quad has a name, compares the first one in the rotations that up rules out. A landmark may hang otherwise
+/// than it was taught, and a mounting may be wrong: then its name says so, and its pose fits no robot on the floor.
+fn recognise_turned(
+    image: &GrayImage,
+    (quads, verdicts): (&mut [Quad], &mut [Option<RecognitionResult>]),
+    landmarks: LandmarkDatabase<'_>,
+    p: &Params,
+) {
+    if verdicts.iter().flatten().any(|v| matches!(v.verdict, Verdict::Unique(_))) {
+        return;
+    }
+    let mut compared = quads.iter_mut().zip(verdicts);
+    let Some((quad, verdict)) = compared.find(|(_, verdict)| verdict.is_some()) else { return };
+    if quad.upright_ambiguous {
+        return;
+    }
+    let turned = Quad { upright_ambiguous: true, ..quad.clone() };
+    let found = recognise(image, &turned, landmarks.models, landmarks.kind, p);
+    if matches!(found.verdict, Verdict::Unique(_)) {
+        (*quad, *verdict) = (turned, Some(found));
+    }
 }
 
 /// Which of the landmarks a single quad may be, by its picture alone, and their common border in the image; `None`
@@ -162,21 +245,32 @@ fn turn_to_recognised(quad: &mut Quad, verdict: &mut RecognitionResult) {
     }
 }
 
-/// Only a unique recognition of a landmark of known size, seen by a known camera, has a pose.
-fn pose(
+/// The border of a uniquely recognised landmark of known size, seen by a known camera: only such a landmark has a pose.
+fn border<'c>(
+    image: PictureRef<'_>,
     quad: &Quad,
     verdict: Option<&RecognitionResult>,
-    camera: Option<&Intrinsics>,
+    camera: Option<&'c Intrinsics>,
     sizes: &BTreeMap<LandmarkId, LandmarkSize>,
-    p: &Params,
-) -> Result<LandmarkPose, PoseUnavailable> {
-    let Some(RecognitionResult { verdict: Verdict::Unique(landmark), .. }) = verdict else {
+    (by, p): (BorderBy, &Params),
+) -> Result<(BorderEstimate, LandmarkSize, &'c Intrinsics), PoseUnavailable> {
+    let Some(verdict @ RecognitionResult { verdict: Verdict::Unique(landmark), .. }) = verdict else {
         return Err(PoseUnavailable::NotUnique);
     };
-    let border = verdict.and_then(|v| matched_border(quad, v, p)).ok_or(PoseUnavailable::NotUnique)?;
     let camera = camera.ok_or(PoseUnavailable::NoCamera)?;
-    let size = sizes.get(landmark).ok_or(PoseUnavailable::NoSize(*landmark))?;
-    Ok(landmark_pose(&border.corners_px, &border.covariance_px2, *size, camera)?)
+    let size = *sizes.get(landmark).ok_or(PoseUnavailable::NoSize(*landmark))?;
+    let border = match by {
+        BorderBy::Picture => {
+            let texture = texture_border(quad, verdict, p).ok_or(PoseUnavailable::NotUnique)?;
+            estimate_border(image, &texture, size, camera)?
+        }
+        BorderBy::Quads => {
+            let border = matched_border(quad, verdict, p).ok_or(PoseUnavailable::NotUnique)?;
+            let covariance_px2 = CornerCovariance::from(&border.covariance_px2);
+            BorderEstimate { corners_px: border.corners_px, covariance_px2 }
+        }
+    };
+    Ok((border, size, camera))
 }
 
 #[cfg(test)]

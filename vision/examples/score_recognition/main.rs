@@ -206,7 +206,7 @@ fn detected(
     for labelled in images {
         let score = &mut scores[labelled[0].half];
         let start = Instant::now();
-        let facts = detect(&labelled[0].image, &p.detect, &mut NoTrace);
+        let facts = detect(&*labelled[0].image, &p.detect, &mut NoTrace);
         score.detection_s += start.elapsed().as_secs_f64();
         let mut named = vec![false; labelled.len()];
         for quad in facts.iter().filter(|q| q.kind == QuadKind::Full).take(MAX_RECOGNISED_QUADS) {

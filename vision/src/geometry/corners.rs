@@ -1,6 +1,6 @@
 //! Four image corners in a fixed order: checked, sorted, rotated.
 
-use nalgebra::Point2;
+use nalgebra::{Point2, Vector2};
 use serde::{Deserialize, Serialize};
 
 /// Why four points are not the corners of a quad.
@@ -46,10 +46,14 @@ impl Corners {
         let angle = |p: &Point2<f64>| (p.y - centre.y).atan2(p.x - centre.x);
         points_px.sort_by(|a, b| angle(a).total_cmp(&angle(b)));
         let sorted = Self::new(points_px)?;
-        let start = (0..4)
-            .min_by(|a, b| sorted.rotated(*a).lean_rad().total_cmp(&sorted.rotated(*b).lean_rad()))
-            .unwrap_or(0);
-        Ok(sorted.rotated(start))
+        Ok(sorted.rotated(sorted.top_left(&Vector2::y())))
+    }
+
+    /// Which corner, 0 to 3, makes the quad most upright when it is named top-left, where gravity points to `down` in
+    /// the image (any length). The first of equal ones.
+    pub fn top_left(&self, down: &Vector2<f64>) -> usize {
+        let lean = |shift: &usize| self.rotated(*shift).lean_rad(down);
+        (0..4).min_by(|a, b| lean(a).total_cmp(&lean(b))).unwrap_or(0)
     }
 
     /// The corners TL, TR, BR, BL.
@@ -63,10 +67,11 @@ impl Corners {
         Self(std::array::from_fn(|i| self.0[(i + shift) % 4]))
     }
 
-    /// Mean angle between the sides TL-BL and TR-BR and image gravity (+v): 0 when upright, pi upside down.
-    pub fn lean_rad(&self) -> f64 {
+    /// Mean angle between the sides TL-BL and TR-BR and the direction `down` of gravity in the image (any length): 0
+    /// when upright, pi upside down.
+    pub fn lean_rad(&self, down: &Vector2<f64>) -> f64 {
         let [tl, tr, br, bl] = self.0;
-        let angle = |side: nalgebra::Vector2<f64>| side.x.abs().atan2(side.y);
+        let angle = |side: Vector2<f64>| side.perp(down).abs().atan2(side.dot(down));
         f64::midpoint(angle(bl - tl), angle(br - tr))
     }
 
@@ -138,6 +143,19 @@ mod tests {
     fn four_rotations_give_the_same_corners() {
         let corners = Corners::try_from(square()).unwrap();
         assert_eq!(corners.rotated(1).rotated(3), corners);
-        assert!(corners.rotated(2).lean_rad() > 3.0);
+        assert!(corners.rotated(2).lean_rad(&Vector2::y()) > 3.0);
+    }
+
+    #[test]
+    fn the_top_left_corner_goes_by_the_direction_of_gravity() {
+        let corners = Corners::try_from(square()).unwrap();
+        let downs = [[0.0, 1.0], [-1.0, 0.0], [0.0, -1.0], [1.0, 0.0]];
+        for (shift, [x, y]) in downs.into_iter().enumerate() {
+            for (lean, factor) in [(0.0, 1.0), (0.6, 0.01), (-0.6, 30.0)] {
+                let down = nalgebra::Rotation2::new(lean) * Vector2::new(x, y) * factor;
+                assert_eq!(corners.top_left(&down), shift, "{down}");
+                assert!((corners.rotated(shift).lean_rad(&down) - f64::abs(lean)).abs() < 1e-12);
+            }
+        }
     }
 }

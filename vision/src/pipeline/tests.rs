@@ -87,6 +87,7 @@ fn facts(image: &GrayImage, quad: Quad, camera: Option<&Intrinsics>) -> QuadAnal
     let sizes = BTreeMap::from([(LandmarkId(1), SIZE)]);
     let models = models();
     let landmarks = LandmarkDatabase { models: &models, sizes: &sizes, kind: DistanceKind::Both };
+    let camera = FrameCamera::level(camera);
     analyse_quads(image, vec![quad], camera, landmarks, &Params::default(), &mut NoTrace).quads.remove(0)
 }
 
@@ -119,8 +120,9 @@ fn the_pipeline_identifies_and_locates_a_landmark_from_pixels() {
     let (models, sizes) = (models(), BTreeMap::from([(LandmarkId(1), SIZE)]));
     let landmarks = LandmarkDatabase { models: &models, sizes: &sizes, kind: DistanceKind::Both };
     let mut stages = Stages::default();
-    let facts =
-        Pipeline::default().analyse(&image, Some(&camera()), landmarks, &Params::default(), &mut stages);
+    let camera = camera();
+    let camera = FrameCamera::level(Some(&camera));
+    let facts = Pipeline::default().analyse(&image, camera, landmarks, &Params::default(), &mut stages);
     let poses: Vec<_> = facts.quads.iter().filter_map(|q| q.pose.as_ref().ok()).collect();
     assert_eq!(poses.len(), 1, "{:?}", facts.quads);
     let error = poses[0].best.camera_from_landmark.inverse() * camera_from_landmark();
@@ -136,9 +138,13 @@ fn rotated_corners_are_returned_in_the_landmarks_order() {
     let (image, mut quad) = scene(1);
     quad.corners_px = quad.corners_px.rotated(3);
     quad.corner_covariance_px2 = std::array::from_fn(|i| Matrix2::identity() * (0.04 + 0.01 * i as f64));
-    quad.upright_ambiguous = true;
-    let facts = facts(&image, quad.clone(), Some(&camera()));
-    assert_pose(&facts);
+    let camera = camera();
+    let (models, sizes) = (models(), BTreeMap::from([(LandmarkId(1), SIZE)]));
+    let landmarks = LandmarkDatabase { models: &models, sizes: &sizes, kind: DistanceKind::Both };
+    let of = FrameCamera { intrinsics: Some(&camera), up: None };
+    let facts = analyse_quads(&image, vec![quad.clone()], of, landmarks, &Params::default(), &mut NoTrace);
+    let facts = &facts.quads[0];
+    assert_pose(facts);
     let seen = matched_border(&quad, facts.recognition.as_ref().unwrap(), &Params::default()).unwrap();
     let border = BORDER_SIGMA_PX.powi(2);
     assert!(
@@ -201,8 +207,11 @@ fn the_number_of_recognised_quads_is_bounded() {
     quads.resize(MAX_RECOGNISED_QUADS + 2, quad);
     let (models, sizes) = (ModelSet::default(), BTreeMap::new());
     let landmarks = LandmarkDatabase { models: &models, sizes: &sizes, kind: DistanceKind::Both };
-    let facts = analyse_quads(&image, quads, None, landmarks, &Params::default(), &mut NoTrace);
+    let camera = FrameCamera::level(None);
+    let facts = analyse_quads(&image, quads, camera, landmarks, &Params::default(), &mut NoTrace);
     let asked: Vec<bool> = facts.quads.iter().map(|q| q.recognition.is_some()).collect();
     assert_eq!(asked.iter().filter(|a| **a).count(), MAX_RECOGNISED_QUADS);
     assert!(!asked[0] && !asked[MAX_RECOGNISED_QUADS + 1]);
 }
+
+mod rolled;

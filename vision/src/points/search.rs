@@ -41,6 +41,9 @@ pub struct LandmarkPoints {
     pub border: usize,
     /// Its point evidence.
     pub evidence: PointEvidence,
+    /// The best evidence for the same landmark under another rotation, where there is any: a landmark that looks the
+    /// same upside down has it.
+    pub turned: Option<PointEvidence>,
 }
 
 /// The landmarks with point evidence in `quad`, by rising number of false alarms; each once.
@@ -86,17 +89,27 @@ pub fn search<'a>(
             }
             let Some(evidence) = verified(&seen, hypothesis, target) else { continue };
             sure |= evidence.log10_nfa <= LOG10_SURE;
-            found.push(LandmarkPoints { model: *model, border, evidence });
+            found.push(LandmarkPoints { model: *model, border, evidence, turned: None });
         }
     }
     found.sort_by(|a, b| a.evidence.log10_nfa.total_cmp(&b.evidence.log10_nfa).then(a.model.cmp(&b.model)));
     let mut once: Vec<LandmarkPoints> = Vec::new();
     for f in found {
-        if once.iter().all(|o| o.model != f.model) {
-            once.push(f);
+        match once.iter_mut().find(|o| o.model == f.model) {
+            None => once.push(f),
+            Some(best) if best.turned.is_none() && is_other_turn(&best.evidence, &f.evidence) => {
+                best.turned = Some(f.evidence);
+            }
+            Some(_) => {}
         }
     }
     once
+}
+
+/// Whether two sightings of one landmark take different corners of it as the top-left one.
+fn is_other_turn(a: &PointEvidence, b: &PointEvidence) -> bool {
+    let apart_px = |shift| a.corners_px.rotated(shift).furthest_px(&b.corners_px);
+    (1..4).any(|shift| apart_px(shift) < apart_px(0))
 }
 
 fn borders(quad: &Quad) -> Vec<(usize, Corners)> {

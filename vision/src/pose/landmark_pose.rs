@@ -6,7 +6,7 @@
 
 use crate::{
     frame::Intrinsics,
-    geometry::corners::Corners,
+    geometry::{corner_covariance::CornerCovariance, corners::Corners},
     pose::{
         linear::{faces_camera, linear_pose, mirrored},
         measurement::{LandmarkSize, PoseError, PoseMeasurement, measured},
@@ -14,7 +14,6 @@ use crate::{
         spread::second_moment,
     },
 };
-use nalgebra::Matrix2;
 
 /// Pose of a recognised landmark: always with covariance, and with the second solution of the planar ambiguity.
 #[derive(Debug, Clone, PartialEq)]
@@ -41,14 +40,14 @@ pub const AMBIGUOUS_CHI2: f64 = 16.0;
 const SAME_POSE_RAD: f64 = 1e-4;
 
 /// Pose of a landmark of known `size` from its `corners` (pixels, distorted as seen, in the landmark's own order)
-/// with their covariances. Eq. (2), nearest rotation, then least squares from it and from its mirror image.
+/// with their covariance, joint or of each. Eq. (2), nearest rotation, then least squares from it and from its mirror image.
 pub fn landmark_pose(
     corners: &Corners,
-    covariance_px2: &[Matrix2<f64>; 4],
+    covariance_px2: impl Into<CornerCovariance>,
     size: LandmarkSize,
     camera: &Intrinsics,
 ) -> Result<LandmarkPose, PoseError> {
-    let measured = measured(corners, covariance_px2, size, camera)?;
+    let measured = measured(corners, &covariance_px2.into(), size, camera)?;
     let problem = Problem::new(&measured).ok_or(PoseError::Degenerate)?;
     let start = linear_pose(&measured).ok_or(PoseError::Degenerate)?;
     let first = problem

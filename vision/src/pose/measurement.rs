@@ -2,9 +2,9 @@
 
 use crate::{
     frame::{Distortion, FrameError, Intrinsics},
-    geometry::corners::Corners,
+    geometry::{corner_covariance::CornerCovariance, corners::Corners},
 };
-use nalgebra::{Matrix2, Matrix2x3, Point2};
+use nalgebra::{Matrix2, Matrix2x3};
 
 /// Width and height of a landmark, in metres.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -27,8 +27,8 @@ impl LandmarkSize {
 pub struct PoseMeasurement {
     /// Corners as a pinhole with the same K would see them, in the landmark's order.
     pub corners_px: Corners,
-    /// Covariance of each of them.
-    pub covariance_px2: [Matrix2<f64>; 4],
+    /// Their joint covariance.
+    pub covariance_px2: CornerCovariance,
     /// The pinhole.
     pub camera: Intrinsics,
     /// Derivative of each corner by errors of the camera's (share of the focal length, cx, cy).
@@ -84,7 +84,7 @@ pub enum PoseError {
 /// Checks the input and undistorts the corners.
 pub(crate) fn measured(
     corners: &Corners,
-    covariance_px2: &[Matrix2<f64>; 4],
+    covariance_px2: &CornerCovariance,
     size: LandmarkSize,
     camera: &Intrinsics,
 ) -> Result<PoseMeasurement, PoseError> {
@@ -103,8 +103,8 @@ pub(crate) fn measured(
 pub struct UndistortedCorners {
     /// As a pinhole with the same K would see them.
     pub corners_px: Corners,
-    /// Covariance of each of them.
-    pub covariance_px2: [Matrix2<f64>; 4],
+    /// Their joint covariance.
+    pub covariance_px2: CornerCovariance,
     /// The pinhole.
     pub camera: Intrinsics,
     /// See [`Intrinsics::straight_by_errors`].
@@ -115,28 +115,34 @@ pub struct UndistortedCorners {
 /// covariances.
 pub fn straightened(
     corners: &Corners,
-    covariance_px2: &[Matrix2<f64>; 4],
+    covariance_px2: &CornerCovariance,
     camera: &Intrinsics,
 ) -> Result<UndistortedCorners, PoseError> {
     let c = Intrinsics::new(camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px, camera.distortion)?;
     let c = camera.sigmas.map_or(Ok(c), |sigmas| c.with_sigmas(sigmas))?;
     let mut by_camera = [Matrix2x3::zeros(); 4];
-    let (mut straight, mut covariances) = (*corners.points(), *covariance_px2);
-    for (corner, (p, s)) in straight.iter_mut().zip(&mut covariances).enumerate() {
+    let (mut straight, mut derivatives) = (*corners.points(), [Matrix2::identity(); 4]);
+    for (corner, (p, derivative)) in straight.iter_mut().zip(&mut derivatives).enumerate() {
         if p.x.abs() > MAX_CORNER_PX || p.y.abs() > MAX_CORNER_PX {
             return Err(PoseError::Corner { corner });
         }
-        if !is_corner_covariance(s) {
+        if !is_corner_covariance(&covariance_px2.of(corner)) {
             return Err(PoseError::Covariance { corner });
         }
         if c.distortion != Distortion::None {
-            (*p, *s) = undistorted(&c, p, s).ok_or(PoseError::Distortion)?;
+            (*p, *derivative) = c.undistort_with(p).ok_or(PoseError::Distortion)?;
+            let own = *derivative * covariance_px2.of(corner) * derivative.transpose();
+            if !is_corner_covariance(&own) {
+                return Err(PoseError::Distortion);
+            }
         }
         by_camera[corner] = c.straight_by_errors(p).ok_or(PoseError::Distortion)?;
     }
     let corners_px = Corners::new(straight).map_err(|_folded| PoseError::Distortion)?;
     let camera = Intrinsics { distortion: Distortion::None, ..c };
-    Ok(UndistortedCorners { corners_px, covariance_px2: covariances, camera, by_camera })
+    let covariance_px2 =
+        if c.distortion == Distortion::None { *covariance_px2 } else { covariance_px2.mapped(&derivatives) };
+    Ok(UndistortedCorners { corners_px, covariance_px2, camera, by_camera })
 }
 
 /// Symmetric, with both standard deviations in range.
@@ -145,15 +151,4 @@ pub(crate) fn is_corner_covariance(s: &Matrix2<f64>) -> bool {
     let (mean, spread) = (0.5 * (s.m11 + s.m22), (0.5 * (s.m11 - s.m22)).hypot(s.m12));
     // NaN fails every comparison.
     symmetric && mean - spread >= MIN_CORNER_SIGMA_PX.powi(2) && mean + spread <= MAX_CORNER_SIGMA_PX.powi(2)
-}
-
-/// The undistorted point and its covariance.
-fn undistorted(
-    camera: &Intrinsics,
-    p: &Point2<f64>,
-    s: &Matrix2<f64>,
-) -> Option<(Point2<f64>, Matrix2<f64>)> {
-    let (straight, j) = camera.undistort_with(p)?;
-    let covariance = j * s * j.transpose();
-    is_corner_covariance(&covariance).then_some((straight, covariance))
 }

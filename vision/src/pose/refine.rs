@@ -4,7 +4,7 @@ use crate::pose::{
     measurement::PoseMeasurement,
     reprojection::{corner_points, perturbed, pixel, project},
 };
-use nalgebra::{Isometry3, Matrix2, Matrix3, Matrix6, SMatrix, Vector2, Vector6};
+use nalgebra::{Isometry3, Matrix3, Matrix6, SMatrix, SVector, Vector6};
 
 /// One minimum of the reprojection error.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,54 +28,56 @@ const STEP_TOLERANCE: f64 = 1e-12;
 /// 95 % quantile of chi2 with two degrees of freedom.
 pub(crate) const CHI2_2_95: f64 = 5.991;
 
-/// Corners whitened by their covariance: `weights[i]` has `W^T W = covariance^-1`.
+/// Corners whitened by their covariance: `whitening` has `W^T W = covariance^-1`.
 pub(crate) struct Problem<'a> {
     measured: &'a PoseMeasurement,
-    weights: [Matrix2<f64>; 4],
+    whitening: SMatrix<f64, 8, 8>,
 }
 
 impl<'a> Problem<'a> {
-    /// `None` when a covariance is not positive definite.
+    /// `None` when the covariance is not positive definite.
     pub(crate) fn new(measured: &'a PoseMeasurement) -> Option<Self> {
-        let mut weights = [Matrix2::zeros(); 4];
-        for (w, covariance) in weights.iter_mut().zip(&measured.covariance_px2) {
-            *w = covariance.cholesky()?.l().try_inverse()?;
-        }
-        Some(Self { measured, weights })
+        Some(Self { measured, whitening: measured.covariance_px2.whitening()? })
     }
 
     /// Weighted squared error; infinite where a corner is not in front of the camera.
     pub(crate) fn chi2(&self, pose: &Isometry3<f64>) -> f64 {
-        let mut sum = 0.0;
+        let mut residual = SVector::<f64, 8>::zeros();
         for (i, point) in corner_points(&self.measured.size).iter().enumerate() {
             let Some(px) = pixel(pose, point, &self.measured.camera) else { return f64::INFINITY };
-            sum += (self.weights[i] * (self.measured.corners_px.points()[i] - px)).norm_squared();
+            residual.fixed_rows_mut::<2>(2 * i).copy_from(&(self.measured.corners_px.points()[i] - px));
         }
+        let sum = (self.whitening * residual).norm_squared();
         if sum.is_nan() { f64::INFINITY } else { sum }
     }
 
     /// Information `J^T S^-1 J` and `J^T S^-1 r` by the left perturbation.
     pub(crate) fn normal_equations(&self, pose: &Isometry3<f64>) -> Option<(Matrix6<f64>, Vector6<f64>)> {
-        let (mut h, mut g) = (Matrix6::zeros(), Vector6::zeros());
+        let (j, r) = self.whitened(pose)?;
+        Some((j.transpose() * j, j.transpose() * r))
+    }
+
+    /// Whitened derivatives by the pose, and residuals.
+    fn whitened(&self, pose: &Isometry3<f64>) -> Option<(SMatrix<f64, 8, 6>, SVector<f64, 8>)> {
+        let (mut j, mut r) = (SMatrix::<f64, 8, 6>::zeros(), SVector::<f64, 8>::zeros());
         for (i, point) in corner_points(&self.measured.size).iter().enumerate() {
             let projected = project(pose, point, &self.measured.camera)?;
-            let j = self.weights[i] * projected.by_pose;
-            let r: Vector2<f64> = self.weights[i] * (self.measured.corners_px.points()[i] - projected.px);
-            h += j.transpose() * j;
-            g += j.transpose() * r;
+            j.fixed_rows_mut::<2>(2 * i).copy_from(&projected.by_pose);
+            r.fixed_rows_mut::<2>(2 * i).copy_from(&(self.measured.corners_px.points()[i] - projected.px));
         }
-        Some((h, g))
+        Some((self.whitening * j, self.whitening * r))
     }
 
     /// Covariance of a minimum due to errors of the intrinsics, to first order. `None` where none are stated.
     pub(crate) fn spread_by_camera(&self, pose: &Isometry3<f64>) -> Option<Matrix6<f64>> {
         self.measured.camera.sigmas?;
-        let (h, _) = self.normal_equations(pose)?;
-        let mut pull = SMatrix::<f64, 6, 3>::zeros();
-        for (i, point) in corner_points(&self.measured.size).iter().enumerate() {
-            let j = self.weights[i] * project(pose, point, &self.measured.camera)?.by_pose;
-            pull += j.transpose() * self.weights[i] * self.measured.by_camera[i];
+        let (j, _) = self.whitened(pose)?;
+        let mut moved = SMatrix::<f64, 8, 3>::zeros();
+        for (i, by_camera) in self.measured.by_camera.iter().enumerate() {
+            moved.fixed_rows_mut::<2>(2 * i).copy_from(by_camera);
         }
+        let pull = j.transpose() * (self.whitening * moved);
+        let h = j.transpose() * j;
         let by_camera = h.cholesky()?.solve(&pull);
         let sigmas = Matrix3::from_diagonal(&self.measured.camera.error_sigmas());
         let by_sigmas = by_camera * sigmas;

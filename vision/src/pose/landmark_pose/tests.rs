@@ -9,7 +9,7 @@ use crate::{
     },
     random::Random,
 };
-use nalgebra::{Isometry3, Matrix3, Point2, Rotation3, UnitQuaternion};
+use nalgebra::{Isometry3, Matrix2, Matrix3, Point2, Rotation3, UnitQuaternion};
 use nalgebra::{Vector2, Vector3, Vector6};
 
 const SIZE: LandmarkSize = LandmarkSize { width_m: 0.6, height_m: 0.84 };

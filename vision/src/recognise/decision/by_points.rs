@@ -119,12 +119,17 @@ fn refusal<'a>(
     }
     // The ratio of the exponents depends on the number of taught points, not on presence: a look-alike taught with
     // fewer points agrees wherever it has any.
-    let alarms = |f: &LandmarkPoints| log10_false_alarms(&f.evidence, landmarks);
-    let is_rival = |f: &LandmarkPoints| {
-        let accepted = alarms(f) <= LOG10_EPSILON;
-        alarms(f) / alarms(best) >= p.recognise.verdict.margin || (accepted && !is_contradicted(f))
+    let alarms = |evidence: &PointEvidence| log10_false_alarms(evidence, landmarks);
+    let is_rival = |evidence: &PointEvidence| {
+        let accepted = alarms(evidence) <= LOG10_EPSILON;
+        alarms(evidence) / alarms(&best.evidence) >= p.recognise.verdict.margin
+            || (accepted && !is_contradicted(evidence))
     };
-    if others.any(is_rival) {
+    if others.any(|f| is_rival(&f.evidence)) {
+        return Some(MatchRefusal::Margin);
+    }
+    // A landmark that looks the same upside down: its name is certain, its pose is not.
+    if best.turned.as_ref().is_some_and(is_rival) {
         return Some(MatchRefusal::Margin);
     }
     // No likeness where part of the landmark is outside the image.
@@ -145,8 +150,8 @@ pub(crate) fn is_doubtful(evidence: &PointEvidence, alignment: &IconAlignment) -
 }
 
 /// Whether a connected part of it mismatches by its points.
-fn is_contradicted(found: &LandmarkPoints) -> bool {
-    is_doubtful(&found.evidence, &IconAlignment::NONE)
+fn is_contradicted(evidence: &PointEvidence) -> bool {
+    is_doubtful(evidence, &IconAlignment::NONE)
 }
 
 /// The border of `quad` nearest to the landmark's: 0 for its corners, i for alternate i - 1; and its corners, the

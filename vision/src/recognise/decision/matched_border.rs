@@ -4,9 +4,19 @@ use crate::{
     detect::quad::Quad,
     params::Params,
     recognise::decision::result::RecognitionResult,
-    seen_border::{ALIGNED_SIGMA_ICON_PX, FoundBy, SeenBorder, is_same_border},
+    seen_border::{ALIGNED_SIGMA_ICON_PX, FoundBy, SeenBorder, aligned_covariance_px2, is_same_border},
 };
 use nalgebra::Matrix2;
+
+/// Where the landmark's texture puts its border: by points, by alignment, or, where neither was needed, as detected.
+pub fn texture_border(quad: &Quad, verdict: &RecognitionResult, p: &Params) -> Option<SeenBorder> {
+    if let Some(evidence) = &verdict.points {
+        return Some(evidence.border());
+    }
+    let Some(corners_px) = verdict.aligned_px else { return matched_border(quad, verdict, p) };
+    let covariance_px2 = aligned_covariance_px2(&corners_px, p.icon.size);
+    Some(SeenBorder { corners_px, covariance_px2, found_by: FoundBy::Alignment })
+}
 
 /// The landmark's border: as detected, or, where another border of the same object was taught than the one
 /// detected, as aligned. An alternate border has no covariances of its own: those of the quad are used, both follow

@@ -17,7 +17,7 @@ pub enum MatchRefusal {
     Mismatch,
     /// Similar, but hardly beyond the frame.
     LowContent,
-    /// Accepted by its own thresholds, but another landmark is too close behind.
+    /// Accepted by its own thresholds, but another landmark, or the same one turned, is too close behind.
     Margin,
     /// The point evidence has too many expected false alarms.
     Points,
