@@ -44,6 +44,11 @@ impl CameraExtrinsics {
         Ok(made)
     }
 
+    /// The direction of up in the camera frame, unit length, of a robot that stands on the floor.
+    pub fn camera_up(&self) -> Vector3<f64> {
+        self.robot_from_camera.inverse_transform_vector(&Vector3::z())
+    }
+
     /// Unit rotation, camera within [`MAX_MOUNTING_M`] of the robot's origin, covariance possible.
     pub fn check(&self) -> Result<(), OutOfRange> {
         let norm = self.robot_from_camera.rotation.quaternion().norm();
@@ -90,6 +95,19 @@ mod tests {
         // Tilt is about the panned axis: the image stays level.
         let right = pan_tilt(0.7, 0.3, Vector3::zeros()).rotation * Vector3::x();
         assert!(right.z.abs() < 1e-12);
+    }
+
+    #[test]
+    fn up_in_the_camera_goes_by_tilt_and_roll_and_not_by_pan() {
+        let up = |pan, tilt, roll| {
+            let rolled = Isometry3::rotation(Vector3::new(0.0, 0.0, roll));
+            let mounting = pan_tilt(pan, tilt, Vector3::new(0.1, 0.2, 1.0)) * rolled;
+            CameraExtrinsics::new(mounting).unwrap().camera_up()
+        };
+        assert!((up(0.8, 0.0, 0.0) + Vector3::y()).norm() < 1e-12);
+        // Rolled clockwise by a quarter, its x axis points down.
+        assert!((up(0.8, 0.0, FRAC_PI_2) + Vector3::x()).norm() < 1e-12);
+        assert!((up(-2.0, FRAC_PI_2, 0.3) - Vector3::z()).norm() < 1e-12);
     }
 
     #[test]

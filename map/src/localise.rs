@@ -11,6 +11,7 @@ mod derivatives;
 pub(crate) mod predict;
 mod planar;
 mod posterior;
+mod spatial;
 mod solve;
 mod refusal_causes;
 mod robot_pose;

@@ -1,16 +1,21 @@
 //! The pose in space of a camera that is held in a hand, from the landmarks of one photograph (method 13.8). In:
 //! observations of landmarks of known place. Out: `map_from_camera` with its covariance, or why there is none.
 //!
-//! Nothing is assumed of the mounting: one landmark alone determines the pose. The landmark that determines it best gives
-//! the pose; the others decide between its two solutions, and must agree with it. They are not averaged: their errors
-//! share those of the intrinsics.
+//! Nothing is assumed of the mounting: one landmark alone determines the pose, but its direction poorly. Several determine
+//! it together: all corners are fitted at once, with the errors of each landmark's place and of the intrinsics, which
+//! they share, in the weights. A landmark that contradicts at least two others, and most of them, is left out.
 
 use crate::{
     check::{self, OutOfRange},
-    localise::fix::LandmarkObservation,
+    gate::{Z_999, chi2_quantile},
+    localise::{
+        fix::LandmarkObservation,
+        robot_pose::largest,
+        spatial::{Spatial, SpatialFit},
+    },
     place::LandmarkPlace,
 };
-use nalgebra::{Isometry3, Matrix6, Translation3, Vector3, Vector6};
+use nalgebra::{Isometry3, Matrix6, Translation3, Vector3};
 use vision::{
     model::LandmarkId,
     pose::{PoseSolution, reprojection::cross},
@@ -18,8 +23,12 @@ use vision::{
 
 /// Heights above the floor, metres, at which a camera is accepted.
 const CAMERA_HEIGHT_M: std::ops::RangeInclusive<f64> = 0.0..=5.0;
-/// 99.9 % quantile of chi2 with 6 degrees of freedom: the largest distance of two poses that agree.
-const AGREE_CHI2: f64 = 22.458;
+/// Two minima whose chi2 differs by less are ambiguous: see [`vision::pose::AMBIGUOUS_CHI2`].
+const AMBIGUOUS_CHI2: f64 = 16.0;
+/// Two minima nearer than this (metres and radians) are one.
+const SAME_POSE: f64 = 1e-4;
+/// Fewest landmarks that outvote another one.
+const MIN_AGREEING: usize = 2;
 
 /// Pose of a camera in the map.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,7 +37,7 @@ pub struct CameraPose {
     pub map_from_camera: Isometry3<f64>,
     /// Covariance of (rotation vector, position), map frame: corners, place and size of the landmark, intrinsics.
     pub covariance: Matrix6<f64>,
-    /// The landmark that gives the pose, then those that agree with it.
+    /// The landmarks that give the pose.
     pub landmarks: Vec<LandmarkId>,
 }
 
@@ -62,31 +71,78 @@ struct Candidate {
 }
 
 fn decide(observations: &[LandmarkObservation<'_>]) -> Result<CameraPose, CameraPoseRefusal> {
-    let mut all = Vec::with_capacity(observations.len());
-    for observation in observations {
-        let candidates = candidates(observation);
-        if candidates.is_empty() {
-            return Err(CameraPoseRefusal::Height);
-        }
-        all.push((observation.landmark, candidates));
+    let mut used = largest(observations);
+    let most = used.len();
+    loop {
+        let worst = match used.as_slice() {
+            [only] => return by_one(only),
+            _ => match by_several(&used) {
+                Ok(pose) => return Ok(pose),
+                Err((refusal, worst)) => {
+                    worst.filter(|_| used.len() > MIN_AGREEING.max(most / 2 + 1)).ok_or(refusal)?
+                }
+            },
+        };
+        // One landmark hangs elsewhere by now: most of the others must still agree.
+        used.remove(worst);
     }
-    // The best known position first; stable, so equal ones stay in order.
-    let spread =
-        |c: &[Candidate]| c.iter().map(|c| c.covariance.fixed_view::<3, 3>(3, 3).trace()).fold(0.0, f64::max);
-    all.sort_by(|(_, a), (_, b)| spread(a).total_cmp(&spread(b)));
-    let landmarks = all.iter().map(|(landmark, _)| *landmark).collect();
-    let mut all = all.into_iter().map(|(_, candidates)| candidates);
-    let first = all.next().unwrap_or_default();
-    let others: Vec<Vec<Candidate>> = all.collect();
-    let agrees = |c: &Candidate| others.iter().all(|o| o.iter().any(|o| distance2(c, o) <= AGREE_CHI2));
-    let mut left: Vec<Candidate> = first.into_iter().filter(agrees).collect();
+}
+
+/// The pose by one landmark.
+fn by_one(observation: &LandmarkObservation<'_>) -> Result<CameraPose, CameraPoseRefusal> {
+    let mut left = candidates(observation);
     match (left.pop(), left.is_empty()) {
-        (Some(only), true) => {
-            Ok(CameraPose { map_from_camera: only.pose, covariance: only.covariance, landmarks })
+        (Some(Candidate { pose, covariance }), true) => {
+            Ok(CameraPose { map_from_camera: pose, covariance, landmarks: vec![observation.landmark] })
         }
         (Some(_), false) => Err(CameraPoseRefusal::Ambiguous),
-        (None, _) => Err(CameraPoseRefusal::Disagree),
+        (None, _) => Err(CameraPoseRefusal::Height),
     }
+}
+
+/// The pose that fits all landmarks; or why there is none, with the one that fits worst where they disagree.
+fn by_several(
+    observations: &[LandmarkObservation<'_>],
+) -> Result<CameraPose, (CameraPoseRefusal, Option<usize>)> {
+    let problem = Spatial::new(observations);
+    let starts: Vec<Isometry3<f64>> =
+        observations.iter().flat_map(candidates).map(|c| c.pose.inverse()).collect();
+    if starts.is_empty() {
+        return Err((CameraPoseRefusal::Height, None));
+    }
+    let mut found: Vec<SpatialFit> = Vec::new();
+    for fit in starts.into_iter().filter_map(|start| problem.descend(start)) {
+        let is_new = |f: &SpatialFit| !is_same(&f.camera_from_map, &fit.camera_from_map);
+        if found.iter().all(is_new) {
+            found.push(fit);
+        }
+    }
+    found.sort_by(|a, b| a.chi2.total_cmp(&b.chi2));
+    let Some(best) = found.first() else { return Err((CameraPoseRefusal::Disagree, None)) };
+    let limit = chi2_quantile(problem.dof(), Z_999);
+    if best.chi2 > limit {
+        let worst = (0..best.each.len()).max_by(|a, b| best.each[*a].total_cmp(&best.each[*b]));
+        return Err((CameraPoseRefusal::Disagree, worst));
+    }
+    if found.get(1).is_some_and(|second| second.chi2 - best.chi2 < AMBIGUOUS_CHI2) {
+        return Err((CameraPoseRefusal::Ambiguous, None));
+    }
+    let map_from_camera = best.camera_from_map.inverse();
+    if !CAMERA_HEIGHT_M.contains(&map_from_camera.translation.z) {
+        return Err((CameraPoseRefusal::Height, None));
+    }
+    let by_seen = by_camera_from(&best.camera_from_map, &map_from_camera);
+    Ok(CameraPose {
+        map_from_camera,
+        covariance: by_seen * best.covariance * by_seen.transpose(),
+        landmarks: observations.iter().map(|o| o.landmark).collect(),
+    })
+}
+
+/// Whether two descents ended in one minimum.
+fn is_same(a: &Isometry3<f64>, b: &Isometry3<f64>) -> bool {
+    a.rotation.angle_to(&b.rotation) < SAME_POSE
+        && (a.inverse().translation.vector - b.inverse().translation.vector).norm() < SAME_POSE
 }
 
 /// The solutions that the image does not tell apart, as poses of the camera at a possible height.
@@ -101,16 +157,22 @@ fn candidates(observation: &LandmarkObservation<'_>) -> Vec<Candidate> {
 fn candidate(solution: &PoseSolution, place: &LandmarkPlace) -> Candidate {
     let (seen, map_from_landmark) = (&solution.camera_from_landmark, place.map_from_landmark());
     let pose = map_from_landmark * seen.inverse();
-    // (rotation vector, translation) of `camera_from_landmark` to (rotation vector, position) of the camera in the map.
-    let map_from_camera = pose.rotation.to_rotation_matrix().into_inner();
-    let mut by_seen = Matrix6::zeros();
-    by_seen.fixed_view_mut::<3, 3>(0, 0).copy_from(&-map_from_camera);
-    by_seen.fixed_view_mut::<3, 3>(3, 0).copy_from(&(-map_from_camera * cross(&seen.translation.vector)));
-    by_seen.fixed_view_mut::<3, 3>(3, 3).copy_from(&-map_from_camera);
+    let by_seen = by_camera_from(seen, &pose);
     let by_place = by_place(place, &pose.translation, &map_from_landmark.translation);
     let covariance = by_seen * solution.covariance * by_seen.transpose()
         + by_place * place.covariance * by_place.transpose();
     Candidate { pose, covariance }
+}
+
+/// Derivative of (rotation vector, position) of the camera in the map by the left perturbation of `camera_from_other`, the
+/// inverse of its pose up to a fixed transform of the other frame.
+fn by_camera_from(camera_from_other: &Isometry3<f64>, map_from_camera: &Isometry3<f64>) -> Matrix6<f64> {
+    let turn = map_from_camera.rotation.to_rotation_matrix().into_inner();
+    let mut by_seen = Matrix6::zeros();
+    by_seen.fixed_view_mut::<3, 3>(0, 0).copy_from(&-turn);
+    by_seen.fixed_view_mut::<3, 3>(3, 0).copy_from(&(-turn * cross(&camera_from_other.translation.vector)));
+    by_seen.fixed_view_mut::<3, 3>(3, 3).copy_from(&-turn);
+    by_seen
 }
 
 /// Derivative of (rotation vector, position) of the camera by (x, y, theta, z, width, height) of the landmark. A landmark
@@ -126,12 +188,4 @@ fn by_place(place: &LandmarkPlace, camera: &Translation3<f64>, centre: &Translat
     by_place.fixed_view_mut::<3, 1>(3, 4).copy_from(&(arm * (0.5 / place.size.width_m)));
     by_place.fixed_view_mut::<3, 1>(3, 5).copy_from(&(arm * (0.5 / place.size.height_m)));
     by_place
-}
-
-/// Squared Mahalanobis distance of two poses; infinite where their covariance is singular.
-fn distance2(a: &Candidate, b: &Candidate) -> f64 {
-    let rotation = (a.pose.rotation * b.pose.rotation.inverse()).scaled_axis();
-    let position = a.pose.translation.vector - b.pose.translation.vector;
-    let d = Vector6::from_iterator(rotation.iter().chain(position.iter()).copied());
-    (a.covariance + b.covariance).cholesky().map_or(f64::INFINITY, |s| d.dot(&s.solve(&d)))
 }

@@ -200,9 +200,7 @@ impl<'a> Planar<'a> {
         let n = self.observations.len();
         let mut s = DMatrix::zeros(8 * n, 8 * n);
         for (i, observation) in self.observations.iter().enumerate() {
-            for (c, covariance) in observation.seen.measured.covariance_px2.iter().enumerate() {
-                s.view_mut((8 * i + 2 * c, 8 * i + 2 * c), (2, 2)).copy_from(covariance);
-            }
+            s.view_mut((8 * i, 8 * i), (8, 8)).copy_from(observation.seen.measured.covariance_px2.matrix());
         }
         s
     }

@@ -43,7 +43,8 @@ pub(super) fn checked<'a>(view: &PosedView<'a>) -> Result<CheckedView<'a>, Place
     view.map_from_robot.check()?;
     view.mounting.check()?;
     let UndistortedCorners { corners_px, covariance_px2, camera, by_camera } =
-        straightened(view.corners, view.covariance_px2, view.camera)?;
+        straightened(view.corners, &view.covariance_px2.into(), view.camera)?;
+    let covariance_px2 = covariance_px2.blocks();
     let (map_from_robot, mounting) = (view.map_from_robot, view.mounting);
     Ok(CheckedView { corners_px, covariance_px2, camera, by_camera, map_from_robot, mounting })
 }

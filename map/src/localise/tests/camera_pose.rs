@@ -106,3 +106,60 @@ fn landmarks_that_contradict_one_another_and_impossible_heights_give_no_pose() {
     assert_eq!(camera_pose(&[seen(1, &pose, &low)]).unwrap(), Err(CameraPoseRefusal::Height));
     assert_eq!(camera_pose(&[]).unwrap_err().field, "observations");
 }
+
+/// The landmark `beside`, metres along its wall to the right.
+fn beside(place: &LandmarkPlace, along_m: f64) -> LandmarkPlace {
+    let mut other = *place;
+    other.x_m += along_m * place.theta_rad.sin();
+    other.y_m -= along_m * place.theta_rad.cos();
+    other
+}
+
+/// `place` as it really is: off by its stated errors.
+fn real(place: &LandmarkPlace, random: &mut Random) -> LandmarkPlace {
+    let sigma = place.covariance.diagonal().map(f64::sqrt);
+    let e = sigma.map(|s| s * random.normal());
+    let mut real = *place;
+    (real.x_m, real.y_m, real.theta_rad, real.z_m) =
+        (real.x_m + e[0], real.y_m + e[1], real.theta_rad + e[2], real.z_m + e[3]);
+    (real.size.width_m, real.size.height_m) = (real.size.width_m + e[4], real.size.height_m + e[5]);
+    real
+}
+
+#[test]
+fn two_landmarks_give_a_better_pose_than_one_with_the_covariance_of_its_errors() {
+    let (place, mut random) = (place(), Random::new(13));
+    let other = beside(&place, 1.8);
+    let (mut nees, mut count, mut one_m, mut two_m) = (0.0, 0, 0.0, 0.0);
+    for trial in 0..300 {
+        let truth = held(&place, 2.5 + f64::from(trial % 4) * 0.4, 20.0 + f64::from(trial % 3) * 10.0);
+        let a = photograph(&real(&place, &mut random), &truth, 0.5, &mut random);
+        let b = photograph(&real(&other, &mut random), &truth, 0.5, &mut random);
+        let Ok(alone) = camera_pose(&[seen(1, &a, &place)]).unwrap() else { continue };
+        let Ok(both) = camera_pose(&[seen(1, &a, &place), seen(2, &b, &other)]).unwrap() else { continue };
+        assert_eq!(both.landmarks.len(), 2);
+        one_m += error(&alone, &truth).fixed_rows::<3>(3).norm();
+        let error = error(&both, &truth);
+        two_m += error.fixed_rows::<3>(3).norm();
+        nees += error.dot(&both.covariance.cholesky().unwrap().solve(&error));
+        count += 1;
+    }
+    let mean = nees / f64::from(count);
+    assert!(count > 200 && (4.8..7.2).contains(&mean), "mean {mean} of {count}");
+    assert!(two_m < 0.7 * one_m, "{two_m} with two, {one_m} with one");
+}
+
+#[test]
+fn a_landmark_that_was_moved_is_outvoted_by_two_others() {
+    let (place, mut random) = (place(), Random::new(17));
+    let places = [place, beside(&place, 1.2), beside(&place, -1.3)];
+    let truth = held(&place, 2.0, 20.0);
+    let looks: Vec<LandmarkPose> = places.iter().map(|p| photograph(p, &truth, 0.3, &mut random)).collect();
+    let mut stated = places;
+    stated[0].x_m += 0.6;
+    let all: Vec<_> =
+        looks.iter().zip(&stated).zip(1..).map(|((look, place), i)| seen(i, look, place)).collect();
+    let found = camera_pose(&all).unwrap().unwrap();
+    assert!(!found.landmarks.contains(&LandmarkId(1)) && found.landmarks.len() == 2, "{:?}", found.landmarks);
+    assert!(error(&found, &truth).fixed_rows::<3>(3).norm() < 0.05);
+}
