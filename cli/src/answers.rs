@@ -106,6 +106,13 @@ fn pose_text(quad: &QuadAnswer) -> String {
         None if quad.pose_refusal == "no_size" => {
             format!(", no pose: its size is not known (waymark landmark size {} WxH)", quad.landmark)
         }
+        None if quad.pose_refusal == "reprojection" => {
+            ", no pose: its corners fit no landmark of its size (check width and height, and the camera)"
+                .to_owned()
+        }
+        None if quad.pose_refusal == "border_unclear" => {
+            ", no pose: a shadow or a second frame may be its border (try another view)".to_owned()
+        }
         None => String::new(),
     }
 }

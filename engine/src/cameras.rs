@@ -194,7 +194,11 @@ fn distorted_view(pose: &LandmarkPose, k: &Intrinsics) -> PlanarView {
     PlanarView {
         plane_m: corner_points(&m.size).map(|p| Point2::new(p.y, p.z)).to_vec(),
         seen_px: corners.iter().map(distorted).collect(),
-        covariance_px2: corners.iter().zip(&m.covariance_px2).map(|(p, s)| covariance(p, s)).collect(),
+        covariance_px2: corners
+            .iter()
+            .zip(&m.covariance_px2.blocks())
+            .map(|(p, s)| covariance(p, s))
+            .collect(),
     }
 }
 

@@ -4,7 +4,7 @@
 use nalgebra::Matrix2;
 use vision::{
     detect::{Quad, QuadKind, detect},
-    frame::GrayImage,
+    frame::{GrayImage, PictureRef},
     geometry::{Corners, polygon::iou},
     params::Params,
     trace::NoTrace,
@@ -26,14 +26,25 @@ pub struct WholeQuad {
     pub covariance_px2: [Matrix2<f64>; 4],
 }
 
+impl WholeQuad {
+    /// The same with corner `shift` (0 to 3) named top-left.
+    #[must_use]
+    pub fn rotated(&self, shift: usize) -> Self {
+        let Self { corners_px, covariance_px2 } = self;
+        let covariance_px2 = std::array::from_fn(|i| covariance_px2[(i + shift) % 4]);
+        Self { corners_px: corners_px.rotated(shift), covariance_px2 }
+    }
+}
+
 /// The quads of a photograph, largest first, px of the photograph: each with four detected sides, none clipped by the image
 /// border.
-pub fn whole_quads(image: &GrayImage, p: &Params) -> Vec<WholeQuad> {
-    let factor = ((image.width() * image.height()) as f64 / MAX_DETECT_PX as f64).sqrt().ceil() as usize;
+pub fn whole_quads<'a>(picture: impl Into<PictureRef<'a>>, p: &Params) -> Vec<WholeQuad> {
+    let picture = picture.into();
+    let factor = ((picture.width() * picture.height()) as f64 / MAX_DETECT_PX as f64).sqrt().ceil() as usize;
     let quads = if factor > 1 {
-        detect(&reduced(image, factor), &p.detect, &mut NoTrace)
+        detect(&picture.map(|plane| reduced(plane, factor)), &p.detect, &mut NoTrace)
     } else {
-        detect(image, &p.detect, &mut NoTrace)
+        detect(picture, &p.detect, &mut NoTrace)
     };
     let whole = |q: &&Quad| q.kind == QuadKind::Full && !q.side_clipped.contains(&true);
     let mut found: Vec<WholeQuad> =
@@ -61,7 +72,7 @@ fn inside(inner: &Corners, outer: &Corners) -> bool {
     inner.points().iter().all(|c| vision::geometry::polygon::contains(outer.points(), c, 1.0))
 }
 
-/// The image reduced by means of `factor` x `factor` pixels; a remainder at the right and the bottom is left out.
+/// A plane reduced by means of `factor` x `factor` pixels; a remainder at the right and the bottom is left out.
 fn reduced(image: &GrayImage, factor: usize) -> GrayImage {
     GrayImage::from_fn(image.width() / factor, image.height() / factor, |u, v| {
         let rows = (v * factor..(v + 1) * factor).map(|row| &image.data()[row * image.width()..]);

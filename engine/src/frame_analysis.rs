@@ -1,7 +1,8 @@
-//! A frame through the pipeline of `vision`, with the times of its stages. In: image, camera, a version of the map. Out:
+//! A frame through the pipeline of `vision`, with the times of its stages. In: picture, camera, a version of the map. Out:
 //! quads with verdicts and landmark poses.
 
 use super::snapshot::MapSnapshot;
+use map::extrinsics::CameraExtrinsics;
 use protos::{
     CheckedFrame,
     convert::{CheckedQuad, Pixels},
@@ -9,9 +10,10 @@ use protos::{
 };
 use std::{cell::RefCell, time::Instant};
 use vision::{
-    frame::{GrayImage, Intrinsics},
-    pipeline::{FrameAnalysis, LandmarkDatabase, Pipeline, analyse_quads},
+    frame::{Intrinsics, PictureRef},
+    pipeline::{FrameAnalysis, FrameCamera, LandmarkDatabase, Pipeline, analyse_quads},
     trace::{Stage, Trace},
+    up::Up,
 };
 
 /// Times the stages of the pipeline.
@@ -49,30 +51,42 @@ impl Trace for StageTimes {
 }
 
 /// Recognises a frame: what its detector finds, or the quads that the robot found, from there on alike.
-pub fn analyse_checked(
+pub fn analyse_checked<'a>(
     frame: &CheckedFrame,
-    image: &GrayImage,
+    picture: impl Into<PictureRef<'a>>,
     map: &MapSnapshot,
     times: &mut StageTimes,
 ) -> FrameAnalysis {
-    let camera = frame.intrinsics.as_ref();
-    let Pixels::Quads(found) = &frame.pixels else { return analyse_frame(image, camera, map, times) };
+    let picture = picture.into();
+    let camera = frame_camera(frame.intrinsics.as_ref(), frame.mounting.as_ref(), map);
+    let Pixels::Quads(found) = &frame.pixels else { return analyse_frame(picture, camera, map, times) };
     let quads = found.iter().map(|CheckedQuad { quad, .. }| quad.clone()).collect();
-    analyse_quads(image, quads, camera, database(map), &map.params, times)
+    analyse_quads(picture.grey(), quads, camera, database(map), &map.params, times)
 }
 
-/// Recognises an image against one version of a map: the whole pipeline.
-pub fn analyse_frame(
-    image: &GrayImage,
-    camera: Option<&Intrinsics>,
+/// Recognises a picture against one version of a map: the whole pipeline.
+pub fn analyse_frame<'a>(
+    picture: impl Into<PictureRef<'a>>,
+    camera: FrameCamera<'_>,
     map: &MapSnapshot,
     times: &mut StageTimes,
 ) -> FrameAnalysis {
     // Taken out while in use: a panic leaves no half-written pipeline behind.
     let mut pipeline = PIPELINE.take();
-    let analysis = pipeline.analyse(image, camera, database(map), &map.params, times);
+    let analysis = pipeline.analyse(picture, camera, database(map), &map.params, times);
     PIPELINE.set(pipeline);
     analysis
+}
+
+/// A camera on a robot. Without its mounting, up is not known.
+pub fn frame_camera<'a>(
+    intrinsics: Option<&'a Intrinsics>,
+    mounting: Option<&CameraExtrinsics>,
+    map: &MapSnapshot,
+) -> FrameCamera<'a> {
+    let up = mounting.and_then(|mounting| Up::new(mounting.camera_up()));
+    let up = if map.has_level_landmarks() { up.map(Up::with_level_landmarks) } else { up };
+    FrameCamera { intrinsics, up }
 }
 
 fn database(map: &MapSnapshot) -> LandmarkDatabase<'_> {
@@ -83,3 +97,6 @@ thread_local! {
     /// Buffers that the pipeline reuses from frame to frame; one pipeline a worker thread.
     static PIPELINE: RefCell<Pipeline> = RefCell::default();
 }
+
+#[cfg(test)]
+mod tests;

@@ -3,7 +3,7 @@
 
 use super::{
     fixes::photograph_pose,
-    frame_analysis::{StageTimes, analyse_frame},
+    frame_analysis::{StageTimes, analyse_frame, frame_camera},
     guided::{GuidedObservation, GuidedResult},
     landmark_checks::FrameEvaluation,
     pose_refusal::refusal_wire,
@@ -19,24 +19,29 @@ use protos::{
 };
 use std::time::Instant;
 use vision::{
-    frame::{GrayImage, Intrinsics},
+    border::BorderError,
+    frame::{Intrinsics, PictureRef},
     model::LandmarkId,
     pipeline::{FrameAnalysis, PoseUnavailable, QuadAnalysis},
 };
 
-/// The answer to one image without a robot: an uploaded photograph.
-pub fn answer_to_photograph(image: &GrayImage, camera: Option<&Intrinsics>, map: &MapSnapshot) -> v1::Answer {
-    analyse_photograph(image, camera, map).0
+/// The answer to one picture without a robot: an uploaded photograph. Nothing says how the camera was held.
+pub fn answer_to_photograph<'a>(
+    picture: impl Into<PictureRef<'a>>,
+    camera: Option<&Intrinsics>,
+    map: &MapSnapshot,
+) -> v1::Answer {
+    analyse_photograph(picture, camera, map).0
 }
 
 /// The same with the analysis that the answer rests on: quad by quad in the same order.
-pub fn analyse_photograph(
-    image: &GrayImage,
+pub fn analyse_photograph<'a>(
+    picture: impl Into<PictureRef<'a>>,
     camera: Option<&Intrinsics>,
     map: &MapSnapshot,
 ) -> (v1::Answer, FrameAnalysis) {
     let (started, mut times) = (Instant::now(), StageTimes::start());
-    let analysis = analyse_frame(image, camera, map, &mut times);
+    let analysis = analyse_frame(picture, frame_camera(camera, None, map), map, &mut times);
     let mut answer = answer(&analysis, map);
     if camera.is_some() {
         match photograph_pose(&analysis, map) {
@@ -85,14 +90,26 @@ fn quad(analysis: &QuadAnalysis, map: &MapSnapshot) -> v1::QuadAnswer {
             quad.corners = corners(&analysis.quad.corners_px.rotated(result.rotation));
         }
     }
+    if let Some(border_px) = &analysis.border_px {
+        quad.corners = corners(border_px);
+    }
     match &analysis.pose {
         Ok(pose) => fill_pose(&mut quad, pose),
-        Err(PoseUnavailable::NotUnique) => {}
-        Err(PoseUnavailable::NoCamera) => "no_intrinsics".clone_into(&mut quad.pose_refusal),
-        Err(PoseUnavailable::NoSize(_)) => "no_size".clone_into(&mut quad.pose_refusal),
-        Err(PoseUnavailable::Pose(_)) => "degenerate".clone_into(&mut quad.pose_refusal),
+        Err(reason) => pose_refusal(reason).clone_into(&mut quad.pose_refusal),
     }
     quad
+}
+
+/// The word on the wire; empty where no landmark was recognised.
+fn pose_refusal(reason: &PoseUnavailable) -> &'static str {
+    match reason {
+        PoseUnavailable::NotUnique => "",
+        PoseUnavailable::NoCamera => "no_intrinsics",
+        PoseUnavailable::NoSize(_) => "no_size",
+        PoseUnavailable::Border(BorderError::Reprojection { .. }) => "reprojection",
+        PoseUnavailable::Border(BorderError::Unclear) => "border_unclear",
+        PoseUnavailable::Border(BorderError::Pose(_)) | PoseUnavailable::Pose(_) => "degenerate",
+    }
 }
 
 fn camera_pose_wire(pose: &CameraPose, map: &MapSnapshot) -> v1::CameraPose {

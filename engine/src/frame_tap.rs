@@ -9,7 +9,7 @@ use vision::{frame::GrayImage, pipeline::QuadAnalysis};
 /// A frame after its analysis.
 #[derive(Debug)]
 pub struct AnalysedFrame {
-    /// The decoded picture.
+    /// The decoded picture, in grey: what is learnt of it is texture.
     pub image: GrayImage,
     /// Its quads with verdicts.
     pub quads: Vec<QuadAnalysis>,

@@ -21,6 +21,7 @@ use map::{
 use nalgebra::Matrix2;
 use std::{collections::BTreeSet, sync::Arc};
 use vision::{
+    border::estimate_border,
     frame::GrayImage,
     geometry::{Corners, polygon},
     model::LandmarkId,
@@ -28,7 +29,7 @@ use vision::{
     points::verify::PointEvidence,
     pose::{LandmarkPose, landmark_pose},
     recognise::{MatchRefusal, Verdict},
-    seen_border::SeenBorder,
+    seen_border::{FoundBy, SeenBorder},
 };
 
 /// Two quads that overlap by more than this and may be the same landmark are two borders of one object.
@@ -133,7 +134,8 @@ pub fn recognise_guided(
     let missed = expected.searchable().any(is_missed);
     let report = GuidedReport { contradictions: assigned.contradictions(), missed };
     let named = assigned.unique().filter(|(i, _)| !matches[*i].is_unique);
-    let observations = named.filter_map(|(i, id)| guided_observation(&matches[i], id, frame)).collect();
+    let observations =
+        named.filter_map(|(i, id)| guided_observation(image, &matches[i], id, frame)).collect();
     GuidedResult { observations, report }
 }
 
@@ -250,17 +252,27 @@ fn observation(quad: &QuadMatch) -> Observation {
     Observation::new(*corners_px, covariance_px2, members.iter().map(candidate).collect())
 }
 
+/// The landmark at a quad that the prior pose names; `None` where no border is clear enough for a pose.
 fn guided_observation(
+    image: &GrayImage,
     quad_match: &QuadMatch,
     landmark: LandmarkId,
     frame: &FrameContext<'_>,
 ) -> Option<GuidedObservation> {
     let LookAlikeMatch { corners_px, covariance_px2, .. } = &quad_match.matched;
     let size = frame.map.sizes.get(&landmark)?;
-    let pose = landmark_pose(corners_px, covariance_px2, *size, frame.camera?).ok()?;
+    let camera = frame.camera?;
+    let (corners_px, joint_px2) = if frame.is_whole {
+        let found_by = FoundBy::Alignment;
+        let texture = SeenBorder { corners_px: *corners_px, covariance_px2: *covariance_px2, found_by };
+        let border = estimate_border(image.into(), &texture, *size, camera).ok()?;
+        (border.corners_px, border.covariance_px2)
+    } else {
+        (*corners_px, covariance_px2.into())
+    };
+    let pose = landmark_pose(&corners_px, joint_px2, *size, camera).ok()?;
     let (quad, points) = (quad_match.quad, quad_match.points.clone());
-    let (corners_px, covariance_px2) = (*corners_px, *covariance_px2);
-    Some(GuidedObservation { quad, landmark, corners_px, covariance_px2, pose, points })
+    Some(GuidedObservation { quad, landmark, corners_px, covariance_px2: joint_px2.blocks(), pose, points })
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@
 use super::{
     ambiguous_observations::ambiguous_observations,
     fixes::{NoFix, landmark_observations, robot_fixes},
-    frame_analysis::{StageTimes, analyse_frame},
+    frame_analysis::{StageTimes, analyse_frame, frame_camera},
     relocalise::{RelocalisationInput, Relocalisers},
     snapshot::MapSnapshot,
 };
@@ -19,7 +19,7 @@ use map::{
 };
 use protos::{Name, v1};
 use vision::{
-    frame::{GrayImage, Intrinsics},
+    frame::{Intrinsics, PictureRef},
     model::LandmarkId,
 };
 
@@ -36,7 +36,7 @@ const INDEPENDENT: f64 = 30.0;
 #[derive(Debug, Clone, Copy)]
 pub struct LocaliseFrame<'a> {
     /// The picture.
-    pub image: &'a GrayImage,
+    pub picture: PictureRef<'a>,
     /// Its camera.
     pub camera: &'a Intrinsics,
     /// `robot_from_camera`.
@@ -166,7 +166,8 @@ type Found = Result<Vec<LocaliseHypothesis>, LocaliseReason>;
 /// By landmarks: those that the picture names, else those that a quad may be.
 fn by_frame(map: &MapSnapshot, frame: &LocaliseFrame<'_>) -> (Found, v1::Answer) {
     let mut times = StageTimes::start();
-    let analysis = analyse_frame(frame.image, Some(frame.camera), map, &mut times);
+    let camera = frame_camera(Some(frame.camera), Some(frame.extrinsics), map);
+    let analysis = analyse_frame(frame.picture, camera, map, &mut times);
     let mut answer = crate::frame_answer::answer(&analysis, map);
     let fixes = landmark_observations(&analysis, map)
         .and_then(|observations| robot_fixes(&observations, Some(frame.extrinsics), None));
@@ -198,7 +199,8 @@ fn look_alike_poses(
     frame: &LocaliseFrame<'_>,
     analysis: &vision::pipeline::FrameAnalysis,
 ) -> Vec<LocaliseHypothesis> {
-    let observations = ambiguous_observations(frame.image, analysis, map, frame.extrinsics, frame.camera);
+    let observations =
+        ambiguous_observations(frame.picture.grey(), analysis, map, frame.extrinsics, frame.camera);
     let Ok(nobody) = Name::new("localise") else { return Vec::new() };
     // Of this frame alone: it has no odometry.
     let input =
@@ -280,6 +282,7 @@ fn fused(a: &Pose2Covariance, b: &Pose2Covariance) -> Option<Pose2Covariance> {
 mod tests {
     use super::*;
     use crate::scene::Scene;
+    use vision::frame::GrayImage;
 
     /// In front of a poster that was taught; without walls.
     #[test]
@@ -290,7 +293,8 @@ mod tests {
         let camera = scene.intrinsics();
         let extrinsics = CameraExtrinsics::new(readings.step.robot_from_camera).unwrap();
         let at = |image: &GrayImage| {
-            let frame = LocaliseFrame { image, camera: &camera, extrinsics: &extrinsics };
+            let picture = image.into();
+            let frame = LocaliseFrame { picture, camera: &camera, extrinsics: &extrinsics };
             localise(&LocaliseInput { map: &map, frame: Some(frame), scan: None }, &|| false)
         };
         let found = at(&readings.frame.image);

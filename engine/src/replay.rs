@@ -17,7 +17,7 @@ use crate::{
 };
 use protos::{CheckedFrame, Rejection, v1};
 use std::{collections::BTreeSet, f64::consts::TAU};
-use vision::frame::GrayImage;
+use vision::frame::Picture;
 
 /// A pose that differs by less in both is the same.
 const SAME_M: f64 = 0.001;
@@ -65,17 +65,18 @@ pub fn replay(
     [before, after]: [&MapSnapshot; 2],
     limits: ImageLimits,
 ) -> Result<AnswerChange, Rejection> {
-    let image = decode_frame(&kept.frame, limits)?;
-    let of = |map| answered(&kept.frame, &image, map);
+    let picture = decode_frame(&kept.frame, limits)?;
+    let of = |map| answered(&kept.frame, &picture, map);
     Ok(change(&of(before), &of(after)))
 }
 
-fn answered(frame: &CheckedFrame, image: &GrayImage, map: &MapSnapshot) -> v1::Answer {
-    let analysis = analyse_checked(frame, image, map, &mut StageTimes::start());
+fn answered(frame: &CheckedFrame, picture: &Picture, map: &MapSnapshot) -> v1::Answer {
+    let analysis = analyse_checked(frame, picture, map, &mut StageTimes::start());
     let mut answer = answer(&analysis, map);
     let context = FrameContext::new(frame, &analysis, map);
     let guide = frame.prior.as_ref();
-    let guided = guide.map_or_else(GuidedResult::default, |pose| recognise_guided(image, &context, pose));
+    let guided =
+        guide.map_or_else(GuidedResult::default, |pose| recognise_guided(picture.grey(), &context, pose));
     fill_fixes(&mut answer, &evaluate_frame(&context, None, &guided), &guided, map);
     answer
 }

@@ -15,6 +15,7 @@ use map::place::{LandmarkPlace, PlaceSigmas};
 use nalgebra::Vector3;
 use sim::{
     building::Building,
+    drive::Step,
     lesson::{self, LessonParams},
     robot::{Robot, RobotParams, SensorReadings},
 };
@@ -57,6 +58,11 @@ impl Scene {
         let names: Vec<_> = self.building.posters().take(2).map(|l| l.name.clone()).collect();
         let stops = lesson::stops(&self.building, &near).into_iter().filter(|s| names.contains(&s.landmark));
         stops.map(|stop| (stop.landmark, self.robot.look(&stop.step))).collect()
+    }
+
+    /// The robot's readings at a step.
+    pub fn look(&mut self, step: &Step) -> SensorReadings {
+        self.robot.look(step)
     }
 
     /// The camera of its robot.

@@ -162,7 +162,8 @@ impl Engine {
         // The whole answer rests on one version of the map.
         let map = self.snapshots.get(&job.map).ok_or_else(|| unknown_map(&job.map))?;
         let mut times = StageTimes::start();
-        let image = decode_frame(frame, self.limits)?;
+        let picture = decode_frame(frame, self.limits)?;
+        let image = picture.grey();
         times.ended("decode");
         // A frame is answered on any map. It changes the robot's pose and the map only on the robot's own map.
         let on_own_map = self.snapshots.robot_map(key.robot.as_str()).is_some_and(|own| own == map.name);
@@ -171,12 +172,12 @@ impl Engine {
         let at = frame_stamp(frame, &map);
         let prior = counts.then(|| self.motion.prior_pose(&key.robot, &key.camera, at)).flatten();
         if let Some((answer, evaluation)) =
-            self.expected_only(key, frame, (&image, &map), prior.as_ref(), &mut times)
+            self.expected_only(key, frame, (image, &map), prior.as_ref(), &mut times)
         {
-            let basis = self.records.take(key, &answer, (&image, &map), (&evaluation, frame));
+            let basis = self.records.take(key, &answer, (image, &map), (&evaluation, frame));
             return Ok(AnsweredFrame { answer, basis, map, evaluation: Some(evaluation), relocalised: None });
         }
-        let analysis = analyse_checked(frame, &image, &map, &mut times);
+        let analysis = analyse_checked(frame, &picture, &map, &mut times);
         let mut answer = crate::frame_answer::answer(&analysis, &map);
         let context = FrameContext::new(frame, &analysis, &map);
         // The guide is the fused pose while nothing contradicts it; without one, the robot's own prior.
@@ -184,23 +185,20 @@ impl Engine {
             Some(prior) => prior.plan.guided.then_some(&prior.pose),
             None => frame.prior.as_ref().filter(|_| on_own_map),
         };
-        let guided =
-            guide.map_or_else(GuidedResult::default, |pose| recognise_guided(&image, &context, pose));
+        let guided = guide.map_or_else(GuidedResult::default, |pose| recognise_guided(image, &context, pose));
         let evaluation = evaluate_frame(&context, prior, &guided);
         crate::frame_answer::fill_fixes(&mut answer, &evaluation, &guided, &map);
         if !counts {
             times.ended("localise");
             answer.timings = times.finish();
-            let basis = self.records.take(key, &answer, (&image, &map), (&evaluation, frame));
+            let basis = self.records.take(key, &answer, (image, &map), (&evaluation, frame));
             if let Some(captured_ns) = job.stamp_instead_ns.filter(|_| on_own_map && is_live) {
                 let frame = CheckedFrame { captured_ns, ..frame.clone() };
                 let (quads, map_from_robot) = (analysis.quads, frame.prior);
                 if self.is_gathered(key, &frame) {
-                    self.frame_tap.offer(
-                        key,
-                        &frame,
-                        AnalysedFrame { image, quads, map: map.clone(), map_from_robot },
-                    );
+                    let image = picture.into_grey();
+                    let analysed = AnalysedFrame { image, quads, map: map.clone(), map_from_robot };
+                    self.frame_tap.offer(key, &frame, analysed);
                 }
             }
             return Ok(AnsweredFrame { answer, basis, map, evaluation: None, relocalised: None });
@@ -215,17 +213,18 @@ impl Engine {
             self.live.camera_registry().record_frame(key, &sample);
         }
         let has_pose = evaluation.checks.is_some() || evaluation.fix.is_ok();
-        let update = self.relocalise(key, frame, (&image, &analysis), &map, has_pose);
+        let update = self.relocalise(key, frame, (image, &analysis), &map, has_pose);
         let relocalised = update.and_then(|update| {
             answer.hypotheses = update.hypotheses.iter().map(hypothesis_wire).collect();
             update.pose
         });
         times.ended("localise");
         answer.timings = times.finish();
-        let basis = self.records.take(key, &answer, (&image, &map), (&evaluation, frame));
+        let basis = self.records.take(key, &answer, (image, &map), (&evaluation, frame));
         if self.is_gathered(key, frame) {
             let map_from_robot = frame.prior.or(evaluation.prior);
-            let analysed = AnalysedFrame { image, quads: analysis.quads, map: map.clone(), map_from_robot };
+            let (image, quads) = (picture.into_grey(), analysis.quads);
+            let analysed = AnalysedFrame { image, quads, map: map.clone(), map_from_robot };
             self.frame_tap.offer(key, frame, analysed);
         }
         Ok(AnsweredFrame { answer, basis, map, evaluation: Some(evaluation), relocalised })

@@ -26,7 +26,7 @@ fuzz_target!(|data: &[u8]| {
         return;
     };
     let [uu, uv, vv] = [0, 1, 2].map(|i| move |corner: usize| 8 + 3 * corner + i);
-    let covariance =
+    let covariance: [Matrix2<f64>; 4] =
         std::array::from_fn(|c| Matrix2::new(numbers[uu(c)], numbers[uv(c)], numbers[uv(c)], numbers[vv(c)]));
     let size = LandmarkSize { width_m: numbers[20], height_m: numbers[21] };
     let [fx, fy, cx, cy] = [22, 23, 24, 25].map(|i| numbers[i]);

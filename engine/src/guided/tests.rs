@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::{
-    frame_analysis::{StageTimes, analyse_frame},
+    frame_analysis::{StageTimes, analyse_frame, frame_camera},
     scene::Scene,
     snapshot::{LandmarkInfo, LookAlikeClasses, MapSnapshot},
 };
@@ -37,7 +37,9 @@ impl Stop {
 
     fn analysis(&self, map: &MapSnapshot) -> FrameAnalysis {
         let camera = self.scene.intrinsics();
-        analyse_frame(&self.readings.frame.image, Some(&camera), map, &mut StageTimes::start())
+        let extrinsics = CameraExtrinsics::new(self.readings.step.robot_from_camera).unwrap();
+        let of = frame_camera(Some(&camera), Some(&extrinsics), map);
+        analyse_frame(&self.readings.frame.image, of, map, &mut StageTimes::start())
     }
 
     /// What a pose adds to this analysis.

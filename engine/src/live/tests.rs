@@ -50,7 +50,7 @@ fn raw_grey_becomes_png() {
     let (media, bytes) = frame(1).for_browsers().unwrap();
     assert_eq!(media, "image/png");
     let back = crate::decode::decode_upload(&bytes, crate::decode::ImageLimits::UPLOAD);
-    assert_eq!(back.unwrap().data(), [0, 50, 100, 150, 200, 250]);
+    assert_eq!(back.unwrap().grey().data(), [0, 50, 100, 150, 200, 250]);
 }
 
 #[test]

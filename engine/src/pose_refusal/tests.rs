@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::{
-    frame_analysis::{StageTimes, analyse_frame},
+    frame_analysis::{StageTimes, analyse_frame, frame_camera},
     frame_answer::{answer, fill_fixes},
     frame_context::FrameContext,
     guided::GuidedResult,
@@ -27,7 +27,8 @@ fn answered(
     prior: Option<&Pose2>,
 ) -> v1::Answer {
     let (camera, extrinsics) = (scene.intrinsics(), CameraExtrinsics::new(robot_from_camera).unwrap());
-    let analysis = analyse_frame(&readings.frame.image, Some(&camera), map, &mut StageTimes::start());
+    let of = frame_camera(Some(&camera), Some(&extrinsics), map);
+    let analysis = analyse_frame(&readings.frame.image, of, map, &mut StageTimes::start());
     let sigmas = Vector3::new(0.05, 0.05, 1_f64.to_radians());
     let covariance = Matrix3::from_diagonal(&sigmas.component_mul(&sigmas));
     let prior = prior.map(|pose| Pose2Covariance::new(*pose, covariance).unwrap());

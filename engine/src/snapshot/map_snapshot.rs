@@ -9,7 +9,7 @@ use map::{
     segments::LaserSegment,
     visibility::{VisibilityMap, VisibilitySettings},
 };
-use std::{collections::BTreeMap, sync::Arc};
+use std::{collections::BTreeMap, f64::consts::FRAC_PI_4, sync::Arc};
 use vision::{
     model::{LandmarkId, ModelSet},
     params::Params,
@@ -84,6 +84,12 @@ impl MapSnapshot {
             distance: DistanceKind::Both,
             params: Arc::default(),
         }
+    }
+
+    /// Whether a landmark is level rather than upright: under a ceiling, or on a floor.
+    pub fn has_level_landmarks(&self) -> bool {
+        let mut places = self.landmarks.values().filter_map(|info| info.place.as_ref());
+        places.any(|place| place.tilt_rad.abs() > FRAC_PI_4)
     }
 }
 

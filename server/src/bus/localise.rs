@@ -176,10 +176,13 @@ fn found(job: &Job, limits: ImageLimits) -> Result<v1::LocaliseReply, Rejection>
         return Err(Rejection::new(Code::Expired, "deadline_ms", detail));
     }
     let CheckedLocalise { frame, scan, .. } = &job.sensed;
-    let image = frame.as_ref().map(|(frame, ..)| decode_frame(frame, limits)).transpose();
-    let image = image.map_err(|r| r.inside("frame"))?;
-    let frame = frame.as_ref().zip(image.as_ref());
-    let frame = frame.map(|((_, camera, extrinsics), image)| LocaliseFrame { image, camera, extrinsics });
+    let picture = frame.as_ref().map(|(frame, ..)| decode_frame(frame, limits)).transpose();
+    let picture = picture.map_err(|r| r.inside("frame"))?;
+    let frame = frame.as_ref().zip(picture.as_ref());
+    let frame = frame.map(|((_, camera, extrinsics), picture)| {
+        let picture = picture.into();
+        LocaliseFrame { picture, camera, extrinsics }
+    });
     let input = LocaliseInput { map: &job.map, frame, scan: scan.as_ref() };
     let localisation = localise(&input, &|| Instant::now() >= job.until);
     Ok(localise_reply(localise_body(localisation, &job.map)))

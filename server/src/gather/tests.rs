@@ -41,7 +41,8 @@ fn offered(count: u64) -> Vec<(CheckedFrame, AnalysedFrame)> {
     let params = Params::default();
     let map = Arc::new(MapSnapshot::empty(MAP, 1));
     let landmarks = pipeline::LandmarkDatabase { models: &map.models, sizes: &map.sizes, kind: map.distance };
-    let analysis = pipeline::Pipeline::default().analyse(image, None, landmarks, &params, &mut NoTrace);
+    let camera = pipeline::FrameCamera::level(None);
+    let analysis = pipeline::Pipeline::default().analyse(image, camera, landmarks, &params, &mut NoTrace);
     let map_from_robot =
         Some(Pose2Covariance { pose: Pose2::new(1.0, 0.0, 0.0), covariance: Matrix3::zeros() });
     (1..=count)

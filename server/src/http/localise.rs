@@ -73,11 +73,14 @@ async fn at(
     let stopped = Arc::new(AtomicBool::new(false));
     let _given_up = GivenUp(stopped.clone());
     let found = app.on_vision_thread(move |app| {
-        let image =
+        let picture =
             sensed.frame.as_ref().map(|(bytes, ..)| picture::decode(bytes, app.config.limits.upload()));
-        let image = image.transpose()?;
-        let frame = sensed.frame.as_ref().zip(image.as_ref());
-        let frame = frame.map(|((_, camera, extrinsics), image)| LocaliseFrame { image, camera, extrinsics });
+        let picture = picture.transpose()?;
+        let frame = sensed.frame.as_ref().zip(picture.as_ref());
+        let frame = frame.map(|((_, camera, extrinsics), picture)| {
+            let picture = picture.into();
+            LocaliseFrame { picture, camera, extrinsics }
+        });
         let input = LocaliseInput { map: &snapshot, frame, scan: sensed.scan.as_ref() };
         // It ends as soon as the client has gone, too.
         let until = Instant::now() + Duration::from_millis(u64::from(MAX_LOCALISE_MS));

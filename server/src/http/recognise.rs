@@ -47,8 +47,8 @@ async fn recognise(
         None => None,
     };
     let answer = app.on_vision_thread(move |app| {
-        let image = picture::decode(&bytes, app.config.limits.upload())?;
-        Ok(answer_to_photograph(&image, camera.as_ref(), &snapshot))
+        let picture = picture::decode(&bytes, app.config.limits.upload())?;
+        Ok(answer_to_photograph(&picture, camera.as_ref(), &snapshot))
     });
     answer.await?.map(Json)
 }

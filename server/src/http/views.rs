@@ -37,7 +37,7 @@ use protos::api::{
 use serde_json::json;
 use utoipa_axum::{router::OpenApiRouter, routes};
 use vision::{
-    frame::GrayImage,
+    frame::{GrayImage, Picture},
     geometry::Corners,
     icon::{Icon, IconError, icon},
     learn::near_duplicates::NoveltyParams,
@@ -130,7 +130,9 @@ async fn add(
         .then(NoveltyParams::default);
     let max = app.config.limits.views;
     let changed = (map.clone(), landmark.clone());
-    let prepared = app.clone().on_vision_thread(move |app| prepare(app, &image, &extent)).await?;
+    let taken = capture.clone();
+    let prepare = move |app: &App| prepare(app, &image, &extent, taken.as_ref());
+    let prepared = app.clone().on_vision_thread(prepare).await?;
     let (new, detected) = match prepared {
         Ok(prepared) => prepared,
         Err(Refused { error, picture }) => {
@@ -231,21 +233,25 @@ fn prepare(
     app: &App,
     bytes: &Bytes,
     extent: &LandmarkRegion,
+    capture: Option<&StoredCapture>,
 ) -> Result<(NewView, Option<WholeQuad>), Refused> {
-    let image = picture::decode(bytes, app.config.limits.upload()).map_err(ApiError::from)?;
-    let of_photograph = |error| Refused { error, picture: Some(Box::new(refused_views::small(&image))) };
-    view_of(app, bytes, &image, extent).map_err(of_photograph)
+    let picture = picture::decode(bytes, app.config.limits.upload()).map_err(ApiError::from)?;
+    let small = || Box::new(refused_views::small(picture.grey()));
+    let of_photograph = |error| Refused { error, picture: Some(small()) };
+    view_of(app, bytes, (&picture, capture), extent).map_err(of_photograph)
 }
 
-/// The view of a decoded photograph.
+/// The view of a decoded photograph. The mounting of its camera says which corner of a quad is the top-left one.
 fn view_of(
     app: &App,
     bytes: &Bytes,
-    image: &GrayImage,
+    (picture, capture): (&Picture, Option<&StoredCapture>),
     extent: &LandmarkRegion,
 ) -> Result<(NewView, Option<WholeQuad>), ApiError> {
-    let p = &app.config.params;
-    let quads = if matches!(extent, LandmarkRegion::Whole) { Vec::new() } else { whole_quads(image, p) };
+    let (p, image) = (&app.config.params, picture.grey());
+    let quads = if matches!(extent, LandmarkRegion::Whole) { Vec::new() } else { whole_quads(picture, p) };
+    let upright = |q: WholeQuad| q.rotated(capture.and_then(|c| c.top_left(&q.corners_px)).unwrap_or(0));
+    let quads: Vec<WholeQuad> = quads.into_iter().map(upright).collect();
     let corners: Vec<Corners> = quads.iter().map(|q| q.corners_px).collect();
     let corners_px = match extent {
         LandmarkRegion::Corners(corners) => *corners,

@@ -8,7 +8,7 @@ use crate::{
 };
 use engine::{decode::ImageLimits, picture, threads::wait_for};
 use vision::{
-    frame::GrayImage,
+    frame::{GrayImage, Picture},
     points::taught::{MAX_POINT_VIEWS, TaughtPoint, view_points},
 };
 
@@ -25,7 +25,7 @@ impl Pictures {
         Self { store: store.clone(), runtime, upload: config.limits.upload() }
     }
 
-    /// The picture of a view; `None`, with a log entry, if it cannot be read.
+    /// The picture of a view in grey; `None`, with a log entry, if it cannot be read.
     pub(super) fn of(&self, view: &TrainingViewRow) -> Option<GrayImage> {
         let (store, sha256) = ((*self.store).clone(), view.image_sha256);
         let read = wait_for(&self.runtime, async move { stored::read(&store, &sha256).await });
@@ -37,7 +37,7 @@ impl Pictures {
             let follows = "no views are generated and no points taken from it";
             tracing::warn!(view = view.view, reason, follows, "picture_unreadable");
         };
-        decoded.inspect_err(skipped).ok()
+        decoded.inspect_err(skipped).ok().map(Picture::into_grey)
     }
 }
 

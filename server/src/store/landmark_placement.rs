@@ -26,6 +26,7 @@ use vision::{
     frame::Intrinsics,
     geometry::Corners,
     pose::{LandmarkSize, MAX_CORNER_SIGMA_PX},
+    up::Up,
 };
 
 statements! {
@@ -99,6 +100,12 @@ impl StoredCapture {
     /// Sets the covariances that the detector gave the corners, px^2.
     pub(crate) fn set_detected_corners(&mut self, covariance_px2: &[Matrix2<f64>; 4]) {
         self.corner_covariance_px2 = Some(covariance_px2.map(|c| [c.m11, c.m12, c.m22]));
+    }
+
+    /// Which corner of a quad, 0 to 3, is the landmark's top-left one. `None` where the mounting does not decide.
+    pub(crate) fn top_left(&self, corners_px: &Corners) -> Option<usize> {
+        let taken = self.checked().ok()?;
+        Up::new(taken.extrinsics.camera_up())?.top_left(corners_px, Some(&taken.camera))
     }
 
     /// Errors: a value is out of range; the rejection names its field.

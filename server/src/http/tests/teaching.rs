@@ -4,7 +4,10 @@ use super::*;
 use crate::store::{jobs, landmarks};
 use engine::picture;
 use serde_json::json;
-use std::fmt::Write as _;
+use std::{
+    f64::consts::{FRAC_PI_2, PI},
+    fmt::Write as _,
+};
 
 /// Grey blocks, another number, other blocks: PNG.
 pub(super) fn blocks(number: usize) -> Vec<u8> {
@@ -258,4 +261,38 @@ async fn two_landmarks_that_are_one_object_become_one() {
     assert_eq!(service.landmark("poster").await.1["views"], 2);
     let (status, back) = service.landmark("sign").await;
     assert_eq!((status, &back["views"], &back["place"]), (200, &json!(2), &place), "{back}");
+}
+
+/// The picture of a camera on its side is taught upright: its mounting says which corner is the top-left one.
+#[tokio::test]
+async fn a_view_of_a_rolled_camera_is_taught_upright() {
+    let service = Service::start(Limits::default()).await;
+    let grey = |i: usize| {
+        let (u, v) = (i % 320, i / 320);
+        if (100..220).contains(&u) && (60..190).contains(&v) { 60 } else { 200 }
+    };
+    let image = picture::png(320, 240, &(0..320 * 240).map(grey).collect::<Vec<_>>()).unwrap();
+    let capture = |roll_rad: f64| {
+        // A level camera, turned clockwise about its axis.
+        let level = map::extrinsics::pan_tilt(0.0, 0.0, nalgebra::Vector3::new(0.0, 0.0, 1.0));
+        let mounting = level * nalgebra::Isometry3::rotation(nalgebra::Vector3::new(0.0, 0.0, roll_rad));
+        let pose =
+            json!({ "pose": { "x_m": 0.0, "y_m": 0.0, "theta_rad": 0.0 }, "covariance": vec![0.0; 9] });
+        let capture = json!({
+            "intrinsics": { "fx_px": 300.0, "fy_px": 300.0, "cx_px": 159.5, "cy_px": 119.5 },
+            "map_from_robot": pose,
+            "robot_from_camera": protos::convert::geometry::pose3_wire(&mounting),
+        });
+        capture.to_string()
+    };
+    // Top-left in the image; a camera that is turned clockwise sees the top of a landmark at the left.
+    for (roll_rad, first) in [(0.0, [99.5, 59.5]), (FRAC_PI_2, [99.5, 189.5]), (PI, [219.5, 189.5])] {
+        let name = format!("poster-{}", (10.0 * roll_rad) as u32);
+        let (status, view) =
+            service.upload(&name, image.clone(), &[CREATE, ("capture", &capture(roll_rad))]).await;
+        assert_eq!(status, 201, "{view}");
+        let corner: [f64; 2] = serde_json::from_value(view["corners"][0].clone()).unwrap();
+        let off_px = (corner[0] - first[0]).abs().max((corner[1] - first[1]).abs());
+        assert!(off_px < 2.0, "roll {roll_rad}: {view}");
+    }
 }
