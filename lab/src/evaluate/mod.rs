@@ -17,6 +17,7 @@ pub(crate) mod mapping;
 pub(crate) mod modalities;
 pub(crate) mod outside;
 pub(crate) mod recognition;
+pub(crate) mod roll;
 pub(crate) mod visibility;
 
 /// What to evaluate.
@@ -55,6 +56,10 @@ pub(crate) enum Command {
     ///   waymark-lab evaluate viewpoint --photographs museum-paintings --taught photograph --detector
     #[command(verbatim_doc_comment)]
     Viewpoint(experiment::viewpoint::Args),
+    /// A camera mounted at twelve rolls: names and poses with its mounting, without one, and by expectation.
+    ///
+    /// Frames are rendered in a corridor whose posters are taught from one level photograph each.
+    Roll(roll::Args),
     /// Recognition over the apparent size, from 300 px down to 28.
     Scale(experiment::scale::Args),
     /// Recognition over illumination: darker, brighter, light from the side, a shadow's edge.
@@ -129,6 +134,7 @@ pub(crate) fn run(command: &Command) -> anyhow::Result<()> {
         Command::Recognition(args) => recognition::run(args),
         Command::Outside(args) => outside::run(args),
         Command::Viewpoint(args) => experiment::viewpoint::run(args),
+        Command::Roll(args) => roll::run(args),
         Command::Scale(args) => experiment::scale::run(args),
         Command::Illumination(args) => experiment::illumination::run(args),
         Command::Occlusion(args) => experiment::occlusion::run(args),

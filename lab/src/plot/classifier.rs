@@ -26,8 +26,9 @@ pub(crate) fn draw(args: &SceneArgs) -> anyhow::Result<Picture> {
     let (scored, edges) = scored_quads(&work, &p, &mut NoTrace);
     let gradients = Gradients { image: &work, gx: edges.gx(), gy: edges.gy() };
     let classified = snap_sides(scored.clone(), &gradients, &p.quads);
-    let kept = suppress_non_maxima(classified.clone(), &p.quads);
     let is_likely = |q: &Quad| q.score >= p.quads.min_probability;
+    let mut kept = suppress_non_maxima(classified.clone(), &p.quads);
+    kept.retain(is_likely);
     let is_kept = |q: &Quad| kept.iter().any(|k| k.corners_px == q.corners_px);
     let quads: Vec<&Quad> = classified.iter().map(|c| &c.quad).collect();
     let rejected: Vec<&Quad> = quads.iter().copied().filter(|q| !is_likely(q)).collect();

@@ -29,7 +29,7 @@ use vision::{
     geometry::Corners,
     model::{LandmarkId, LandmarkModel, ModelSet},
     params::Params,
-    pipeline::{ExpectedLandmark, LandmarkDatabase, Pipeline, QuadAnalysis, expected},
+    pipeline::{ExpectedLandmark, FrameCamera, LandmarkDatabase, Pipeline, QuadAnalysis, expected},
     recognise::{DistanceKind, Verdict},
     trace::NoTrace,
 };
@@ -70,7 +70,7 @@ pub(crate) fn draw(args: &ExpectedArgs) -> anyhow::Result<Picture> {
     let models = frame.taught(args, &p)?;
     let image = &frame.rendered.image;
     let database = LandmarkDatabase { models: &models, sizes: &BTreeMap::new(), kind: DistanceKind::Both };
-    let facts = Pipeline::default().analyse(image, None, database, &p, &mut NoTrace);
+    let facts = Pipeline::default().analyse(image, FrameCamera::level(None), database, &p, &mut NoTrace);
     let expectations = frame.expected()?;
     let named: Vec<(LandmarkId, &QuadAnalysis)> =
         facts.quads.iter().filter_map(|q| Some((unique(q)?, q))).collect();

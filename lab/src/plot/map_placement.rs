@@ -61,7 +61,7 @@ impl Scene {
             let mounting = aimed(&believed, &centre(&truth))?;
             let seen = look(&real, &mounting, &truth, SIGMA_PX, &mut random).context("in the image")?;
             let map_from_robot = around(believed, ROBOT_SIGMAS)?;
-            let (corners, covariance_px2) = (seen.measured.corners_px, seen.measured.covariance_px2);
+            let (corners, covariance_px2) = (seen.measured.corners_px, seen.measured.covariance_px2.blocks());
             let view = StatedView { map_from_robot, mounting, corners, covariance_px2 };
             rectangles.push(view.rectangle(&walls)?);
             views.push(view);

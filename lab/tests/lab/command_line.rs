@@ -11,7 +11,7 @@ use tests::{
 };
 
 /// Options that each command must name in its help.
-const OPTIONS: [(&str, &[&str]); 27] = [
+const OPTIONS: [(&str, &[&str]); 28] = [
     (
         "evaluate navigation",
         &["--drives", "--posters", "--length-m", "--rate-hz", "--seed", "--json", "--plot"],
@@ -66,6 +66,7 @@ const OPTIONS: [(&str, &[&str]); 27] = [
             "--json",
         ],
     ),
+    ("evaluate roll", &["--posters", "--views", "--seed", "--json"]),
     ("evaluate scale", &["--landmarks", "--views", "--detector", "--plot"]),
     ("evaluate illumination", &["--landmarks", "--views", "--detector", "--plot"]),
     ("evaluate occlusion", &["--landmarks", "--views", "--detector", "--plot"]),

@@ -9,7 +9,7 @@ use super::{
 };
 use cli::simulated_errors::SimulatedRobotErrors;
 use engine::{
-    frame_analysis::{StageTimes, analyse_frame},
+    frame_analysis::{StageTimes, analyse_frame, frame_camera},
     frame_context::FrameContext,
     guided::{GuidedResult, recognise_guided},
     landmark_checks::{LandmarkChecks, evaluate_frame},
@@ -226,7 +226,9 @@ pub(super) fn drive(world: &World, way: Way) -> anyhow::Result<Journey> {
             server.scan(&seen, odom_from_robot, captured_ns);
         }
         let map = server.map()?;
-        let analysis = analyse_frame(&seen.frame.image, Some(&wrong.camera), &map, &mut StageTimes::start());
+        let mounting = wrong.extrinsics(&seen.step.robot_from_camera).ok();
+        let camera = frame_camera(Some(&wrong.camera), mounting.as_ref(), &map);
+        let analysis = analyse_frame(&seen.frame.image, camera, &map, &mut StageTimes::start());
         let (changes, guided) =
             server.frame(&map, &analysis, (&seen, odom_from_robot), (&wrong, captured_ns));
         let misled = journey.guided_false;

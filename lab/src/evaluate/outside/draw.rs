@@ -32,7 +32,7 @@ pub(super) fn draw(folder: &Path, score: &PictureScore, recognised: &Recognised)
 }
 
 fn drawn(score: &PictureScore, recognised: &Recognised) -> Picture {
-    let mut picture = Picture::of(&recognised.image, 0.75);
+    let mut picture = Picture::of(recognised.image.grey(), 0.75);
     for quad in score.false_quads.iter().flatten() {
         picture.tint(quad, RED, 0.3);
     }

@@ -108,7 +108,7 @@ pub(super) fn measurement_score(
         let seen = measured.camera.undistort(&corners.points()[i])?;
         let residual = seen - expected;
         reprojection_px = reprojection_px.max(residual.norm());
-        let squared = residual.dot(&measured.covariance_px2[i].cholesky()?.solve(&residual));
+        let squared = residual.dot(&measured.covariance_px2.of(i).cholesky()?.solve(&residual));
         reprojection_sigmas = reprojection_sigmas.max(squared.sqrt());
     }
     Some(MeasurementScore {

@@ -8,7 +8,7 @@ use protos::v1;
 use std::path::Path;
 use vision::{
     detect::{Quad, QuadKind, detect},
-    frame::GrayImage,
+    frame::Picture,
     geometry::Corners,
     pipeline::FrameAnalysis,
     trace::NoTrace,
@@ -16,7 +16,7 @@ use vision::{
 
 /// One picture and what was made of it.
 pub(super) struct Recognised {
-    pub(super) image: GrayImage,
+    pub(super) image: Picture,
     /// Quads that the detector shows to people.
     pub(super) shown: Vec<Quad>,
     /// Quad by quad in the order of `analysis`.
