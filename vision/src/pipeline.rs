@@ -79,9 +79,11 @@ pub struct FrameAnalysis {
 pub struct QuadAnalysis {
     /// The quad as detected.
     pub quad: Quad,
-    /// The verdict; `None` for quads that were not compared (three-sided, or beyond [`MAX_RECOGNISED_QUADS`]).
+    /// The verdict; `None` for quads that were not compared (beyond [`MAX_RECOGNISED_QUADS`]), and for
+    /// three-sided ones that no points identify.
     pub recognition: Option<RecognitionResult>,
-    /// The corners that the pose rests on, the landmark's top-left first; `None` without a pose.
+    /// The corners of a landmark that was uniquely recognised, its top-left first: those that the pose rests on, or
+    /// without a pose those by the picture. `None` for other quads.
     pub border_px: Option<Corners>,
     /// The landmark in the camera frame, or why not.
     pub pose: Result<LandmarkPose, PoseUnavailable>,
@@ -160,15 +162,14 @@ fn analyse(
     (p, trace): (&Params, &mut impl Trace),
 ) -> FrameAnalysis {
     let FrameCamera { intrinsics, up } = camera;
-    let quads: Vec<Quad> = quads.into_iter().map(|q| q.named_by(up.as_ref(), intrinsics)).collect();
-    let mut asked = 0;
-    let mut verdict = |quad: &Quad| {
-        asked += usize::from(quad.kind == QuadKind::Full);
-        (quad.kind == QuadKind::Full && asked <= MAX_RECOGNISED_QUADS)
-            .then(|| recognise(image.grey(), quad, landmarks.models, landmarks.kind, p))
+    let mut quads: Vec<Quad> = quads.into_iter().map(|q| q.named_by(up.as_ref(), intrinsics)).collect();
+    let verdict = |(i, quad): (usize, &Quad)| {
+        let is_asked = i < MAX_RECOGNISED_QUADS;
+        let verdict = is_asked.then(|| recognise(image.grey(), quad, landmarks.models, landmarks.kind, p));
+        // A side of a three-sided quad is a guess: an icon read from it says nothing.
+        verdict.filter(|v| quad.kind == QuadKind::Full || v.points.is_some())
     };
-    let mut quads = quads;
-    let mut verdicts: Vec<Option<RecognitionResult>> = quads.iter().map(&mut verdict).collect();
+    let mut verdicts: Vec<Option<RecognitionResult>> = quads.iter().enumerate().map(verdict).collect();
     recognise_turned(image.grey(), (&mut quads, &mut verdicts), landmarks, p);
     trace.finished(Stage::Recognition);
     let quads = quads
@@ -179,7 +180,11 @@ fn analyse(
                 turn_to_recognised(&mut quad, verdict);
             }
             let border = border(image, &quad, verdict.as_ref(), intrinsics, landmarks.sizes, (by, p));
-            let border_px = border.as_ref().ok().map(|(border, ..)| border.corners_px);
+            let border_px = match (&border, &verdict) {
+                (Ok((border, ..)), _) => Some(border.corners_px),
+                (Err(_), Some(v)) => recognised_border(&quad, v, p),
+                (Err(_), None) => None,
+            };
             let pose = border.and_then(|(border, size, camera)| {
                 Ok(landmark_pose(&border.corners_px, border.covariance_px2, size, camera)?)
             });
@@ -189,6 +194,12 @@ fn analyse(
         .collect();
     trace.finished(Stage::Poses);
     FrameAnalysis { quads }
+}
+
+/// The border by the picture alone, where it is exactly one landmark.
+fn recognised_border(quad: &Quad, verdict: &RecognitionResult, p: &Params) -> Option<Corners> {
+    let is_unique = matches!(verdict.verdict, Verdict::Unique(_));
+    is_unique.then(|| matched_border(quad, verdict, p)).flatten().map(|border| border.corners_px)
 }
 
 /// Whether it is a landmark, or may be one.

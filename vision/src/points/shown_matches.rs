@@ -10,7 +10,7 @@ use crate::{
         patch::{Patch, inner_px},
         point::{Point, SeenPatch},
         taught::TaughtPoint,
-        verify::{GLOBAL_GATE, MAX_PATCH_POINTS, Target, global_hypothesis},
+        verify::{GLOBAL_GATE, Hypothesis, MAX_PATCH_POINTS, Target, global_hypothesis, verified},
     },
 };
 
@@ -24,6 +24,9 @@ pub struct ShownMatch {
     /// Whether it agrees with the homography that the matches determine.
     pub agrees: bool,
 }
+
+/// log10 of the false alarms below which matches are shown as agreeing.
+const LOG10_BELIEVED: f64 = -1.0;
 
 /// At most `most` matches of the quad `corners_px` with the points `taught`; none where the quad gives no patch. A quad may be
 /// turned by quarters: the turn with most matches that agree counts.
@@ -39,7 +42,9 @@ pub fn shown_matches(
     let target = Target::new(taught);
     let of_turn = |turn: usize| {
         let turned: Vec<Point> = seen.points.iter().map(|point| point.rotated(turn)).collect();
-        let (found, inliers) = match global_hypothesis(&turned, turn, &target) {
+        let is_believed =
+            |h: &Hypothesis| verified(&seen, h, &target).is_some_and(|e| e.log10_nfa <= LOG10_BELIEVED);
+        let (found, inliers) = match global_hypothesis(&turned, turn, &target).filter(is_believed) {
             Some(hypothesis) => (hypothesis.matches, hypothesis.consensus.inliers),
             None => (matches(&turned, target.points(), &GLOBAL_GATE), Vec::new()),
         };

@@ -17,7 +17,11 @@ use std::sync::LazyLock;
 pub const MAX_LANDMARK_POINTS: usize = 240;
 /// Most views that points are taken from.
 pub const MAX_POINT_VIEWS: usize = 3;
-/// Most points of a view.
+/// Points of the largest patch of a view to those of the smaller ones.
+const SHARES: [usize; 3] = [4, 1, 1];
+/// Points of smaller patches that are coarser than this, in their pixels, see whole frames at once.
+const COARSEST_PX: f32 = 5.0;
+/// Most points of a patch.
 const MAX_VIEW_POINTS: usize = 400;
 /// Points nearer than this to a plain structure are dropped.
 const MIN_PLAIN_DISTANCE: u32 = 46;
@@ -101,16 +105,36 @@ impl TaughtPoint {
     }
 }
 
-/// The points of one photographed view: those on the landmark that are not plain structures, strongest first. Empty
-/// where the corners are degenerate.
+/// The points of one photographed view: those on the landmark that are not plain structures, in the patch of its size
+/// and in the smaller ones, as robots see it from further away. The strongest first, [`SHARES`] of each size in turn.
+/// Empty where the corners are degenerate.
 pub fn view_points(image: &GrayImage, corners_px: &Corners) -> Vec<TaughtPoint> {
-    let Some(patch) = Patch::new(image, corners_px, inner_px(corners_px).min(INNER_PX[0])) else {
-        return Vec::new();
-    };
-    let inside = |p: &Point| p.at.iter().all(|a| (0.0..=1.0).contains(a));
-    let seen = SeenPatch::new(patch, MAX_VIEW_POINTS);
+    let largest = inner_px(corners_px);
+    let mut sizes: Vec<Vec<TaughtPoint>> = Vec::new();
+    for inner in INNER_PX.into_iter().filter(|inner| *inner <= largest) {
+        let Some(patch) = Patch::new(image, corners_px, inner) else { continue };
+        let is_new = |p: &TaughtPoint| !sizes.iter().flatten().any(|known| is_duplicate(known, p));
+        let coarsest = COARSEST_PX / inner as f32;
+        let is_fine = |p: &TaughtPoint| sizes.is_empty() || p.point().sigma < coarsest;
+        let found = points_of(patch).into_iter().filter(is_new).filter(is_fine).collect();
+        sizes.push(found);
+    }
+    let mut rest: Vec<_> = sizes.iter().map(|points| points.iter().copied()).collect();
+    let mut points = Vec::new();
+    while rest.iter().any(|points| points.len() > 0) {
+        for (size, share) in rest.iter_mut().zip(SHARES) {
+            points.extend(size.by_ref().take(share));
+        }
+    }
+    points
+}
+
+/// The points of one patch that are taught, strongest first.
+fn points_of(patch: Patch) -> Vec<TaughtPoint> {
+    let inside = |p: &&Point| p.at.iter().all(|a| (0.0..=1.0).contains(a));
     let of = |p: &Point| TaughtPoint::new(p, distance_to_plain(&p.descriptor));
-    seen.points.iter().filter(|p| inside(p)).map(of).filter(|p| p.plain() >= MIN_PLAIN_DISTANCE).collect()
+    let seen = SeenPatch::new(patch, MAX_VIEW_POINTS);
+    seen.points.iter().filter(inside).map(of).filter(|p| p.plain() >= MIN_PLAIN_DISTANCE).collect()
 }
 
 /// The points of a landmark from those of its photographed views: of up to [`MAX_POINT_VIEWS`] views, evenly chosen,

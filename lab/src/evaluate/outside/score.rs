@@ -233,7 +233,7 @@ fn miss(label: &TruthQuad, map: &MapSnapshot, r: &Recognised) -> Miss {
     if !map.models.iter().any(|m| map.landmarks.get(&m.id).is_some_and(|l| l.name == *landmark)) {
         return made("not_active", format!("IoU {iou:.2}"));
     }
-    if r.analysis.quads[i].quad.kind == QuadKind::ThreeSided {
+    if r.analysis.quads[i].recognition.is_none() && r.analysis.quads[i].quad.kind == QuadKind::ThreeSided {
         return made("three_sided", format!("IoU {iou:.2}"));
     }
     if r.analysis.quads[i].recognition.is_none() {

@@ -2,9 +2,9 @@
 //! enough evidence and the icons decide. Corners are those of the homography, refined by alignment with the learnt
 //! icon.
 //!
-//! The number of false alarms is computed for unrelated pictures. Against look-alikes two more conditions hold:
-//! every other landmark with point evidence must be contradicted, and where a landmark of the map lowered the
-//! likeness threshold, the likeness must pass that threshold.
+//! The number of false alarms is computed for unrelated pictures. Against look-alikes three more conditions hold:
+//! every other landmark with point evidence must be contradicted; where a landmark of the map lowered the likeness
+//! threshold, the likeness must pass that threshold; and a picture that is unlike the icon needs more evidence.
 
 use crate::{
     detect::quad::Quad,
@@ -30,6 +30,10 @@ use crate::{
 pub const LOG10_EPSILON: f64 = -5.0;
 /// log10 of the comparisons of a quad with one landmark: four turns.
 const LOG10_TURNS: f64 = 0.6;
+/// A picture whose gradient similarity with the learnt icon is below this is unlike the landmark...
+const UNLIKE: f64 = 0.3;
+/// ... and is named only with fewer false alarms than this.
+const LOG10_EPSILON_UNLIKE: f64 = -20.0;
 /// A landmark with this many connected mismatched parts of 25 is doubtful.
 pub const DOUBTFUL_PARTS: usize = 5;
 
@@ -131,6 +135,11 @@ fn refusal<'a>(
     // A landmark that looks the same upside down: its name is certain, its pose is not.
     if best.turned.as_ref().is_some_and(is_rival) {
         return Some(MatchRefusal::Margin);
+    }
+    // Two doors have panels in common: a few points agree, and the icon does not.
+    let is_unlike = alignment.likeness.is_some_and(|l| l < UNLIKE);
+    if is_unlike && alarms(&best.evidence) > LOG10_EPSILON_UNLIKE {
+        return Some(MatchRefusal::Similarity);
     }
     // No likeness where part of the landmark is outside the image.
     let is_within_threshold = alignment.likeness.is_none_or(|l| 1.0 - l < model.likeness.tau);
