@@ -185,15 +185,27 @@ fn analyse(
                 (Err(_), Some(v)) => recognised_border(&quad, v, p),
                 (Err(_), None) => None,
             };
-            let pose = border.and_then(|(border, size, camera)| {
-                Ok(landmark_pose(&border.corners_px, border.covariance_px2, size, camera)?)
-            });
+            let pose = border.and_then(|(border, size, camera)| pose(&border, size, camera));
             QuadAnalysis { quad, recognition: verdict, border_px, pose }
         })
         .filter(|analysis| p.detect.quads.is_shown(&analysis.quad) || is_recognised(analysis))
         .collect();
     trace.finished(Stage::Poses);
     FrameAnalysis { quads }
+}
+
+/// The pose by a border. Where the border fits two poses but the corners have only one, it is unclear.
+fn pose(
+    border: &BorderEstimate,
+    size: LandmarkSize,
+    camera: &Intrinsics,
+) -> Result<LandmarkPose, PoseUnavailable> {
+    let mut pose = landmark_pose(&border.corners_px, border.covariance_px2, size, camera)?;
+    if border.is_mirrored && pose.second.is_none() {
+        return Err(BorderError::Unclear.into());
+    }
+    pose.ambiguous |= border.is_mirrored;
+    Ok(pose)
 }
 
 /// The border by the picture alone, where it is exactly one landmark.
@@ -278,7 +290,7 @@ fn border<'c>(
         BorderBy::Quads => {
             let border = matched_border(quad, verdict, p).ok_or(PoseUnavailable::NotUnique)?;
             let covariance_px2 = CornerCovariance::from(&border.covariance_px2);
-            BorderEstimate { corners_px: border.corners_px, covariance_px2 }
+            BorderEstimate { corners_px: border.corners_px, covariance_px2, is_mirrored: false }
         }
     };
     Ok((border, size, camera))

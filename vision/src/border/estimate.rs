@@ -2,15 +2,16 @@
 
 use crate::{
     border::{
-        hypotheses::{Linear, Reading, readings},
+        hypotheses::{Linear, Reading, flat, readings},
         side_edges::{SideEdge, side_edges},
     },
     detect::quad::BORDER_SIGMA_PX,
     frame::{Intrinsics, PictureRef},
     geometry::{corner_covariance::CornerCovariance, corners::Corners},
     pose::{
-        landmark_pose::landmark_pose,
+        landmark_pose::{AMBIGUOUS_CHI2, landmark_pose},
         measurement::{LandmarkSize, PoseError},
+        refine::PoseSolution,
         reprojection::{corner_points, perturbed},
     },
     seen_border::SeenBorder,
@@ -68,6 +69,8 @@ pub struct BorderEstimate {
     pub corners_px: Corners,
     /// Their joint covariance.
     pub covariance_px2: CornerCovariance,
+    /// The other solution of the planar ambiguity fits about as well.
+    pub is_mirrored: bool,
 }
 
 /// The border of a landmark of `size` whose texture is at `texture`.
@@ -80,35 +83,56 @@ pub fn estimate_border(
     let texture_px = &texture.corners_px;
     let texture_covariance_px2 = &texture_covariance(texture);
     let rough = landmark_pose(texture_px, texture_covariance_px2, size, camera)?;
-    let pose = rough.best.camera_from_landmark;
-    let (by_pose, by_recess) = derivatives(&pose, &size, camera);
     let reach_px = (REACH_SHARE * texture_px.area_px2().sqrt()).clamp(REACH_PX[0], REACH_PX[1]);
-    let problem = Linear {
-        texture_px,
-        texture_covariance_px2,
-        predicted_px: corners_at(&pose, &size, 0.0, camera),
-        by_pose,
-        by_recess,
-        reach_px,
-    };
     let points = texture_px.points();
     let edges: [Vec<SideEdge>; 4] =
         std::array::from_fn(|i| side_edges(image, &points[i], &points[(i + 1) % 4], reach_px));
-    let readings = readings(&problem, &edges);
-    let best = readings.first().ok_or(BorderError::Pose(PoseError::Degenerate))?;
+    let fit = |solution: &PoseSolution| {
+        let pose = solution.camera_from_landmark;
+        let (by_pose, by_recess) = derivatives(&pose, &size, camera);
+        let predicted_px = corners_at(&pose, &size, 0.0, camera);
+        let problem =
+            Linear { texture_px, texture_covariance_px2, predicted_px, by_pose, by_recess, reach_px };
+        let readings = readings(&problem, &edges);
+        Some(Fit { cost: readings.first()?.cost, predicted_px, by_pose, readings })
+    };
+    // Each solution of the planar ambiguity is read by itself: corners on the one leave nothing of the other.
+    let mut fits: Vec<Fit> = std::iter::once(&rough.best).chain(&rough.second).filter_map(fit).collect();
+    fits.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    let Fit { predicted_px, by_pose, readings, cost } = fits.first().ok_or(PoseError::Degenerate)?;
+    let is_mirrored = fits.get(1).is_some_and(|other| other.cost - cost < AMBIGUOUS_CHI2);
+    let best = readings.first().ok_or(PoseError::Degenerate)?;
     let limit = CHI2_999[best.edges];
     if best.chi2.is_nan() || best.chi2 > limit {
         return Err(BorderError::Reprojection { chi2: best.chi2, limit });
     }
-    let (state, covariance) = mean(&readings)?;
-    let corners_px = problem.predicted_px + by_pose * state;
+    let (state, covariance) = mean(readings)?;
+    let (corners_px, covariance_px2) = if is_mirrored {
+        // Corners of either pose would decide for it.
+        let free = best.information.cholesky().ok_or(PoseError::Degenerate)?;
+        (flat(texture_px) + free.solve(&best.pull), free.inverse())
+    } else {
+        let beside = beside_pose(by_pose, &best.information).ok_or(PoseError::Degenerate)?;
+        (predicted_px + by_pose * state, by_pose * covariance * by_pose.transpose() + beside)
+    };
     let corners_px =
         Corners::new(std::array::from_fn(|i| Point2::new(corners_px[2 * i], corners_px[2 * i + 1])))
             .map_err(|_folded| PoseError::Degenerate)?;
-    let beside = beside_pose(&by_pose, &best.information).ok_or(PoseError::Degenerate)?;
     let floor = SMatrix::<f64, 8, 8>::identity() * LEAST_SIGMA_PX.powi(2);
-    let covariance_px2 = CornerCovariance::new(by_pose * covariance * by_pose.transpose() + beside + floor);
-    Ok(BorderEstimate { corners_px, covariance_px2 })
+    Ok(BorderEstimate {
+        corners_px,
+        covariance_px2: CornerCovariance::new(covariance_px2 + floor),
+        is_mirrored,
+    })
+}
+
+/// All readings about one solution of the planar ambiguity.
+struct Fit {
+    /// Of the likeliest reading.
+    cost: f64,
+    predicted_px: SVector<f64, 8>,
+    by_pose: SMatrix<f64, 8, 6>,
+    readings: Vec<Reading>,
 }
 
 /// Covariance of the corners in the two directions that no pose moves them in. The other solution of the planar ambiguity

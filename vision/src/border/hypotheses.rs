@@ -51,6 +51,8 @@ pub(super) struct Reading {
     pub(super) edges: usize,
     /// Information about the corners without the pose: by texture and edges, px^-2.
     pub(super) information: SMatrix<f64, 8, 8>,
+    /// It times the offset of the corners from those by texture, px^-1.
+    pub(super) pull: SVector<f64, 8>,
 }
 
 /// Every reading, the likeliest first; empty where the texture does not determine a pose.
@@ -87,16 +89,17 @@ fn by_texture(problem: &Linear<'_>, mean_m: f64, sigma_m: f64) -> Option<Reading
     let mut information = j.transpose() * j;
     let weight = sigma_m.powi(-2);
     information[(RECESS, RECESS)] += weight;
-    let mut pull = j.transpose() * r;
-    pull[RECESS] += weight * mean_m;
+    let mut towards = j.transpose() * r;
+    towards[RECESS] += weight * mean_m;
     let factor = information.cholesky()?;
-    let state = factor.solve(&pull);
+    let state = factor.solve(&towards);
     let chi2 = (r - j * state).norm_squared() + weight * (state[RECESS] - mean_m).powi(2);
     let log_determinant: f64 = 2.0 * factor.l().diagonal().map(f64::ln).sum();
     let cost = chi2 + log_determinant - weight.ln();
     let depth = problem.by_recess * problem.by_recess.transpose() * sigma_m.powi(2);
     let information = (problem.texture_covariance_px2.matrix() + depth).cholesky()?.inverse();
-    Some(Reading { state, covariance: factor.inverse(), cost, chi2, edges: 0, information })
+    let pull = -information * problem.by_recess * mean_m;
+    Some(Reading { state, covariance: factor.inverse(), cost, chi2, edges: 0, information, pull })
 }
 
 /// `reading` with the border's side at `edge`.
@@ -121,6 +124,7 @@ fn at_edge(problem: &Linear<'_>, reading: &Reading, side: usize, edge: &SideEdge
     let gain = reading.covariance * rows.transpose() * inverse;
     let chi2 = (residual.transpose() * inverse * residual)[0];
     let covariance = reading.covariance - gain * rows * reading.covariance;
+    let on_corners = by_corners.transpose() * noise.try_inverse()?;
     // The density of the edge's two offsets against that of an edge anywhere in reach.
     let density = chi2 + innovation.determinant().ln() + 2.0 * std::f64::consts::TAU.ln();
     let anywhere = 2.0 * (2.0 * problem.reach_px).ln();
@@ -130,11 +134,12 @@ fn at_edge(problem: &Linear<'_>, reading: &Reading, side: usize, edge: &SideEdge
         cost: reading.cost + density - anywhere,
         chi2: reading.chi2 + chi2,
         edges: reading.edges + 1,
-        information: reading.information + by_corners.transpose() * noise.try_inverse()? * by_corners,
+        information: reading.information + on_corners * by_corners,
+        pull: reading.pull + on_corners * edge.offsets_px,
     })
 }
 
 /// The coordinates of corners, one after the other.
-fn flat(corners: &Corners) -> SVector<f64, 8> {
+pub(super) fn flat(corners: &Corners) -> SVector<f64, 8> {
     SVector::from_fn(|i, _| corners.points()[i / 2][i % 2])
 }

@@ -126,7 +126,7 @@ fn reading(off_m: f64, cost: f64) -> Reading {
     let mut state = SVector::<f64, 7>::zeros();
     state[3] = off_m;
     let (covariance, information) = (SMatrix::identity() * 1e-6, SMatrix::identity());
-    Reading { state, covariance, cost, chi2: 1.0, edges: 2, information }
+    Reading { state, covariance, cost, chi2: 1.0, edges: 2, information, pull: SVector::zeros() }
 }
 
 #[test]
