@@ -132,6 +132,23 @@ fn edges_and_right_angles_are_plain_and_textures_are_not() {
     assert!(view_points(&frame, &whole()).is_empty());
 }
 
+/// Smaller patches add points that the largest one does not have, and no coarse ones.
+#[test]
+fn points_of_smaller_patches_are_taught() {
+    let of_patch =
+        |inner: usize| SeenPatch::new(Patch::new(&poster(2), &whole(), inner).unwrap(), 400).points;
+    let largest = of_patch(patch::INNER_PX[0]);
+    let added: Vec<_> = view_points(&poster(2), &whole())
+        .into_iter()
+        .filter(|t| largest.iter().all(|p| p.descriptor != t.descriptor))
+        .collect();
+    assert!(added.len() >= 10, "{}", added.len());
+    let finest = patch::INNER_PX[2] as f32;
+    assert!(added.iter().all(|t| t.point().sigma * finest < 5.2), "no point sees a whole frame");
+    let small = of_patch(patch::INNER_PX[2]);
+    assert!(added.iter().any(|t| small.iter().any(|p| p.descriptor == t.descriptor)));
+}
+
 #[test]
 fn binomial_tails_by_hand() {
     // By hand: 1 - 0.9^3; 3 * 0.01 * 0.9 + 0.001.

@@ -162,6 +162,7 @@ fn the_other_solution_of_the_planar_ambiguity_stays_possible() {
     let image = picture(&far, |y, z| if beyond(y, z) < 0.0 { 0.1 } else { 0.6 }, &mut random);
     let texture = texture(&far, 0.0, 0.4, &mut random);
     let found = estimate_border((&image).into(), &texture, SIZE, &camera()).unwrap();
+    assert!(found.is_mirrored, "{found:?}");
     let seen = landmark_pose(&found.corners_px, found.covariance_px2, SIZE, &camera()).unwrap();
     assert!(seen.ambiguous, "{:?}", seen.second);
 }
