@@ -106,7 +106,7 @@ impl TaughtPoint {
 }
 
 /// The points of one photographed view: those on the landmark that are not plain structures, in the patch of its size
-/// and in the smaller ones, as robots see it from further away. The strongest first, [`SHARES`] of each size in turn.
+/// and in the smaller ones, as robots see it from further away. The strongest first, a share of each size in turn.
 /// Empty where the corners are degenerate.
 pub fn view_points(image: &GrayImage, corners_px: &Corners) -> Vec<TaughtPoint> {
     let largest = inner_px(corners_px);
