@@ -4,6 +4,7 @@ use crate::{place::LandmarkPlace, pose2::wrap_rad, tracks::params::GatherParams}
 use std::collections::VecDeque;
 use vision::{
     geometry::Corners,
+    icon::Icon,
     learn::near_duplicates::ViewSummary,
     model::LandmarkId,
     recognise::{IconFeatures, RecogniseParams, features::correlation::correlation},
@@ -70,13 +71,18 @@ impl Track {
             .fold(f64::INFINITY, f64::min)
     }
 
+    /// The icon of the first stored view: its border is that of the track.
+    pub fn reference(&self) -> Option<&Icon> {
+        self.icons.front().map(|first| &first.icon)
+    }
+
     pub(super) fn keep(&mut self, summary: ViewSummary, icon: &IconFeatures) {
         self.views.push(summary);
-        // The first views, later one at regular intervals.
+        // The first views, later one at regular intervals; the reference stays.
         if self.icons.len() < MAX_ICONS {
             self.icons.push_back(icon.clone());
         } else if self.views.len().is_multiple_of(MAX_TRACK_VIEWS / MAX_ICONS) {
-            self.icons.pop_front();
+            self.icons.remove(1);
             self.icons.push_back(icon.clone());
         }
     }

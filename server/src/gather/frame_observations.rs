@@ -36,7 +36,7 @@ const POSSIBLE_RATIO: f64 = 1.5;
 /// The observations of a frame.
 pub(super) struct FrameObservations {
     pub(super) quads: Vec<QuadObservation>,
-    /// For each quad, the covariances of its corners by the detector, px^2.
+    /// For each quad, the covariances of its corners, px^2.
     pub(super) corners_px2: Vec<[Matrix2<f64>; 4]>,
     /// How the picture was taken, if the pose is known well enough.
     pub(super) capture: Option<StoredCapture>,
@@ -91,27 +91,35 @@ pub(super) fn frame_observations(offered: &OfferedFrame, params: &Params) -> Fra
         let identity =
             identity(analysis, recognised.map(|(id, _)| id), place.as_ref(), &offered.analysed.map);
         let icon = features(icon, &params.recognise);
-        // A recognised landmark's corners are the detected ones in the landmark's order.
-        let turn = analysis.recognition.as_ref().filter(|_| recognised.is_some()).map_or(0, |v| v.rotation);
-        let mut covariance = analysis.quad.corner_covariance_px2;
-        covariance.rotate_left(turn % 4);
-        observed.corners_px2.push(covariance);
+        observed.corners_px2.push(stated_covariance_px2(analysis, recognised.map(|(_, border)| border)));
         observed.quads.push(QuadObservation { corners_px, icon, place, identity });
     }
     observed
 }
 
-/// The landmark with verdict unique and enough confidence, with its corners. Corners by template alignment are not good
-/// enough to learn from.
+/// The landmark with verdict unique and enough confidence, with its corners. Those by points alone are not good enough
+/// to learn from.
 fn recognised(analysis: &QuadAnalysis, params: &Params) -> Option<(LandmarkId, SeenBorder)> {
     let result = analysis.recognition.as_ref()?;
     let Verdict::Unique(id) = result.verdict else { return None };
-    if result.confidence < MIN_CONFIDENCE || result.border != 0 {
+    if result.confidence < MIN_CONFIDENCE {
         return None;
     }
     matched_border(&analysis.quad, result, params)
-        .filter(|s| s.found_by == FoundBy::Edges)
+        .filter(|border| border.found_by != FoundBy::Points)
         .map(|border| (id, border))
+}
+
+/// The covariances of corners, px^2: by the detector, in the order of a recognised landmark's corners; by alignment
+/// where the landmark was taught by another border than the detected one.
+fn stated_covariance_px2(analysis: &QuadAnalysis, recognised: Option<SeenBorder>) -> [Matrix2<f64>; 4] {
+    if let Some(aligned) = recognised.filter(|border| border.found_by == FoundBy::Alignment) {
+        return aligned.covariance_px2;
+    }
+    let turn = analysis.recognition.as_ref().filter(|_| recognised.is_some()).map_or(0, |v| v.rotation);
+    let mut covariance_px2 = analysis.quad.corner_covariance_px2;
+    covariance_px2.rotate_left(turn % 4);
+    covariance_px2
 }
 
 /// The place of a quad; `None` where the pose or the walls are not known. Errors: it is not flat on a wall.

@@ -20,7 +20,7 @@ use crate::{
         gatherings::{self, GatheringLimits, GatheringRow, NewGathering},
         landmark_placement::{self, StoredCapture},
         track_acceptance::{self, AcceptanceResult, Decision, TrackAcceptance},
-        views::NewView,
+        views::{NewView, QuadCrop},
     },
 };
 use engine::{
@@ -29,7 +29,7 @@ use engine::{
     threads::{self, Class},
 };
 use frame_tap::{ActiveGatherings, lock};
-use map::tracks::{GatherParams, StoredTrack, TrackOutcome, ViewTracker};
+use map::tracks::{GatherParams, StoredTrack, Track, TrackOutcome, ViewTracker};
 use protos::{
     api::{GatheringChange, ServerEventBody},
     convert::{Encoding, Pixels},
@@ -37,9 +37,13 @@ use protos::{
 use std::{collections::BTreeMap, sync::Arc};
 use tokio::sync::mpsc::Receiver;
 use vision::{
+    frame::GrayImage,
+    icon::icon,
+    learn::reference_border::reference_border,
     model::LandmarkId,
     params::Params,
     recognise::{RecogniseParams, features},
+    seen_border::{FoundBy, SeenBorder},
 };
 
 /// The active gatherings.
@@ -299,20 +303,41 @@ fn new_views(offered: &OfferedFrame, params: &Params) -> Vec<(StoredTrack, NewVi
             known: track.known,
             place: quad.place,
         };
+        let detected = SeenBorder {
+            corners_px: quad.corners_px,
+            covariance_px2: *corners_px2,
+            found_by: FoundBy::Edges,
+        };
+        let Some((crop, border)) = view_of(track, &offered.analysed.image, detected, params) else {
+            lock(&gathering.counts).appearance_mismatch += 1;
+            continue;
+        };
         let mut capture = observed.capture.clone();
         if let Some(capture) = &mut capture {
-            capture.set_detected_corners(corners_px2);
+            capture.set_detected_corners(&border.covariance_px2);
         }
-        views.extend(new_view(offered, quad, capture.as_ref()).map(|view| (stored, view)));
+        views.extend(new_view(offered, crop, capture.as_ref()).map(|view| (stored, view)));
     }
     views
 }
 
-fn new_view(
-    offered: &OfferedFrame,
-    quad: &map::tracks::QuadObservation,
-    capture: Option<&StoredCapture>,
-) -> Option<NewView> {
+/// A view along the border of the track's first one. `None` where the picture shows something else there. A landmark
+/// is recognised along its own border.
+fn view_of(
+    track: &Track,
+    image: &GrayImage,
+    detected: SeenBorder,
+    params: &Params,
+) -> Option<(QuadCrop, SeenBorder)> {
+    let border = match (track.landmark, track.reference()) {
+        (None, Some(reference)) => reference_border(image, &detected, reference, params)?,
+        _ => detected,
+    };
+    let icon = icon(image, &border.corners_px, &params.icon).ok()?;
+    Some((QuadCrop { corners_px: border.corners_px, icon }, border))
+}
+
+fn new_view(offered: &OfferedFrame, crop: QuadCrop, capture: Option<&StoredCapture>) -> Option<NewView> {
     let (frame, grey) = (&offered.frame, &offered.analysed.image);
     // Only whole images are offered.
     let Pixels::Image(sent) = &frame.pixels else { return None };
@@ -328,7 +353,7 @@ fn new_view(
         image,
         image_kind,
         size_px: [grey.width(), grey.height()],
-        crop: crate::store::views::QuadCrop { corners_px: quad.corners_px, icon: quad.icon.icon.clone() },
+        crop,
         // Another quad of the frame may become a landmark itself: it is no distractor here.
         distractors: vec![],
         capture: capture.and_then(|c| serde_json::to_string(c).ok()),

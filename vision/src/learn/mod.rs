@@ -5,6 +5,7 @@ pub mod training_view;
 pub(crate) mod texture;
 pub mod synthesis;
 pub mod near_duplicates;
+pub mod reference_border;
 pub mod pca;
 pub mod threshold;
 pub mod gates;
