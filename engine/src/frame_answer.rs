@@ -108,7 +108,7 @@ fn pose_refusal(reason: &PoseUnavailable) -> &'static str {
         PoseUnavailable::NoSize(_) => "no_size",
         PoseUnavailable::Border(BorderError::Reprojection { .. }) => "reprojection",
         PoseUnavailable::Border(BorderError::Unclear) => "border_unclear",
-        PoseUnavailable::Border(BorderError::Pose(_)) | PoseUnavailable::Pose(_) => "degenerate",
+        PoseUnavailable::Border(BorderError::Pose(_)) => "degenerate",
     }
 }
 

@@ -21,13 +21,13 @@ use map::{
 use nalgebra::Matrix2;
 use std::{collections::BTreeSet, sync::Arc};
 use vision::{
-    border::estimate_border,
+    border::{BorderEstimate, estimate_border},
     frame::GrayImage,
     geometry::{Corners, polygon},
     model::LandmarkId,
     pipeline::{ACCEPTED_NATS, ExpectedLandmark, QuadAnalysis, expected, matched_border},
     points::verify::PointEvidence,
-    pose::{LandmarkPose, landmark_pose},
+    pose::LandmarkPose,
     recognise::{MatchRefusal, Verdict},
     seen_border::{FoundBy, SeenBorder},
 };
@@ -262,17 +262,19 @@ fn guided_observation(
     let LookAlikeMatch { corners_px, covariance_px2, .. } = &quad_match.matched;
     let size = frame.map.sizes.get(&landmark)?;
     let camera = frame.camera?;
-    let (corners_px, joint_px2) = if frame.is_whole {
+    let border = if frame.is_whole {
         let found_by = FoundBy::Alignment;
         let texture = SeenBorder { corners_px: *corners_px, covariance_px2: *covariance_px2, found_by };
-        let border = estimate_border(image.into(), &texture, *size, camera).ok()?;
-        (border.corners_px, border.covariance_px2)
+        estimate_border(image.into(), &texture, *size, camera).ok()?
     } else {
-        (*corners_px, covariance_px2.into())
+        let covariance_px2 = covariance_px2.into();
+        BorderEstimate { corners_px: *corners_px, covariance_px2, is_mirrored: false }
     };
-    let pose = landmark_pose(&corners_px, joint_px2, *size, camera).ok()?;
+    let pose = border.pose(*size, camera).ok()?;
     let (quad, points) = (quad_match.quad, quad_match.points.clone());
-    Some(GuidedObservation { quad, landmark, corners_px, covariance_px2: joint_px2.blocks(), pose, points })
+    let BorderEstimate { corners_px, covariance_px2, .. } = border;
+    let covariance_px2 = covariance_px2.blocks();
+    Some(GuidedObservation { quad, landmark, corners_px, covariance_px2, pose, points })
 }
 
 #[cfg(test)]

@@ -14,10 +14,7 @@ use crate::{
     geometry::{corner_covariance::CornerCovariance, corners::Corners},
     model::{landmark_id::LandmarkId, model_set::ModelSet},
     params::Params,
-    pose::{
-        landmark_pose::{LandmarkPose, landmark_pose},
-        measurement::{LandmarkSize, PoseError},
-    },
+    pose::{landmark_pose::LandmarkPose, measurement::LandmarkSize},
     recognise::{
         decision::{
             matched_border::texture_border,
@@ -104,9 +101,6 @@ pub enum PoseUnavailable {
     /// No border that the pose could rest on.
     #[error(transparent)]
     Border(#[from] BorderError),
-    /// The corners give no pose.
-    #[error(transparent)]
-    Pose(#[from] PoseError),
 }
 
 /// The pipeline with memory reused from frame to frame: fresh planes cost more than a tenth of the time to
@@ -185,27 +179,13 @@ fn analyse(
                 (Err(_), Some(v)) => recognised_border(&quad, v, p),
                 (Err(_), None) => None,
             };
-            let pose = border.and_then(|(border, size, camera)| pose(&border, size, camera));
+            let pose = border.and_then(|(border, size, camera)| Ok(border.pose(size, camera)?));
             QuadAnalysis { quad, recognition: verdict, border_px, pose }
         })
         .filter(|analysis| p.detect.quads.is_shown(&analysis.quad) || is_recognised(analysis))
         .collect();
     trace.finished(Stage::Poses);
     FrameAnalysis { quads }
-}
-
-/// The pose by a border. Where the border fits two poses but the corners have only one, it is unclear.
-fn pose(
-    border: &BorderEstimate,
-    size: LandmarkSize,
-    camera: &Intrinsics,
-) -> Result<LandmarkPose, PoseUnavailable> {
-    let mut pose = landmark_pose(&border.corners_px, border.covariance_px2, size, camera)?;
-    if border.is_mirrored && pose.second.is_none() {
-        return Err(BorderError::Unclear.into());
-    }
-    pose.ambiguous |= border.is_mirrored;
-    Ok(pose)
 }
 
 /// The border by the picture alone, where it is exactly one landmark.

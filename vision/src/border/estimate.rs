@@ -9,7 +9,7 @@ use crate::{
     frame::{Intrinsics, PictureRef},
     geometry::{corner_covariance::CornerCovariance, corners::Corners},
     pose::{
-        landmark_pose::{AMBIGUOUS_CHI2, landmark_pose},
+        landmark_pose::{AMBIGUOUS_CHI2, LandmarkPose, landmark_pose},
         measurement::{LandmarkSize, PoseError},
         refine::PoseSolution,
         reprojection::{corner_points, perturbed},
@@ -71,6 +71,19 @@ pub struct BorderEstimate {
     pub covariance_px2: CornerCovariance,
     /// The other solution of the planar ambiguity fits about as well.
     pub is_mirrored: bool,
+}
+
+impl BorderEstimate {
+    /// The landmark's pose by these corners. Where the border fits two poses but the corners have only one, it is
+    /// unclear.
+    pub fn pose(&self, size: LandmarkSize, camera: &Intrinsics) -> Result<LandmarkPose, BorderError> {
+        let mut pose = landmark_pose(&self.corners_px, self.covariance_px2, size, camera)?;
+        if self.is_mirrored && pose.second.is_none() {
+            return Err(BorderError::Unclear);
+        }
+        pose.ambiguous |= self.is_mirrored;
+        Ok(pose)
+    }
 }
 
 /// The border of a landmark of `size` whose texture is at `texture`.

@@ -132,6 +132,28 @@ fn with_a_look_alike_in_the_map_the_likeness_must_pass() {
     assert_eq!(decided(1e-6), (Verdict::Ambiguous(LandmarkId(1)), Some(MatchRefusal::Similarity)));
 }
 
+/// Panels that two doors share give points that agree, beside an icon that does not.
+#[test]
+fn a_picture_unlike_the_icon_needs_far_fewer_false_alarms() {
+    let p = Params::default();
+    let image = photograph(&poster(1), &oblique(), 0.8, 20.0);
+    let model = trained_model(1, 1, &p).with_points(&[taught(1)]);
+    let set = ModelSet::new(vec![Arc::new(model.clone())], &p).unwrap();
+    let evidence = *by_points(&image, &quad(oblique()), &set, &p).unwrap().points.unwrap();
+    let refused = |log10_nfa: f64, likeness: f64| {
+        let best = LandmarkPoints {
+            model: 0,
+            border: 0,
+            evidence: PointEvidence { log10_nfa, ..evidence.clone() },
+            turned: None,
+        };
+        let alignment = IconAlignment { likeness: Some(likeness), has_mismatch: Some(false) };
+        refusal(&best, std::iter::empty(), (&model, &alignment), 1, &p)
+    };
+    assert_eq!(refused(-15.0, 0.29), Some(MatchRefusal::Similarity));
+    assert_eq!((refused(-15.0, 0.31), refused(-25.0, 0.29)), (None, None));
+}
+
 #[test]
 fn the_landmarks_border_is_chosen_over_the_wall_panel() {
     let p = Params::default();
