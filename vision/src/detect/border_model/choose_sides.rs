@@ -99,20 +99,35 @@ mod tests {
         params::QuadParams,
         tests::fixtures::render,
     };
+    use crate::frame::GrayImage;
 
     const PICTURE: [[f64; 2]; 4] = [[100.0, 80.0], [300.0, 80.0], [300.0, 240.0], [100.0, 240.0]];
 
     #[test]
     fn the_shadow_under_a_picture_is_not_its_side() {
-        // Light from above: the wall under the picture is at six tenths, down to 20 px below it.
-        let shadow = [[102.0, 95.0], [298.0, 95.0], [298.0, 260.0], [102.0, 260.0]];
-        let inner = [[125.0, 105.0], [275.0, 105.0], [275.0, 215.0], [125.0, 215.0]];
-        let image = render(420, 340, 200, &[(shadow, 120), (PICTURE, 50), (inner, 170)]);
+        // A lamp above: the wall under the picture is at six tenths, down to 20 px below it, with a penumbra of 12 px.
+        let is_in = |[left, top, right, bottom]: [f64; 4], x: f64, y: f64| {
+            (left..right).contains(&x) && (top..bottom).contains(&y)
+        };
+        let image = GrayImage::from_fn(420, 340, |u, v| {
+            let (x, y) = (u as f64 + 0.5, v as f64 + 0.5);
+            if is_in([125.5, 105.5, 275.5, 215.5], x, y) {
+                return 170;
+            }
+            if is_in([100.5, 80.5, 300.5, 240.5], x, y) {
+                return 50;
+            }
+            let depth_px = (x - 102.5).min(298.5 - x).min(260.5 - y);
+            let share = if y < 95.5 { 0.0 } else { (0.5 + depth_px / 12.0).clamp(0.0, 1.0) };
+            (200.0 - 80.0 * share) as u8
+        });
         let map = edges(&image, &EdgeParams::default());
         let g = Gradients { image: &image, gx: map.gx(), gy: map.gy() };
         let with_shadow = [[100.0, 80.0], [300.0, 80.0], [300.0, 260.0], [100.0, 260.0]].map(Point2::from);
         let chosen = choose_sides(&g, &with_shadow, QuadParams::default().side_network()).unwrap();
-        for (found, wanted) in chosen.corners_px.iter().zip(PICTURE.map(Point2::from)) {
+        // Pixels belong to the picture from 100 to 299, so that its border is half a pixel further out.
+        for (found, [u, v]) in chosen.corners_px.iter().zip(PICTURE) {
+            let wanted = Point2::new(u - 0.5, v - 0.5);
             assert!((found - wanted).norm() < 0.5, "{:?}", chosen.corners_px);
         }
     }
