@@ -146,7 +146,7 @@ def map_files():
 
 
 def texts():
-    for i, key in enumerate(["robot/r1/frame/front", "robot/r1/quads/c-0", "robot/r1/odometry", "robot/r1/alive/42",
+    for i, key in enumerate(["robot/r1/frame/front", "robot/r1/quads/c-0", "robot/r1/odometry", "robot/r1/alive/7",
                              "robot/r1/rpc/gaze", "map/hall/changed", "map/hall/version"]):
         seed("keys", f"key-{i}", f"default\nwaymark/1/default/{key}")
     seed("keys", "key-below", "works_2\nrobot/r1/answer/front")

@@ -30,6 +30,7 @@ mod run;
 pub mod scratch;
 pub mod screen;
 mod serve;
+mod serve_panic;
 mod server_status;
 mod session;
 mod shell;

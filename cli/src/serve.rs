@@ -1,6 +1,6 @@
 //! `waymark serve`: the server, until Ctrl-C or SIGTERM.
 
-use super::notify::Supervisor;
+use super::{notify::Supervisor, serve_panic::end_after_a_panic_of_zenoh};
 use anyhow::{Context, anyhow};
 use clap::Args;
 use engine::vitals::Failure;
@@ -130,6 +130,7 @@ impl Serve {
     pub(super) async fn run(self) -> anyhow::Result<()> {
         let config = self.settings()?;
         warn_of_plain_text(&config);
+        end_after_a_panic_of_zenoh();
         let data = config.data.clone();
         let server = Server::start(config).await?;
         let signals = StopSignals::heard()?;

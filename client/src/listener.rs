@@ -71,7 +71,9 @@ impl FleetListener {
             let (keys, robots) = (keys.clone(), robots.to_vec());
             let (to, counters) = (to.clone(), counters.clone());
             let receive = move |sample: Sample| {
-                let Ok(key) = keys.parse(sample.key_expr().as_str()) else { return };
+                let attached = sample.attachment().map(|attached| attached.to_bytes());
+                let received = keys.received(sample.key_expr().as_str(), attached.as_deref());
+                let Ok(key) = received else { return };
                 if is_wanted(&key, &robots) {
                     counters.queue(&to, key, &sample);
                 }

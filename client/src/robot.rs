@@ -8,7 +8,7 @@ use crate::{
     transport,
 };
 use map::pose2::Pose2;
-use protos::{Key, Keys, Name, convert::geometry::pose2_wire, prost::Message, v1};
+use protos::{Key, Keys, Name, convert::geometry::pose2_wire, keys::alive_slot, prost::Message, v1};
 use std::{
     hash::{BuildHasher, RandomState},
     sync::atomic::{AtomicU64, Ordering},
@@ -174,7 +174,9 @@ impl RobotClient {
         let to_answers = {
             let (keys, answers, servers) = (keys.clone(), answers.clone(), servers.clone());
             move |sample: Sample| {
-                let Ok(Key::Answer(_, camera)) = keys.parse(sample.key_expr().as_str()) else { return };
+                let attached = sample.attachment().map(|attached| attached.to_bytes());
+                let received = keys.received(sample.key_expr().as_str(), attached.as_deref());
+                let Ok(Key::Answer(_, camera)) = received else { return };
                 let Ok(answer) = v1::Answer::decode(&*sample.payload().to_bytes()) else { return };
                 if !servers.takes_answer(&answer) {
                     return;
@@ -210,7 +212,8 @@ impl RobotClient {
                 .await
                 .map_err(subscribe)?,
         ]);
-        let alive = session.liveliness().declare_token(keys.build(&Key::Alive(robot.clone(), Some(epoch))));
+        let alive =
+            session.liveliness().declare_token(keys.build(&Key::Alive(robot.clone(), alive_slot(epoch))));
         let alive = alive.await.map_err(fault("declare the liveliness token"))?;
         Ok(Self {
             session,
@@ -356,9 +359,13 @@ impl RobotClient {
             Delivery::Latest => CongestionControl::Drop,
             Delivery::Every => CongestionControl::Block,
         };
-        let (session, key) = (self.session.clone(), self.keys.build(key));
+        let (key, camera) = self.keys.on_wire(key);
+        let (session, camera) = (self.session.clone(), camera.map(str::to_owned));
         // zenoh waits inside the call when the link is full: not on an async thread.
-        let put = move || session.put(key, bytes).congestion_control(congestion).priority(priority).wait();
+        let put = move || {
+            let put = session.put(key, bytes).attachment(camera);
+            put.congestion_control(congestion).priority(priority).wait()
+        };
         match tokio::task::spawn_blocking(put).await {
             Ok(sent) => sent.map_err(fault("send")),
             Err(gone) => Err(ClientError::Transport { action: "send", detail: gone.to_string() }),

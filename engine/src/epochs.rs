@@ -2,10 +2,15 @@
 //! Out: the message is admitted, or refused because another epoch of the robot is live. Knows no transport; time is passed
 //! in.
 //!
-//! An epoch is live while its liveliness token is there, or for [`MESSAGE_LIVE`] after its last message. While one epoch of
-//! a robot is live, every other one is refused. When its token goes, the epoch ends at once, and the next one is admitted.
+//! An epoch begins with its first message. It is live while its liveliness token is there, or for [`MESSAGE_LIVE`] after its
+//! last message. While one epoch of a robot is live, every other one is refused. When its token goes, the epoch ends at once,
+//! and the next one is admitted. A token names the slot of its epoch, one of [`protos::keys::ALIVE_SLOTS`]: of two epochs that
+//! share a slot, the token says nothing, and the later one waits for [`MESSAGE_LIVE`].
 
-use protos::{Code, Name, Rejection};
+use protos::{
+    Code, Name, Rejection,
+    keys::{ALIVE_SLOTS, alive_slot},
+};
 use std::{
     collections::{BTreeMap, VecDeque},
     sync::{Mutex, MutexGuard, PoisonError},
@@ -15,8 +20,6 @@ use std::{
 /// An epoch without a liveliness token is live for this long after its last message: the longest wait of a restarted robot.
 /// Longer than zenoh's lease (2 s), after which the token of a lost link goes.
 pub const MESSAGE_LIVE: Duration = Duration::from_secs(3);
-/// Liveliness tokens remembered of one robot; more are ignored.
-pub const MAX_TOKENS_PER_ROBOT: usize = 8;
 /// Epochs of one robot whose end is remembered: late messages of an ended epoch are not a robot that came back.
 pub const MAX_ENDED: usize = 8;
 /// Robots beyond the registered ones; a further one replaces the one with the oldest token or message.
@@ -60,8 +63,8 @@ struct Refused {
 /// The epochs of one robot.
 #[derive(Debug)]
 struct RobotEpochs {
-    /// Present tokens; those of older clients name no epoch.
-    tokens: Vec<Option<u64>>,
+    /// Present tokens: a bit for each slot.
+    tokens: u16,
     /// The last live epoch, and the time of its last token or message.
     current: Option<(u64, Instant)>,
     /// Earlier epochs and when each ended; the latest last.
@@ -74,7 +77,7 @@ struct RobotEpochs {
 impl RobotEpochs {
     fn new(now: Instant) -> Self {
         Self {
-            tokens: Vec::new(),
+            tokens: 0,
             current: None,
             ended: VecDeque::new(),
             refused: None,
@@ -84,14 +87,19 @@ impl RobotEpochs {
     }
 
     fn has_token(&self, epoch: u64) -> bool {
-        self.tokens.contains(&Some(epoch))
+        self.tokens & bit(alive_slot(epoch)) != 0
     }
 
-    /// The live epoch.
+    /// The live epoch, by its token or its messages.
     fn live(&self, now: Instant) -> Option<u64> {
+        let (epoch, _) = self.current?;
+        if self.has_token(epoch) { Some(epoch) } else { self.heard(now) }
+    }
+
+    /// The epoch that is live by its messages alone.
+    fn heard(&self, now: Instant) -> Option<u64> {
         let (epoch, last) = self.current?;
-        let recent = now.saturating_duration_since(last) < MESSAGE_LIVE;
-        (recent || self.has_token(epoch)).then_some(epoch)
+        (now.saturating_duration_since(last) < MESSAGE_LIVE).then_some(epoch)
     }
 
     fn end_current(&mut self, now: Instant) {
@@ -157,7 +165,9 @@ impl Epochs {
             *last = now;
             return Ok(());
         }
-        let live = epochs.live(now);
+        let has_other_slot = |(live, _): (u64, Instant)| alive_slot(live) != alive_slot(epoch);
+        let is_token_its_own = epochs.current.is_none_or(has_other_slot);
+        let live = if is_token_its_own { epochs.live(now) } else { epochs.heard(now) };
         if epochs.is_straggler(epoch, now) {
             return Err(Rejection::new(Code::NotNewer, "epoch", format!("epoch {epoch} is over")));
         }
@@ -175,12 +185,12 @@ impl Epochs {
         Err(Rejection::new(Code::EpochConflict, "epoch", detail))
     }
 
-    /// A liveliness token appeared or went; `epoch` is absent in the tokens of older clients. Names that are not registered
+    /// The liveliness token of a slot appeared or went. Names that are not registered
     /// (`is_registered`) never replace registered ones. `Some(true)` if the robot came by that, `Some(false)` if it went.
     pub fn token(
         &self,
         robot: &Name,
-        (epoch, appeared): (Option<u64>, bool),
+        (slot, appeared): (u8, bool),
         now: Instant,
         is_registered: impl Fn(&Name) -> bool,
     ) -> Option<bool> {
@@ -195,21 +205,16 @@ impl Epochs {
         }
         let epochs = robots.entry(robot.clone()).or_insert_with(|| RobotEpochs::new(now));
         epochs.last_heard = now;
-        let before = epochs.tokens.len();
+        let before = epochs.tokens;
         if appeared {
-            if before < MAX_TOKENS_PER_ROBOT && !epochs.tokens.contains(&epoch) {
-                epochs.tokens.push(epoch);
-            }
-            if let Some(epoch) = epoch.filter(|_| epochs.live(now).is_none()) {
-                epochs.begin(epoch, now);
-            }
+            epochs.tokens |= bit(slot);
         } else {
-            epochs.tokens.retain(|token| *token != epoch);
-            if epochs.current.is_some_and(|(current, _)| Some(current) == epoch) {
+            epochs.tokens &= !bit(slot);
+            if epochs.current.is_some_and(|(current, _)| alive_slot(current) == slot) {
                 epochs.end_current(now);
             }
         }
-        match (before, epochs.tokens.len()) {
+        match (before, epochs.tokens) {
             (0, 1..) => Some(true),
             (1.., 0) => Some(false),
             _ => None,
@@ -231,13 +236,17 @@ impl Epochs {
             let last_ms = u64::try_from(ago.as_millis()).unwrap_or(u64::MAX);
             (ago < CONFLICT_SHOWN).then_some(Conflict { epoch: r.epoch, refused: r.count, last_ms })
         });
-        Status { alive: epoch.is_some() || !epochs.tokens.is_empty(), epoch, conflict }
+        Status { alive: epoch.is_some() || epochs.tokens != 0, epoch, conflict }
     }
 
     fn lock(&self) -> MutexGuard<'_, BTreeMap<Name, RobotEpochs>> {
         // No code inside can panic halfway through a change.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
+}
+
+fn bit(slot: u8) -> u16 {
+    1 << (slot % ALIVE_SLOTS)
 }
 
 /// Makes room for one more robot that is not registered.
@@ -280,8 +289,8 @@ mod tests {
             self.epochs.admit(&name("r1"), epoch, self.at(ms)).map_err(|r| r.code)
         }
 
-        fn token(&self, epoch: Option<u64>, appeared: bool, ms: u64) -> Option<bool> {
-            self.epochs.token(&name("r1"), (epoch, appeared), self.at(ms), |_| true)
+        fn token(&self, epoch: u64, appeared: bool, ms: u64) -> Option<bool> {
+            self.epochs.token(&name("r1"), (alive_slot(epoch), appeared), self.at(ms), |_| true)
         }
 
         fn status(&self, ms: u64) -> Status {
@@ -320,49 +329,57 @@ mod tests {
     #[test]
     fn a_token_keeps_an_epoch_live_and_its_end_is_at_once() {
         let world = World::new();
-        assert_eq!(world.token(Some(7), true, 0), Some(true));
+        assert_eq!(world.token(7, true, 0), Some(true));
+        assert_eq!(world.message(7, 10), Ok(()));
         assert_eq!(world.message(8, 100_000), Err(Code::EpochConflict), "silent, but there");
-        assert_eq!(world.token(Some(8), true, 100_000), None, "the robot was present before");
+        assert_eq!(world.token(8, true, 100_000), None, "the robot was present before");
         assert_eq!(world.message(8, 100_001), Err(Code::EpochConflict));
-        assert_eq!(world.token(Some(7), false, 100_002), None);
+        assert_eq!(world.token(7, false, 100_002), None);
         assert_eq!(world.epochs.current(&name("r1")), None);
         assert_eq!(world.message(8, 100_003), Ok(()));
         assert_eq!(world.message(7, 100_004), Err(Code::NotNewer), "a straggler");
-        assert_eq!(world.token(Some(8), false, 100_005), Some(false));
+        assert_eq!(world.token(8, false, 100_005), Some(false));
         assert!(!world.status(100_005).alive);
     }
 
     #[test]
     fn a_straggler_does_not_bring_its_epoch_back() {
         let world = World::new();
-        world.token(Some(7), true, 0);
+        world.token(7, true, 0);
         world.message(7, 10).unwrap();
-        world.token(Some(7), false, 20);
+        world.token(7, false, 20);
         assert_eq!(world.message(7, 30), Err(Code::NotNewer));
         assert_eq!(world.message(8, 40), Ok(()), "at once");
-        world.token(Some(8), false, 50);
+        world.token(8, false, 50);
         // A link that was lost comes back: the token says so.
-        world.token(Some(7), true, 60);
+        world.token(7, true, 60);
         assert_eq!(world.message(7, 70), Ok(()));
     }
 
     #[test]
-    fn tokens_without_an_epoch_are_presence_only() {
+    fn a_token_is_presence_until_its_epoch_sends() {
         let world = World::new();
-        assert_eq!(world.token(None, true, 0), Some(true));
+        assert_eq!(world.token(7, true, 0), Some(true));
         assert_eq!((world.status(0).alive, world.status(0).epoch), (true, None));
-        assert_eq!(world.message(7, 10), Ok(()));
-        assert_eq!(world.message(8, 10 + MESSAGE_LIVE.as_millis() as u64), Ok(()));
-        assert_eq!(world.token(None, false, 20_000), Some(false));
+        assert_eq!(world.message(8, 10), Ok(()), "the first that sends is live");
+        assert_eq!(world.message(7, 20), Err(Code::EpochConflict));
     }
 
     #[test]
-    fn tokens_are_bounded() {
+    fn an_epoch_in_the_same_slot_waits_for_the_messages_alone() {
         let world = World::new();
-        for epoch in 0..=MAX_TOKENS_PER_ROBOT as u64 {
-            world.token(Some(epoch), true, epoch);
-        }
-        assert_eq!(world.epochs.lock()[&name("r1")].tokens.len(), MAX_TOKENS_PER_ROBOT);
+        let (live, other) = (MESSAGE_LIVE.as_millis() as u64, 7 + u64::from(ALIVE_SLOTS));
+        world.token(7, true, 0);
+        assert_eq!(world.message(7, 10), Ok(()));
+        assert_eq!(world.message(other, 10 + live - 1), Err(Code::EpochConflict));
+        assert_eq!(world.message(other, 10 + live), Ok(()), "the token may be its own");
+        assert_eq!(world.token(other, false, 20_000), Some(false));
+        assert_eq!(world.status(20_000).epoch, None);
+    }
+
+    #[test]
+    fn ended_epochs_are_bounded() {
+        let world = World::new();
         for epoch in 100..200 {
             world.message(epoch, epoch * 10_000).ok();
         }
@@ -383,8 +400,7 @@ mod tests {
     fn names_that_nobody_registered_are_bounded() {
         let world = World::new();
         let registered = |n: &Name| n.as_str() == "r1";
-        let token =
-            |robot: &str, ms| world.epochs.token(&name(robot), (None, true), world.at(ms), registered);
+        let token = |robot: &str, ms| world.epochs.token(&name(robot), (0, true), world.at(ms), registered);
         token("r1", 0);
         for i in 0..3 * MAX_UNREGISTERED as u64 {
             token(&format!("made-up-{i}"), i + 1);
@@ -392,7 +408,7 @@ mod tests {
         assert_eq!(world.epochs.lock().len(), MAX_UNREGISTERED + 1);
         assert!(world.status(0).alive, "the registered robot is shown");
         // A registered robot is let in when the list is full, and one whose token came before its registration is alive.
-        world.epochs.token(&name("r2"), (Some(1), true), world.at(9), |n| n.as_str() == "r2");
+        world.epochs.token(&name("r2"), (1, true), world.at(9), |n| n.as_str() == "r2");
         assert!(world.epochs.status(&name("r2"), world.at(9)).alive);
         let latest = format!("made-up-{}", 3 * MAX_UNREGISTERED - 1);
         assert!(world.epochs.status(&name(&latest), world.at(9)).alive);

@@ -71,7 +71,7 @@ pub struct Intrinsics {
     #[prost(double, optional, tag = "9")]
     pub center_sigma_px: ::core::option::Option<f64>,
 }
-/// robot/{robot}/frame/{camera}
+/// robot/{robot}/frame, with the camera attached
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct Frame {
     /// Random at every start of the robot's software. A new epoch starts its own sequence.
@@ -180,9 +180,9 @@ pub struct FoundQuad {
     #[prost(message, optional, tag = "6")]
     pub patch: ::core::option::Option<Patch>,
 }
-/// robot/{robot}/quads/{camera}: what the robot's own detector found in an image, in place of the image. Answered as a frame
-/// of that camera, and numbered with its frames. What is outside of the patches is unknown: nothing is searched for there,
-/// and no landmark counts as missing.
+/// robot/{robot}/quads, with the camera attached: what the robot's own detector found in an image, in place of the image.
+/// Answered as a frame of that camera, and numbered with its frames. What is outside of the patches is unknown: nothing is
+/// searched for there, and no landmark counts as missing.
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct Quads {
     #[prost(uint64, tag = "1")]
@@ -412,7 +412,7 @@ pub struct Hypothesis {
     #[prost(message, optional, tag = "2")]
     pub map_from_robot: ::core::option::Option<Pose2Covariance>,
 }
-/// robot/{robot}/answer/{camera}
+/// robot/{robot}/answer, with the camera attached
 #[derive(::serde::Serialize, ::serde::Deserialize)]
 #[serde(default)]
 #[derive(Clone, PartialEq, ::prost::Message)]

@@ -1,5 +1,8 @@
-//! Key expressions under `waymark/1/{fleet}/`, built from checked names and parsed back into them. The transport does
-//! not tell a handler who sent a message, so the robot's name is in every key that a robot writes.
+//! Keys under `waymark/1/{fleet}/`, built from checked names and parsed back into them. The transport does not tell a
+//! handler who sent a message, so the robot's name is in every key that a robot writes.
+//!
+//! On the wire every key of a robot is one of a fixed list: access control names each, and needs no wildcard, which would
+//! let keys of any length pass. So the camera is not in the key expression: it is the attachment of the message.
 
 use std::fmt;
 
@@ -9,6 +12,8 @@ pub const PROTOCOL: &str = "1";
 pub const ROOT: &str = "waymark";
 /// Longest name, in bytes.
 pub const MAX_NAME_BYTES: usize = 64;
+/// Liveliness tokens that a robot may have: the slot of an epoch is its remainder by this number.
+pub const ALIVE_SLOTS: u8 = 16;
 
 /// Why a text is not a name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -86,11 +91,11 @@ impl From<Name> for String {
 /// What a key says, without the fleet.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Key {
-    /// `robot/{robot}/frame/{camera}`: robot to server, `Frame`.
+    /// `robot/{robot}/frame/{camera}`: robot to server, `Frame`. On the wire `robot/{robot}/frame`, the camera attached.
     Frame(Name, Name),
-    /// `robot/{robot}/quads/{camera}`: robot to server, `Quads`.
+    /// `robot/{robot}/quads/{camera}`: robot to server, `Quads`. The camera is attached.
     Quads(Name, Name),
-    /// `robot/{robot}/answer/{camera}`: server to robot, `Answer`.
+    /// `robot/{robot}/answer/{camera}`: server to robot, `Answer`. The camera is attached.
     Answer(Name, Name),
     /// `robot/{robot}/odometry`: robot to server, `Odometry`.
     Odometry(Name),
@@ -98,9 +103,9 @@ pub enum Key {
     Scan(Name),
     /// `robot/{robot}/pose`: server to robot, `RobotPose`.
     Pose(Name),
-    /// `robot/{robot}/alive/{epoch}`: liveliness token of a start of a robot's software; the epoch in decimal digits.
-    /// The older `robot/{robot}/alive` names no epoch.
-    Alive(Name, Option<u64>),
+    /// `robot/{robot}/alive/{slot}`: liveliness token of a start of a robot's software; [`alive_slot`] of its epoch, in
+    /// decimal digits.
+    Alive(Name, u8),
     /// `robot/{robot}/rpc/gaze`: a query of the robot, `GazeRequest` in, `GazeAdvice` out.
     Gaze(Name),
     /// `robot/{robot}/rpc/hello`: a query of the robot, answered with nothing: its messages arrive.
@@ -159,7 +164,29 @@ impl Keys {
         Self { prefix: format!("{ROOT}/{PROTOCOL}/{fleet}/") }
     }
 
-    /// The full key expression.
+    /// The key expression on the wire, and the name of the camera that is attached to the message.
+    pub fn on_wire<'a>(&self, key: &'a Key) -> (String, Option<&'a str>) {
+        let p = &self.prefix;
+        match key {
+            Key::Frame(robot, camera) => (format!("{p}robot/{robot}/frame"), Some(camera.as_str())),
+            Key::Quads(robot, camera) => (format!("{p}robot/{robot}/quads"), Some(camera.as_str())),
+            Key::Answer(robot, camera) => (self.answers_of(robot), Some(camera.as_str())),
+            other => (self.build(other), None),
+        }
+    }
+
+    /// The key of a message: its key expression, and what is attached. Total, as [`Self::parse`].
+    pub fn received(&self, expression: &str, attachment: Option<&[u8]>) -> Result<Key, KeyError> {
+        let kinds = ["/frame", "/quads", "/answer"];
+        if !kinds.iter().any(|kind| expression.ends_with(kind)) {
+            return self.parse(expression);
+        }
+        // Longer ones are no names: they are not copied.
+        let camera = attachment.filter(|camera| camera.len() <= MAX_NAME_BYTES).unwrap_or_default();
+        self.parse(&format!("{expression}/{}", String::from_utf8_lossy(camera)))
+    }
+
+    /// The full key. Frames, quads and answers have their camera in it: so they are called in recordings.
     pub fn build(&self, key: &Key) -> String {
         let p = &self.prefix;
         match key {
@@ -169,8 +196,7 @@ impl Keys {
             Key::Odometry(robot) => format!("{p}robot/{robot}/odometry"),
             Key::Scan(robot) => format!("{p}robot/{robot}/scan"),
             Key::Pose(robot) => format!("{p}robot/{robot}/pose"),
-            Key::Alive(robot, None) => format!("{p}robot/{robot}/alive"),
-            Key::Alive(robot, Some(epoch)) => format!("{p}robot/{robot}/alive/{epoch}"),
+            Key::Alive(robot, slot) => format!("{p}robot/{robot}/alive/{slot}"),
             Key::Gaze(robot) => format!("{p}robot/{robot}/rpc/gaze"),
             Key::Hello(robot) => format!("{p}robot/{robot}/rpc/hello"),
             Key::Localise(robot) => format!("{p}robot/{robot}/rpc/localise"),
@@ -187,12 +213,12 @@ impl Keys {
 
     /// Key expression of the frames of all robots.
     pub fn all_frames(&self) -> String {
-        format!("{}robot/*/frame/*", self.prefix)
+        format!("{}robot/*/frame", self.prefix)
     }
 
     /// Key expression of the quads of all robots.
     pub fn all_quads(&self) -> String {
-        format!("{}robot/*/quads/*", self.prefix)
+        format!("{}robot/*/quads", self.prefix)
     }
 
     /// Key expression of the odometry of all robots.
@@ -232,12 +258,12 @@ impl Keys {
 
     /// Key expression of all liveliness tokens.
     pub fn all_alive(&self) -> String {
-        format!("{}robot/*/alive/**", self.prefix)
+        format!("{}robot/*/alive/*", self.prefix)
     }
 
     /// Key expression of all answers for all robots.
     pub fn all_answers(&self) -> String {
-        format!("{}robot/*/answer/*", self.prefix)
+        format!("{}robot/*/answer", self.prefix)
     }
 
     /// Key expression of the fused poses of all robots.
@@ -270,27 +296,22 @@ impl Keys {
         format!("{}server/*/robot/{robot}", self.prefix)
     }
 
-    /// Key expression of the frames of one robot.
-    pub fn frames_of(&self, robot: &Name) -> String {
-        format!("{}robot/{robot}/frame/*", self.prefix)
+    /// Key expressions of everything that one robot puts.
+    pub fn puts_of(&self, robot: &Name) -> [String; 4] {
+        ["frame", "quads", "odometry", "scan"].map(|kind| format!("{}robot/{robot}/{kind}", self.prefix))
     }
 
-    /// Key expression of the quads of one robot.
-    pub fn quads_of(&self, robot: &Name) -> String {
-        format!("{}robot/{robot}/quads/*", self.prefix)
-    }
-
-    /// Key expression of the liveliness tokens of one robot.
-    pub fn tokens_of(&self, robot: &Name) -> String {
-        format!("{}robot/{robot}/alive/**", self.prefix)
+    /// Keys of all liveliness tokens of one robot.
+    pub fn tokens_of(&self, robot: &Name) -> Vec<String> {
+        (0..ALIVE_SLOTS).map(|slot| self.build(&Key::Alive(robot.clone(), slot))).collect()
     }
 
     /// Key expression of all answers for one robot.
     pub fn answers_of(&self, robot: &Name) -> String {
-        format!("{}robot/{robot}/answer/*", self.prefix)
+        format!("{}robot/{robot}/answer", self.prefix)
     }
 
-    /// Parses a full key. Total: any text gives a key or an error.
+    /// Parses a full key, as [`Self::build`] gives it. Total: any text gives a key or an error.
     pub fn parse(&self, text: &str) -> Result<Key, KeyError> {
         let rest = text.strip_prefix(&self.prefix).ok_or_else(|| KeyError::Prefix(self.prefix.clone()))?;
         let named = |chunk: &'static str, text: &str| {
@@ -315,16 +336,16 @@ impl Keys {
             [Some("robot"), Some(r), Some("odometry"), None, _] => Ok(Key::Odometry(robot(r)?)),
             [Some("robot"), Some(r), Some("scan"), None, _] => Ok(Key::Scan(robot(r)?)),
             [Some("robot"), Some(r), Some("pose"), None, _] => Ok(Key::Pose(robot(r)?)),
-            [Some("robot"), Some(r), Some("alive"), None, _] => Ok(Key::Alive(robot(r)?, None)),
-            [Some("robot"), Some(r), Some("alive"), Some(e), None] => {
-                Ok(Key::Alive(robot(r)?, Some(epoch(e)?)))
+            [Some("robot"), Some(r), Some("alive"), Some(slot), None] => {
+                let slot = u8::try_from(number(slot)?).ok().filter(|slot| *slot < ALIVE_SLOTS);
+                Ok(Key::Alive(robot(r)?, slot.ok_or(KeyError::Shape)?))
             }
             [Some("map"), Some(m), Some("changed"), None, _] => Ok(Key::MapChanged(named("map", m)?)),
             [Some("map"), Some(m), Some("version"), None, _] => Ok(Key::MapVersion(named("map", m)?)),
             [Some("server"), Some(s), Some(kind), Some(of), None] => {
                 let server = named("server", s)?;
                 let token = match kind {
-                    "alive" => ServerToken::Alive(epoch(of)?),
+                    "alive" => ServerToken::Alive(number(of)?),
                     "holds" => ServerToken::Holds(named("map", of)?),
                     "serves" => ServerToken::Serves(named("map", of)?),
                     "robot" => ServerToken::Robot(robot(of)?),
@@ -337,10 +358,15 @@ impl Keys {
     }
 }
 
-/// An epoch as [`Keys::build`] writes it: no sign, no leading zero.
-fn epoch(text: &str) -> Result<u64, KeyError> {
-    let epoch: u64 = text.parse().map_err(|_not_a_number| KeyError::Shape)?;
-    if epoch.to_string() == text { Ok(epoch) } else { Err(KeyError::Shape) }
+/// The slot of an epoch among a robot's liveliness tokens.
+pub fn alive_slot(epoch: u64) -> u8 {
+    (epoch % u64::from(ALIVE_SLOTS)) as u8
+}
+
+/// A number as [`Keys::build`] writes it: no sign, no leading zero.
+fn number(text: &str) -> Result<u64, KeyError> {
+    let number: u64 = text.parse().map_err(|_not_a_number| KeyError::Shape)?;
+    if number.to_string() == text { Ok(number) } else { Err(KeyError::Shape) }
 }
 
 #[cfg(test)]

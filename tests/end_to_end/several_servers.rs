@@ -35,7 +35,9 @@ impl Heard {
         let keys = Keys::new(&Name::new("default").expect("a name"));
         let (to, all) = (answers.clone(), keys.all_answers());
         let hear = move |sample: zenoh::sample::Sample| {
-            let Ok(Key::Answer(robot, _)) = keys.parse(sample.key_expr().as_str()) else { return };
+            let attached = sample.attachment().map(|attached| attached.to_bytes());
+            let received = keys.received(sample.key_expr().as_str(), attached.as_deref());
+            let Ok(Key::Answer(robot, _)) = received else { return };
             let answer = v1::Answer::decode(&*sample.payload().to_bytes()).expect("an answer");
             let code = answer.rejection.map(|rejection| rejection.code).unwrap_or_default();
             let mut answers = to.lock().expect("unharmed");

@@ -2,7 +2,7 @@
 //! and shown by the API; the first is not affected. When the first ends, the next is admitted: at once after an
 //! orderly end, within the stated time after a kill.
 
-use client::{Capture, RobotClient, api::NewMap, v1};
+use client::{Capture, Delivery, RobotClient, RobotOptions, api::NewMap, v1};
 use engine::epochs::MESSAGE_LIVE;
 use server::config::Limits;
 use std::time::{Duration, Instant};
@@ -15,6 +15,13 @@ async fn ask(robot: &RobotClient) -> v1::Answer {
 
 fn code(answer: &v1::Answer) -> &str {
     answer.rejection.as_ref().map_or("", |r| r.code.as_str())
+}
+
+/// Of epochs that share a slot among the tokens, the later one would wait for silence instead.
+async fn connect_as(endpoint: &str, epoch: u64) -> RobotClient {
+    let options = RobotOptions::new(endpoint, "default", "r1");
+    let options = RobotOptions { delivery: Delivery::Every, epoch: Some(epoch), ..options };
+    RobotClient::connect(&options).await.expect("connected")
 }
 
 async fn started() -> Inside {
@@ -30,11 +37,11 @@ async fn a_second_program_is_refused_until_the_first_ends() {
     let inside = started().await;
     let maps = inside.maps();
     let endpoint = &inside.server.zenoh_endpoint;
-    let first = connect(endpoint, "r1").await;
+    let first = connect_as(endpoint, 1).await;
     assert_eq!(ask(&first).await.status(), v1::Status::NoMatch);
     assert_eq!(maps.robot("r1").await.expect("the robot").conflict, None);
 
-    let second = connect(endpoint, "r1").await;
+    let second = connect_as(endpoint, 2).await;
     for _ in 0..3 {
         let answer = ask(&second).await;
         assert_eq!((answer.status(), code(&answer)), (v1::Status::Rejected, "epoch_conflict"), "{answer:?}");

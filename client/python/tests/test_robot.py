@@ -234,7 +234,9 @@ def test_a_robot_is_alive_while_it_is_connected(server: Server) -> None:
             return maps.robot("here").alive
 
         with connect(server, "here") as robot:
-            assert eventually(is_alive) and maps.robot("here").epoch == robot.epoch
+            assert eventually(is_alive) and maps.robot("here").epoch is None
+            robot.publish_odometry(Pose2(0.0, 0.0, 0.0))
+            assert eventually(lambda: maps.robot("here").epoch == robot.epoch)
         assert eventually(lambda: not is_alive())
 
 

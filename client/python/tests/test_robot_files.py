@@ -79,6 +79,15 @@ def test_an_enrolled_robot_is_answered(enrolled: Path, encrypted: Server, monkey
         assert robot.recognise("front", picture(), wait_s=SOON_S).map == "hall"
 
 
+def test_an_enrolled_robot_hears_of_maps_by_their_names(enrolled: Path, encrypted: Server) -> None:
+    with encrypted.maps() as maps, Robot.from_file(enrolled) as robot:
+        with robot.map_changes("hall") as changes:
+            first = changes.get(SOON_S)
+            assert first is not None and first.version == maps.map("hall").version == robot.map_version("hall")
+        with pytest.raises(InvalidInput, match="a map is named"):
+            robot.map_changes("*")
+
+
 def test_an_enrolled_robot_is_answered_in_a_program_of_asyncio(enrolled: Path) -> None:
     async def run() -> str:
         async with await AsyncRobot.from_file(enrolled) as robot:

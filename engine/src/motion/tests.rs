@@ -330,8 +330,8 @@ fn an_epoch_that_is_over_changes_nothing() {
     let (motion, r1) = motion();
     motion.epochs().admit(&r1, 1, time(1.0)).unwrap();
     motion.apply_fix(&r1, at(1_000_000_000, 3.0), &fix(10.0)).unwrap();
-    motion.epochs().token(&r1, (Some(1), true), time(1.1), |_| true);
-    motion.epochs().token(&r1, (Some(1), false), time(1.2), |_| true);
+    motion.epochs().token(&r1, (1, true), time(1.1), |_| true);
+    motion.epochs().token(&r1, (1, false), time(1.2), |_| true);
     motion.epochs().admit(&r1, 2, time(1.3)).unwrap();
     let anew = FrameStamp { epoch: 2, ..at(2_000_000_000, 0.0) };
     motion.apply_fix(&r1, anew, &fix(20.0)).unwrap();

@@ -11,7 +11,7 @@ use engine::{
     slots::{FrameOutcome, SlotKey, Slots},
     snapshot::{MapSnapshot, Snapshots},
 };
-use protos::{Code, Name, v1};
+use protos::{Code, Name, keys::alive_slot, v1};
 use std::{
     collections::{BTreeMap, BTreeSet},
     sync::{Arc, LazyLock},
@@ -205,7 +205,7 @@ impl World {
 
     fn token(&mut self, robot: &Name, epoch: u64, appeared: bool) {
         self.tell(|| format!("token of {robot} {epoch:x} {}", if appeared { "appears" } else { "goes" }));
-        self.intake.motion.epochs().token(robot, (Some(epoch), appeared), self.now, |_| true);
+        self.intake.motion.epochs().token(robot, (alive_slot(epoch), appeared), self.now, |_| true);
         let (now, lives) = (self.now, self.lives.get_mut(robot).expect("a robot of this world"));
         if appeared {
             lives.tokens.insert(epoch);

@@ -25,15 +25,30 @@ fn names_at_the_bound() {
 fn a_key_reads_as_written_down() {
     let key = Key::Frame(Name::new("r1").unwrap(), Name::new("front").unwrap());
     assert_eq!(keys().build(&key), "waymark/1/site-1/robot/r1/frame/front");
-    assert_eq!(keys().all_frames(), "waymark/1/site-1/robot/*/frame/*");
+    assert_eq!(keys().all_frames(), "waymark/1/site-1/robot/*/frame");
 }
 
 #[test]
-fn epochs_are_plain_numbers() {
-    let parsed = |epoch: &str| keys().parse(&format!("waymark/1/site-1/robot/r1/alive/{epoch}"));
+fn on_the_wire_the_camera_is_attached() {
+    let key = Key::Quads(Name::new("r1").unwrap(), Name::new("front").unwrap());
+    let wire = "waymark/1/site-1/robot/r1/quads";
+    assert_eq!(keys().on_wire(&key), (wire.to_owned(), Some("front")));
+    assert_eq!(keys().received(wire, Some(b"front")), Ok(key));
+    let long = [b'a'; MAX_NAME_BYTES + 1];
+    for attached in [None, Some(&b""[..]), Some(b"a/b"), Some(b"\xff"), Some(&long)] {
+        assert!(keys().received(wire, attached).is_err(), "{attached:?}");
+    }
+    // The full key is none of the wire, and nothing else takes an attachment.
+    assert_eq!(keys().received("waymark/1/site-1/robot/r1", Some(b"scan")), Err(KeyError::Shape));
+    assert!(keys().received("waymark/1/site-1/robot/r1/scan", Some(b"front")).is_ok());
+}
+
+#[test]
+fn slots_of_tokens_are_plain_numbers() {
+    let parsed = |slot: &str| keys().parse(&format!("waymark/1/site-1/robot/r1/alive/{slot}"));
     let r1 = Name::new("r1").unwrap();
-    assert_eq!(parsed("18446744073709551615"), Ok(Key::Alive(r1, Some(u64::MAX))));
-    for text in ["", "x", "-1", "+1", "01", "18446744073709551616", "1/2"] {
+    assert_eq!(parsed("15"), Ok(Key::Alive(r1, alive_slot(u64::MAX))));
+    for text in ["", "x", "-1", "+1", "01", "16", "18446744073709551616", "1/2"] {
         assert_eq!(parsed(text), Err(KeyError::Shape), "{text}");
     }
 }
@@ -57,7 +72,7 @@ fn foreign_and_crooked_keys_are_refused() {
 
 proptest! {
     #[test]
-    fn what_is_built_parses_back(a in names(), b in names(), fleet in names(), epoch: u64) {
+    fn what_is_built_parses_back(a in names(), b in names(), fleet in names(), slot in 0..ALIVE_SLOTS, epoch: u64) {
         let keys = Keys::new(&fleet);
         for key in [
             Key::Frame(a.clone(), b.clone()),
@@ -66,8 +81,7 @@ proptest! {
             Key::Odometry(a.clone()),
             Key::Scan(a.clone()),
             Key::Pose(a.clone()),
-            Key::Alive(a.clone(), None),
-            Key::Alive(a.clone(), Some(epoch)),
+            Key::Alive(a.clone(), slot),
             Key::MapChanged(a.clone()),
             Key::MapVersion(a.clone()),
             Key::Gaze(a.clone()),

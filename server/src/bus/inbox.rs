@@ -53,8 +53,8 @@ pub(super) async fn subscribe(
     let alive = {
         let (keys, to) = (keys.clone(), to.clone());
         move |sample: Sample| {
-            if let Ok(Key::Alive(robot, epoch)) = keys.parse(sample.key_expr().as_str()) {
-                announce_presence(&to, &robot, (epoch, sample.kind() == SampleKind::Put));
+            if let Ok(Key::Alive(robot, slot)) = keys.parse(sample.key_expr().as_str()) {
+                announce_presence(&to, &robot, (slot, sample.kind() == SampleKind::Put));
             }
         }
     };
@@ -83,8 +83,8 @@ fn is_taken(to: &Receivers, robot: &Name, map: impl FnOnce() -> String) -> bool 
     to.admits(robot) && to.duty(robot, map) == Duty::Take
 }
 
-/// A liveliness token of a robot's epoch appeared or went.
-pub(crate) fn announce_presence(to: &Receivers, robot: &Name, token: (Option<u64>, bool)) {
+/// A liveliness token of a robot, in this slot, appeared or went.
+pub(crate) fn announce_presence(to: &Receivers, robot: &Name, token: (u8, bool)) {
     let map_of = |robot: &Name| to.intake.snapshots.robot_map(robot.as_str());
     let is_registered = |robot: &Name| map_of(robot).is_some();
     let came = to.motion.epochs().token(robot, token, Instant::now(), is_registered);
@@ -100,11 +100,12 @@ pub(crate) fn announce_presence(to: &Receivers, robot: &Name, token: (Option<u64
 
 fn frame(keys: &Keys, to: &Receivers, outbox: &Outbox, sample: &Sample) {
     let key = sample.key_expr().as_str();
-    let (kind, robot, camera) = match keys.parse(key) {
+    let attached = sample.attachment().map(|attached| attached.to_bytes());
+    let (kind, robot, camera) = match keys.received(key, attached.as_deref()) {
         Ok(Key::Frame(robot, camera)) => (FrameKind::Image, robot, camera),
         Ok(Key::Quads(robot, camera)) => (FrameKind::Quads, robot, camera),
         _ => {
-            // The key names no camera, so there is nobody to answer.
+            // No camera is named, so there is nobody to answer.
             tracing::debug!(key, "frame_key_invalid");
             return to.intake.slots.refuse(protos::Code::BadName);
         }

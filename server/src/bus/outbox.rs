@@ -31,6 +31,7 @@ const QUEUE: usize = 1024;
 
 struct OutgoingMessage {
     key: String,
+    camera: Option<String>,
     bytes: Vec<u8>,
     priority: Priority,
 }
@@ -130,7 +131,8 @@ impl Outbox {
     fn send_bytes(&self, key: &Key, bytes: Vec<u8>) {
         let priority =
             if matches!(key, Key::MapChanged(_)) { Priority::Data } else { Priority::InteractiveHigh };
-        let message = OutgoingMessage { key: self.keys.build(key), bytes, priority };
+        let (key, camera) = self.keys.on_wire(key);
+        let message = OutgoingMessage { key, camera: camera.map(str::to_owned), bytes, priority };
         let queue = self.queue.lock().unwrap_or_else(PoisonError::into_inner);
         // Counted first: the thread may have sent it before this one goes on.
         self.waiting.fetch_add(1, Ordering::Relaxed);
@@ -179,10 +181,10 @@ fn deliver(
     for queued in messages {
         waiting.fetch_sub(1, Ordering::Relaxed);
         heart.beat();
-        let Queued::Message(OutgoingMessage { key, bytes, priority }) = queued else { continue };
+        let Queued::Message(OutgoingMessage { key, camera, bytes, priority }) = queued else { continue };
         let Some(session) = session.get() else { continue };
         let put = || {
-            let put = session.put(key.as_str(), bytes).express(true);
+            let put = session.put(key.as_str(), bytes).attachment(camera).express(true);
             put.congestion_control(CongestionControl::Drop).priority(priority).wait()
         };
         if let Some(Err(error)) = panics.catch(Edge::Delivery, &key, "the message is lost", put) {

@@ -10,7 +10,7 @@ use super::{
 };
 use crate::bus::{Outbox, Receivers, announce_presence, take_frame};
 use engine::{intake::FrameKind, panics::Edge, slots::SlotKey, vitals::Pulse, workers::Publish};
-use protos::{Name, prost::Message, v1};
+use protos::{Name, keys::alive_slot, prost::Message, v1};
 use ros2::robot::{Lack, Problem, RobotAdapter, RobotMessage, Taken, TopicUse};
 use std::{
     collections::BTreeMap,
@@ -59,7 +59,7 @@ impl RobotThread {
             let what = format!("a message of robot {} over ROS", self.robot);
             panics.catch(Edge::Message, what, "it is dropped", || self.handle(event));
         }
-        announce_presence(&self.to, &self.robot, (Some(self.adapter.epoch()), false));
+        announce_presence(&self.to, &self.robot, (alive_slot(self.adapter.epoch()), false));
         pulse.end();
     }
 
@@ -143,7 +143,7 @@ impl RobotThread {
             if !is_there {
                 self.caches_asked = 0;
             }
-            announce_presence(&self.to, &self.robot, (Some(self.adapter.epoch()), is_there));
+            announce_presence(&self.to, &self.robot, (alive_slot(self.adapter.epoch()), is_there));
         }
     }
 

@@ -44,6 +44,8 @@ _HELLO_EVERY_S = 0.05
 _GREETED_S = (0.5, 2.0)
 # Longest wait for the present versions of maps, in seconds.
 _VERSION_WAIT_S = 10.0
+# Liveliness tokens that a robot may have; an epoch takes the one of its remainder.
+_ALIVE_SLOTS = 16
 _NAME = re.compile(r"[a-z0-9_-]{1,64}")
 _log = logging.getLogger("waymark")
 
@@ -119,6 +121,7 @@ class Link:
     ) -> None:
         self.robot = name("robot", robot)
         self.endpoint = endpoint
+        self._is_enrolled = file is not None
         prefix = f"waymark/1/{name('fleet', fleet)}"
         self._maps = f"{prefix}/map"
         self._own = f"{prefix}/robot/{robot}"
@@ -142,9 +145,9 @@ class Link:
                     self._session.liveliness().declare_subscriber(key, self._on_server, history=True)
                     for key in (f"{servers}/*/alive/*", f"{servers}/*/serves/*", f"{servers}/*/robot/{robot}")
                 ),
-                self._session.declare_subscriber(f"{self._own}/answer/*", self._on_answer),
+                self._session.declare_subscriber(f"{self._own}/answer", self._on_answer),
                 self._session.declare_subscriber(f"{self._own}/pose", self._on_pose),
-                self._session.liveliness().declare_token(f"{self._own}/alive/{self.epoch}"),
+                self._session.liveliness().declare_token(f"{self._own}/alive/{self.epoch % _ALIVE_SLOTS}"),
             ]
         except zenoh.ZError as error:
             self._session.close()
@@ -199,10 +202,14 @@ class Link:
     def _on_answer(self, sample: zenoh.Sample) -> None:
         if not self.answers:
             return
+        camera = sample.attachment.to_bytes().decode(errors="replace") if sample.attachment is not None else ""
+        if not _NAME.fullmatch(camera):
+            _log.warning("%s: no camera is attached", sample.key_expr)
+            return
         answer = _decoded(Answer, pb.Answer(), sample)
         # Refusals are of whoever says them.
         if answer is not None and (answer.status == "rejected" or self.servers.takes(answer.map, answer.server)):
-            self.answers.call(CameraAnswer(str(sample.key_expr).rsplit("/", 1)[1], answer))
+            self.answers.call(CameraAnswer(camera, answer))
 
     def _on_pose(self, sample: zenoh.Sample) -> None:
         if not self.poses:
@@ -213,7 +220,10 @@ class Link:
             self.poses.call(pose)
 
     def on_map_changed(self, map: str, listener: Listener[MapChanged]) -> Subscription:
-        """Calls `listener` with the present version of a map, and with every new one; `*` stands for all maps."""
+        """Calls `listener` with the present version of a map, and with every new one; `*` stands for all maps, without
+        a certificate: one gives access to maps by name."""
+        if map == "*" and self._is_enrolled:
+            raise InvalidInput("with a certificate a map is named: `*` hears nothing", code="bad_name", field="map")
         # A change that comes before the present version is newer.
         heard: set[str] = set()
         one_by_one = threading.Lock()
@@ -248,7 +258,7 @@ class Link:
     def publish_frame(self, camera: str, frame: Capture | Quads | Picture, seq: int) -> None:
         """Sends a frame, or the quads of one."""
         kind, message = frame_message(frame, self.epoch, seq, self.servers.map)
-        self._put(f"{self._own}/{kind}/{name('camera', camera)}", message, zenoh.Priority.DATA_LOW)
+        self._put(f"{self._own}/{kind}", message, zenoh.Priority.DATA_LOW, name("camera", camera))
 
     def publish_odometry(self, odom_from_robot: Pose2, captured_ns: int | None) -> int:
         """Sends odometry, read now or at `captured_ns`."""
@@ -268,9 +278,10 @@ class Link:
         self._put(f"{self._own}/scan", message.SerializeToString(), zenoh.Priority.DATA)
         return seq
 
-    def _put(self, key: str, payload: bytes, priority: zenoh.Priority) -> None:
+    def _put(self, key: str, payload: bytes, priority: zenoh.Priority, attachment: str | None = None) -> None:
+        congestion = self._congestion
         try:
-            self._session.put(key, payload, congestion_control=self._congestion, priority=priority)
+            self._session.put(key, payload, congestion_control=congestion, priority=priority, attachment=attachment)
         except zenoh.ZError as error:
             raise Unreachable(f"zenoh could not send to {self.endpoint}: {error}") from error
 

@@ -188,7 +188,7 @@ class AsyncRobot:
         return self._link.poses.add(call)
 
     def map_changes(self, map: str) -> AsyncInbox[MapChanged]:
-        """The present version of a map, then every new one; `*` stands for all maps."""
+        """The present version of a map, then every new one; `*` stands for all maps, without a certificate."""
         inbox: AsyncInbox[MapChanged] = AsyncInbox()
         self._inboxes.add(inbox)
         return inbox._attach(self._link.on_map_changed(map, inbox._push))

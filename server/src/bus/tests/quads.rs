@@ -73,10 +73,11 @@ async fn quads_have_the_numbers_and_refusals_of_their_cameras_frames() {
     .await
     .unwrap();
     let name = |text: &str| protos::Name::new(text).unwrap();
-    let key = Keys::new(&name("test")).build(&Key::Quads(name("r1"), name("front")));
+    let key = Key::Quads(name("r1"), name("front"));
+    let (key, camera) = Keys::new(&name("test")).on_wire(&key);
     let mut answers = robot.answers();
     let mut refused = async |message: Vec<u8>| {
-        raw.put(&key, message).await.unwrap();
+        raw.put(&key, message).attachment(camera).await.unwrap();
         let answer = tokio::time::timeout(WAIT, answers.recv()).await.unwrap().unwrap().answer;
         assert_eq!(answer.status(), v1::Status::Rejected, "{answer:?}");
         let refusal = answer.rejection.unwrap();

@@ -1,0 +1,138 @@
+//! Claim: a robot with a certificate may put, delete, ask, reply and declare keys of more than 65 535 bytes, which zenoh cannot
+//! send: no thread panics, the server stays ready, and another robot loses no message. By what access control does not check
+//! (SECURITY.md), and where there is none, the program ends in order, with the cause. A process of its own: what is looked for ends the process.
+
+mod raw;
+
+use client::{Capture, RobotClient, RobotOptions, RobotTls, api::NewMap, v1};
+use raw::{Kind, RawRobot};
+use server::config::{RawConfig, RawTls};
+use std::{
+    io::Read,
+    panic,
+    process::Stdio,
+    sync::atomic::{AtomicU64, Ordering},
+    thread,
+    time::{Duration, Instant},
+};
+use tempfile::TempDir;
+use tests::{Child, Inside, SOON, command::waymark, http, pictures};
+
+/// At the bound of one part of a key on the wire, beyond it, and beyond two.
+const LENGTHS: [usize; 3] = [65_535, 65_536, 200_000];
+
+/// Time after which what was sent has arrived.
+const ARRIVED: Duration = Duration::from_millis(500);
+
+static PANICS: AtomicU64 = AtomicU64::new(0);
+
+fn count_panics() {
+    let before = panic::take_hook();
+    panic::set_hook(Box::new(move |what| {
+        PANICS.fetch_add(1, Ordering::Relaxed);
+        before(what);
+    }));
+}
+
+/// Keys of a length: below what the robot `r1` writes and hears, of a map, of a server, of another robot, of none.
+fn keys(length: usize) -> Vec<String> {
+    let shapes = [
+        ("robot/r1/frame/", ""),
+        ("robot/r1/answer/", ""),
+        ("robot/r1/alive/", ""),
+        ("robot/r1/rpc/", ""),
+        ("robot/", "/frame"),
+        ("robot/", "/rpc/hello"),
+        ("map/", "/version"),
+        ("map/", "/changed"),
+        ("server/a/serves/", ""),
+        ("server/", "/alive/*"),
+    ];
+    let long = |(before, after): (&str, &str)| {
+        let before = format!("waymark/1/default/{before}");
+        let middle = "a".repeat(length - before.len() - after.len());
+        format!("{before}{middle}{after}")
+    };
+    shapes.map(long).to_vec()
+}
+
+/// A frame of the robot is answered, and the server is ready.
+async fn is_served(robot: &RobotClient, inside: &Inside) {
+    let capture = Capture::encoded(pictures::picture(5)).expect("a picture").with_deadline_ms(60_000);
+    let answer = robot.recognise("front", capture, SOON).await.expect("an answer");
+    assert_eq!(answer.status(), v1::Status::NoMatch);
+    let ready = http(&inside.url()).await.get(format!("{}/readyz", inside.url())).send().await;
+    assert_eq!(ready.expect("an answer").status().as_u16(), 200);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn long_keys_of_a_robot_disturb_no_other() {
+    count_panics();
+    let tls = RawTls { enabled: true, ..RawTls::default() };
+    let inside = Inside::start_with(RawConfig { tls, ..RawConfig::default() }).await;
+    let folders = TempDir::new().expect("a folder");
+    inside.maps().create_map(&NewMap::new("hall")).await.expect("a map");
+    let options = async |robot: &str| {
+        inside.maps().put_robot(robot, "hall").await.expect("a robot");
+        let out = folders.path().join(robot);
+        let run = waymark(
+            ["robot", "enrol", robot, "--out", out.to_str().expect("a path"), "--server", &inside.url()],
+            SOON,
+        );
+        assert_eq!(run.status, 0, "{run:?}");
+        let options = RobotOptions::from_file(out.join("robot.json")).expect("the robot's file");
+        RobotOptions { timeout: SOON, ..options }
+    };
+    let (hostile, other) = (options("r1").await, options("r2").await);
+    let other = RobotClient::connect(&other).await.expect("connected");
+    is_served(&other, &inside).await;
+    for kind in Kind::BOUNDED {
+        let (endpoint, tls) = (hostile.endpoint.clone(), hostile.tls.clone());
+        let said = tokio::task::spawn_blocking(move || said(&endpoint, tls.as_ref(), kind));
+        said.await.expect("said");
+        is_served(&other, &inside).await;
+        assert_eq!(PANICS.load(Ordering::Relaxed), 0, "panics after {kind:?}");
+    }
+    inside.server.stop().await;
+}
+
+/// Says one kind of thing about keys of all lengths, each in a session of its own, as the server may close it. They stay open
+/// until everything has arrived.
+fn said(endpoint: &str, tls: Option<&RobotTls>, kind: Kind) {
+    let keys = LENGTHS.iter().flat_map(|length| keys(*length));
+    let mut sessions = Vec::new();
+    for (id, key) in keys.enumerate() {
+        // Zeros at the end of an id are left out of it.
+        let mut robot = RawRobot::connect(id as u128 | 1 << 127, endpoint, tls);
+        robot.say(kind, &key);
+        sessions.push(robot);
+    }
+    thread::sleep(ARRIVED);
+}
+
+/// The plain endpoint has no access control.
+#[test]
+fn a_panic_inside_zenoh_ends_the_program_with_its_cause() {
+    let data = TempDir::new().expect("a folder");
+    let mut server = Child::start_from(Child::command(data.path(), &[]).stderr(Stdio::piped()));
+    let mut log = server.stderr();
+    let key = format!("waymark/1/default/robot/{}/rpc/hello", "a".repeat(70_000));
+    let mut hostile = RawRobot::connect(1 << 127, &server.zenoh, None);
+    hostile.say(Kind::AggregateInterest, &key);
+    hostile.say(Kind::Queryable, &key);
+    hostile.say(Kind::Put, &key);
+    let mut other = RawRobot::connect(1 << 127 | 1, &server.zenoh, None);
+    other.say(Kind::Query, "waymark/1/default/robot/*/rpc/hello");
+    let until = Instant::now() + SOON;
+    let status = loop {
+        if let Some(status) = server.ended() {
+            break status;
+        }
+        assert!(Instant::now() < until, "it goes on: this version of zenoh sends such keys");
+        thread::sleep(Duration::from_millis(20));
+    };
+    let mut said = String::new();
+    log.read_to_string(&mut said).expect("a log");
+    assert_eq!(status.code(), Some(1), "{said}");
+    assert!(said.contains("zenoh_panicked"), "{said}");
+}
