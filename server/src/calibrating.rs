@@ -1,5 +1,5 @@
-//! Camera calibration from views of one landmark, for the command line and HTTP. In: corners (px) and constraints. Out: a
-//! report. `vision::camera_calibration::calibrate` computes.
+//! Camera calibration from views of one landmark, for the command line and HTTP. In: corners (px) or pictures, and
+//! constraints. Out: a report. `vision::camera_calibration` computes.
 
 use protos::{
     api::{CalibrationConstraintsBody, CalibrationReport, CalibrationViewReport},
@@ -8,10 +8,11 @@ use protos::{
 use vision::{
     camera_calibration::{
         CalibrateError, CalibrateParams, CameraCalibration, CameraHeight, PlanarView, RobustCalibration,
-        calibrate_choosing,
+        calibrate_choosing, calibrate_pictures,
     },
     detect::BORDER_SIGMA_PX,
-    frame::{Intrinsics, IntrinsicsSigmas},
+    frame::{GrayImage, Intrinsics, IntrinsicsSigmas},
+    pose::LandmarkSize,
 };
 
 /// Standard deviation of a corner per coordinate, where nobody says.
@@ -22,6 +23,8 @@ const CENTRE_SIGMA: f64 = 0.1;
 const DOUBTFUL_CHI2: f64 = 10.0;
 /// and with its principal point so far from the image's centre, as a share of the width.
 const DOUBTFUL_CENTRE: f64 = 0.15;
+/// A focal length is doubtful from this standard deviation, as a share of it.
+const DOUBTFUL_SIGMA: f64 = 0.03;
 /// How well the roll of a camera that does not roll is 0, radians.
 const ROLL_SIGMA_RAD: f64 = 0.0175;
 /// How well a given height is known, metres.
@@ -70,6 +73,13 @@ fn warnings(c: &CameraCalibration, image_px: [usize; 2]) -> Vec<String> {
     if chi2 > DOUBTFUL_CHI2 {
         all.push(format!("corners fit {:.1} times worse than they claim", chi2.sqrt()));
     }
+    let share = c.fx_sigma_px().map_or(f64::INFINITY, |sigma| sigma / c.camera.fx_px);
+    if share > DOUBTFUL_SIGMA {
+        all.push(format!(
+            "the focal length is known to {:.0} % only: views from more sides help",
+            100.0 * share
+        ));
+    }
     let off = [c.camera.cx_px, c.camera.cy_px]
         .iter()
         .zip(image_px)
@@ -91,8 +101,40 @@ pub fn calibrated(
     for covariance in views.iter_mut().flat_map(|v| &mut v.covariance_px2) {
         *covariance += nalgebra::Matrix2::identity() * BORDER_SIGMA_PX.powi(2);
     }
-    let RobustCalibration { calibration: c, used } =
+    let RobustCalibration { calibration, used } =
         calibrate_choosing(&views, image_px, &constraints.params())?;
+    Ok(report(&calibration, &used, views.len(), image_px))
+}
+
+/// A camera from pictures.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CalibratedPictures {
+    /// As from corners.
+    pub report: CalibrationReport,
+    /// For each picture: windows of the object's texture that it shows; `None` where it was not used.
+    pub points: Vec<Option<usize>>,
+    /// Lines along the object's sides that agree on two directions at right angles, and all that were found.
+    pub lines: [usize; 2],
+}
+
+/// Calibrates a camera from pictures of one flat, textured object of about `size`. Slow: not for an async thread.
+pub fn calibrated_from_pictures(
+    pictures: &[GrayImage],
+    size: LandmarkSize,
+    constraints: &CalibrationConstraints,
+) -> Result<CalibratedPictures, CalibrateError> {
+    let found = calibrate_pictures(pictures, size, &constraints.params())?;
+    let image_px = pictures.first().map_or([0, 0], |p| [p.width(), p.height()]);
+    let points_of = |i: usize| found.used.iter().position(|u| *u == i).map(|k| found.points[k]);
+    Ok(CalibratedPictures {
+        report: report(&found.calibration, &found.used, pictures.len(), image_px),
+        points: (0..pictures.len()).map(points_of).collect(),
+        lines: found.lines,
+    })
+}
+
+/// The report on `count` views, of which `used` determine the camera.
+fn report(c: &CameraCalibration, used: &[usize], count: usize, image_px: [usize; 2]) -> CalibrationReport {
     let sigma = |i: usize| c.covariance.map_or(f64::INFINITY, |m| m[(i, i)].sqrt());
     let view = |i: usize| {
         let fit = used.iter().position(|u| *u == i).and_then(|k| c.views.get(k));
@@ -102,7 +144,7 @@ pub fn calibrated(
             distance_m: fit.map(|f| f.camera_from_plane.translation.vector.norm()),
         }
     };
-    Ok(CalibrationReport {
+    CalibrationReport {
         intrinsics: intrinsics_wire(&with_sigmas(&c.camera, [sigma(0), sigma(1), sigma(2)])),
         fx_sigma_px: sigma(0),
         cx_sigma_px: sigma(1),
@@ -112,9 +154,9 @@ pub fn calibrated(
         reduced_chi2: c.chi2 / c.dof.max(1) as f64,
         orientations: c.orientations,
         aspect_ratio: c.aspect_ratio,
-        warnings: warnings(&c, image_px),
-        views: (0..views.len()).map(view).collect(),
-    })
+        warnings: warnings(c, image_px),
+        views: (0..count).map(view).collect(),
+    }
 }
 
 /// The camera with its standard deviations (the larger one of the centre's), at most those that frames may carry; without

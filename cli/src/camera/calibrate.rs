@@ -2,26 +2,28 @@
 
 use crate::{detect, pictures, screen};
 use anyhow::Context as _;
-use engine::dominant::dominant;
 use protos::api::CalibrationReport;
 use serde::Deserialize;
-use server::calibrating::{CORNER_SIGMA_PX, CalibrationConstraints, calibrated};
+use server::calibrating::{
+    CORNER_SIGMA_PX, CalibratedPictures, CalibrationConstraints, calibrated, calibrated_from_pictures,
+};
 use std::path::{Path, PathBuf};
 use vision::{
-    camera_calibration::PlanarView,
-    detect::{DetectParams, Quad, QuadKind, detect},
+    camera_calibration::{MAX_PICTURES, PlanarView},
+    frame::GrayImage,
     geometry::Corners,
     pose::LandmarkSize,
-    trace::NoTrace,
 };
 
 /// `waymark camera calibrate`.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// Pictures by one camera (PNG, JPEG, or folders of them), each of which shows the object as its largest quad.
+    /// Pictures by one camera (PNG, JPEG, or folders of them) of one flat, textured rectangle: 3 to 32, from sides that
+    /// differ by more than 15 degrees.
     #[arg(required_unless_present = "corners")]
     images: Vec<PathBuf>,
-    /// Width and height of the object in metres, such as 0.60x0.84; only their ratio matters for the camera.
+    /// Width and height of the object in metres, such as 0.60x0.84. With corners only their ratio matters for the camera;
+    /// with pictures they only set the distances.
     #[arg(long, value_parser = size)]
     size: LandmarkSize,
     /// Corners instead of pictures: JSON `{"width": px, "height": px, "views": [[[x,y],[x,y],[x,y],[x,y]], ...]}`, each
@@ -44,11 +46,11 @@ struct Constraints {
     /// The camera does not roll (C2).
     #[arg(long)]
     zero_roll: bool,
-    /// The camera is this high over the landmark's centre in all views, metres; negative below (C3).
-    #[arg(long, value_name = "METRES", allow_negative_numbers = true)]
+    /// With corners: the camera is this high over the landmark's centre in all views, metres; negative below (C3).
+    #[arg(long, value_name = "METRES", allow_negative_numbers = true, requires = "corners")]
     height_m: Option<f64>,
-    /// The ratio of the landmark's sides is not what its size says, and is found with the camera.
-    #[arg(long)]
+    /// With corners: the ratio of the landmark's sides is not what its size says, and is found with the camera.
+    #[arg(long, requires = "corners")]
     unknown_aspect: bool,
 }
 
@@ -76,13 +78,32 @@ fn size(text: &str) -> Result<LandmarkSize, String> {
 }
 
 pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
-    let (names, views, image_px) = match &args.corners {
-        Some(file) => views_of_file(file, args.size)?,
-        None => views_of_images(&args.images, args.size)?,
+    let known = args.constraints.given();
+    let (names, report, evidence) = match &args.corners {
+        Some(file) => {
+            let (names, views, image_px) = views_of_file(file, args.size)?;
+            (names, calibrated(&views, image_px, &known)?, vec![])
+        }
+        None => {
+            let (names, images) = read(&args.images)?;
+            let found = calibrated_from_pictures(&images, args.size, &known)?;
+            let evidence = evidence(&found);
+            (names, found.report, evidence)
+        }
     };
-    let report = calibrated(&views, image_px, &args.constraints.given())?;
-    screen::say(&if args.json { serde_json::to_string(&report)? } else { table(&report, &names) });
+    screen::say(&if args.json { serde_json::to_string(&report)? } else { table(&report, &names, &evidence) });
     Ok(())
+}
+
+/// What a camera from pictures rests on.
+fn evidence(found: &CalibratedPictures) -> Vec<String> {
+    let points: Vec<String> =
+        found.points.iter().map(|n| n.map_or_else(|| "none".to_owned(), |n| n.to_string())).collect();
+    let [agreeing, all] = found.lines;
+    vec![format!(
+        "windows of texture by picture: {}; {agreeing} of {all} side lines agree",
+        points.join(", ")
+    )]
 }
 
 type Views = (Vec<String>, Vec<PlanarView>, [usize; 2]);
@@ -100,37 +121,29 @@ fn views_of_file(file: &Path, size: LandmarkSize) -> anyhow::Result<Views> {
     Ok(((0..views.len()).map(|i| format!("view {i}")).collect(), views, [given.width, given.height]))
 }
 
-/// The largest quad of every picture.
-fn views_of_images(images: &[PathBuf], size: LandmarkSize) -> anyhow::Result<Views> {
-    let (mut names, mut views) = (vec![], vec![]);
-    let mut image_px = None;
-    for path in detect::files(images)? {
+fn read(images: &[PathBuf]) -> anyhow::Result<(Vec<String>, Vec<GrayImage>)> {
+    let (mut names, mut read) = (vec![], vec![]);
+    let files = detect::files(images)?;
+    anyhow::ensure!(
+        (2..=MAX_PICTURES).contains(&files.len()),
+        "{} pictures given, 3 to {MAX_PICTURES} are needed",
+        files.len()
+    );
+    for path in files {
         let name = path.display().to_string();
-        let image = pictures::read_picture(&path).with_context(|| name.clone())?;
-        let here = [image.width(), image.height()];
-        anyhow::ensure!(*image_px.get_or_insert(here) == here, "{name}: not as large as the first picture");
-        match largest(&detect(&image, &DetectParams::default(), &mut NoTrace)) {
-            Some(quad) => {
-                views.push(PlanarView::of_quad(&quad.corners_px, &quad.corner_covariance_px2, size));
-                names.push(name);
-            }
-            None => screen::complain(&format!("waymark: {name}: no quad stands out")),
-        }
+        let image = pictures::read(&path).with_context(|| name.clone())?;
+        let first = read.first().unwrap_or(&image);
+        anyhow::ensure!(
+            [image.width(), image.height()] == [first.width(), first.height()],
+            "{name}: not as large as the first picture"
+        );
+        names.push(name);
+        read.push(image);
     }
-    Ok((names, views, image_px.context("no pictures")?))
+    Ok((names, read))
 }
 
-/// The dominant whole quad; without one the largest.
-fn largest(quads: &[Quad]) -> Option<&Quad> {
-    let mut whole: Vec<&Quad> =
-        quads.iter().filter(|q| q.kind == QuadKind::Full && !q.side_clipped.contains(&true)).collect();
-    whole.sort_by(|a, b| b.corners_px.area_px2().total_cmp(&a.corners_px.area_px2()));
-    let corners: Vec<Corners> = whole.iter().map(|q| q.corners_px).collect();
-    let dominant = dominant(&corners).and_then(|c| whole.iter().find(|q| q.corners_px == *c));
-    dominant.or(whole.first()).copied()
-}
-
-fn table(r: &CalibrationReport, names: &[String]) -> String {
+fn table(r: &CalibrationReport, names: &[String], evidence: &[String]) -> String {
     let k = &r.intrinsics;
     let mut lines = vec![
         format!(
@@ -150,6 +163,7 @@ fn table(r: &CalibrationReport, names: &[String]) -> String {
             r.reduced_chi2
         ),
     ];
+    lines.extend(evidence.iter().cloned());
     lines.extend(r.linear_fx_px.map(|fx| format!("linear solution: fx {fx:.2}")));
     lines.extend(r.warnings.iter().map(|warning| format!("caution: {warning}")));
     for (view, name) in r.views.iter().zip(names) {

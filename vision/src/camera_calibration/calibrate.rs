@@ -18,6 +18,8 @@ use crate::{
 };
 use nalgebra::{Isometry3, Matrix3, Point2, SMatrix, Vector3};
 
+/// Focal lengths that are believed, in longer sides of the picture.
+pub const FOCAL_SIDES: [f64; 2] = [0.4, 4.0];
 /// Focal lengths tried where the linear solution fails, in image widths.
 const STARTS: [f64; 5] = [0.4, 0.7, 1.1, 1.8, 3.0];
 
@@ -81,6 +83,39 @@ pub enum CalibrateError {
         worst: usize,
         /// Its root mean square residual.
         worst_px: f64,
+    },
+    /// Pictures show no textured object that they have in common.
+    #[error(
+        "no_common_object: {shown} of {of} pictures show one textured object; take sharp pictures of the whole of \
+         one poster or painting, from at least three sides, or give corners by hand"
+    )]
+    NoCommonObject {
+        /// Pictures that show it.
+        shown: usize,
+        /// Pictures given.
+        of: usize,
+    },
+    /// The lines along an object's sides are not parallel to two directions at right angles.
+    #[error(
+        "border_unclear: {agreeing} of {found} lines along the object's sides agree on two directions at right \
+         angles; take pictures of a rectangle that stands out from the wall, or give corners by hand"
+    )]
+    BorderUnclear {
+        /// Lines that agree.
+        agreeing: usize,
+        /// Lines found.
+        found: usize,
+    },
+    /// The focal length is none of a usual camera: the views are not of one rectangle, or the pictures are cropped.
+    #[error(
+        "focal_out_of_range: fx {fx_px:.0} px is not within {} to {} times the longer side of the picture, {side_px} \
+         px; check that the pictures are not cropped and all show one rectangle", FOCAL_SIDES[0], FOCAL_SIDES[1]
+    )]
+    FocalOutOfRange {
+        /// The focal length found, px.
+        fx_px: f64,
+        /// The longer side of the picture, px.
+        side_px: usize,
     },
     /// The solution is not a possible camera.
     #[error(transparent)]
@@ -178,7 +213,20 @@ pub fn calibrate(
     let undetermined = CalibrateError::Undetermined { sigma_ratio, sigma_share };
     let state = best.ok_or(undetermined.clone())?;
     let made = problem.summary(&state, p.refine).ok_or(undetermined)?;
-    finished(&state, made, linear.map(|l| l.alpha), (orientations, sigma_ratio), p)
+    let found = finished(&state, made, linear.map(|l| l.alpha), (orientations, sigma_ratio), p)?;
+    believable(&found.camera, image_size_px)?;
+    Ok(found)
+}
+
+/// Refuses a focal length outside [`FOCAL_SIDES`].
+pub(crate) fn believable(camera: &Intrinsics, image_size_px: [usize; 2]) -> Result<(), CalibrateError> {
+    let side_px = image_size_px[0].max(image_size_px[1]);
+    let [low, high] = FOCAL_SIDES.map(|sides| sides * side_px as f64);
+    if (low..=high).contains(&camera.fx_px) {
+        Ok(())
+    } else {
+        Err(CalibrateError::FocalOutOfRange { fx_px: camera.fx_px, side_px })
+    }
 }
 
 /// The linear solution.
@@ -218,14 +266,14 @@ fn settled(
 }
 
 /// Eq. (2) for every view; homographies and camera have square pixels.
-fn poses(homographies: &[Matrix3<f64>], camera: &LinearCamera) -> Option<Vec<Isometry3<f64>>> {
+pub(crate) fn poses(homographies: &[Matrix3<f64>], camera: &LinearCamera) -> Option<Vec<Isometry3<f64>>> {
     let k = Matrix3::new(camera.alpha, 0.0, camera.u0, 0.0, camera.alpha, camera.v0, 0.0, 0.0, 1.0);
     let inverse = k.try_inverse()?;
     homographies.iter().map(|h| crate::pose::linear::pose_of_columns(&(inverse * h))).collect()
 }
 
 /// Number of plane normals that differ by more than `step_rad` from all counted before, in order.
-fn orientations(poses: &[Isometry3<f64>], step_rad: f64) -> usize {
+pub(crate) fn orientations(poses: &[Isometry3<f64>], step_rad: f64) -> usize {
     let mut counted: Vec<Vector3<f64>> = Vec::new();
     for pose in poses {
         let normal = pose.rotation * Vector3::x();

@@ -1,6 +1,8 @@
 //! `waymark-lab evaluate calibration`: auto-calibration from views of one quad (method 16; E9, Fig. 17). Error of
-//! the focal length over the number of views, on synthetic views and on real boards with a reference calibration.
+//! the focal length over the number of views, on synthetic views and on real boards with a reference calibration; and
+//! what `waymark camera calibrate` answers to rendered pictures of canvases with shadows and framed pictures.
 
+mod photoreal;
 mod real;
 mod sets;
 mod synthetic;
@@ -25,6 +27,12 @@ pub(crate) struct Args {
     /// Folders with real views of a board: Zhang's Model.txt and data*.txt, OpenCV's yml with corners, or
     /// photographs of a chessboard beside a yml that says its size (then python3 with OpenCV finds the corners).
     sets: Vec<PathBuf>,
+    /// Folder of rendered sets, one a folder: pictures and truth.json. Nothing else is measured then.
+    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["sets", "plot"])]
+    photoreal: Option<PathBuf>,
+    /// Sets of --photoreal by the numbers of their folders, such as 21-60; all if absent.
+    #[arg(long, value_name = "FROM-TO", requires = "photoreal", value_parser = numbers)]
+    numbers: Option<[u64; 2]>,
     /// Numbers of views of the synthetic curves.
     #[arg(long, value_delimiter = ',', default_value = "5,10,15,20,30,40,50", value_parser = views)]
     views: Vec<usize>,
@@ -53,6 +61,12 @@ fn views(text: &str) -> Result<usize, String> {
     if (3..=MAX_VIEWS).contains(&n) { Ok(n) } else { Err(format!("not within 3 to {MAX_VIEWS}")) }
 }
 
+fn numbers(text: &str) -> Result<[u64; 2], String> {
+    let (from, to) = text.split_once('-').unwrap_or((text, text));
+    let number = |t: &str| t.trim().parse::<u64>().map_err(|error| format!("{error}"));
+    Ok([number(from)?, number(to)?])
+}
+
 fn noise(text: &str) -> Result<f64, String> {
     let px: f64 = text.trim().parse().map_err(|error| format!("{error}"))?;
     if (0.0..=20.0).contains(&px) { Ok(px) } else { Err("not within 0 to 20".to_owned()) }
@@ -68,6 +82,18 @@ struct Report {
 }
 
 pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
+    if let Some(folder) = &args.photoreal {
+        let mut folders = photoreal::folders(folder)?;
+        if let Some([from, to]) = args.numbers {
+            let number = |path: &PathBuf| path.file_name().and_then(|n| n.to_str()?.parse::<u64>().ok());
+            folders.retain(|path| number(path).is_some_and(|n| (from..=to).contains(&n)));
+        }
+        let sets = photoreal::evaluated(&folders)?;
+        return say(args.json, &sets, || {
+            let title = "calibration: pictures of one object, against the true focal length".to_owned();
+            std::iter::once(title).chain(photoreal::lines(&sets)).collect()
+        });
+    }
     let mut curves = vec![];
     for noise_px in &args.corner_noise_px {
         curves.extend(synthetic::curves(&args.views, args.trials as usize, *noise_px, args.seed));

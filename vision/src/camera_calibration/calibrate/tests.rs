@@ -345,3 +345,32 @@ fn agrees_with_opencv() {
     }
     assert!((found.rms_px - 0.183_859).abs() < 1e-5, "{}", found.rms_px);
 }
+
+#[test]
+fn a_focal_length_of_no_usual_camera_is_refused_by_name() {
+    let mut random = Random::new(8);
+    for (fx_px, is_believed) in
+        [(0.5, true), (0.3, false), (3.5, true), (5.0, false)].map(|(f, b)| (f * 1280.0, b))
+    {
+        let camera = Intrinsics::new(fx_px, fx_px, 639.5, 479.5, Distortion::None).unwrap();
+        // As large in the image as at 900 px.
+        let views: Vec<PlanarView> = (0..8)
+            .map(|i| {
+                let (turn, tilt) = (f64::from(i % 3 - 1) * 0.6, f64::from(i / 3 - 1) * 0.4 + 0.05);
+                let front = Matrix3::new(0.0, 1.0, 0.0, 0.0, 0.0, -1.0, -1.0, 0.0, 0.0);
+                let front = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(front));
+                let rotation = UnitQuaternion::from_euler_angles(tilt, turn, 0.0) * front;
+                let at = Vector3::new(0.0, 0.0, fx_px / 400.0);
+                quad(corner_points(&SIZE).map(|p| camera.project(&(rotation * p + at))), 0.0, &mut random)
+            })
+            .collect();
+        match calibrate(&views, IMAGE, &CalibrateParams::default()) {
+            Ok(found) => assert!(is_believed && (found.camera.fx_px / fx_px - 1.0).abs() < 1e-3, "{fx_px}"),
+            Err(error) => {
+                let text = error.to_string();
+                assert!(!is_believed && text.starts_with("focal_out_of_range: fx"), "{fx_px}: {text}");
+                assert!(text.contains("0.4 to 4 times the longer side of the picture, 1280 px"), "{text}");
+            }
+        }
+    }
+}
