@@ -1,5 +1,5 @@
 //! Any text as a key expression: it is parsed to the key that gives the same text, or refused. The fleet is the text's
-//! first line where that is a name.
+//! first line where that is a name. Each key comes back from its form on the wire.
 
 #![no_main]
 
@@ -11,9 +11,14 @@ fuzz_target!(|data: &[u8]| {
     let (fleet, text) = text.split_once('\n').unwrap_or(("default", text));
     let fleet = Name::new(fleet).unwrap_or_else(|_| Name::new("default").expect("a name"));
     let keys = Keys::new(&fleet);
+    keys.received(text, Some(data)).ok();
     for text in [text.to_owned(), format!("waymark/1/{fleet}/{text}")] {
         match keys.parse(&text) {
-            Ok(key) => assert_eq!(keys.build(&key), text),
+            Ok(key) => {
+                assert_eq!(keys.build(&key), text);
+                let (wire, camera) = keys.on_wire(&key);
+                assert_eq!(keys.received(&wire, camera.map(str::as_bytes)), Ok(key.clone()));
+            }
             Err(error) => assert!(!error.to_string().is_empty()),
         }
     }

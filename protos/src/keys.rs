@@ -177,10 +177,11 @@ impl Keys {
 
     /// The key of a message: its key expression, and what is attached. Total, as [`Self::parse`].
     pub fn received(&self, expression: &str, attachment: Option<&[u8]>) -> Result<Key, KeyError> {
-        let kinds = ["/frame", "/quads", "/answer"];
-        if !kinds.iter().any(|kind| expression.ends_with(kind)) {
+        let mut chunks = expression.strip_prefix(&self.prefix).unwrap_or_default().split('/');
+        let shape = [chunks.next(), chunks.next(), chunks.next(), chunks.next()];
+        let [Some("robot"), Some(_), Some("frame" | "quads" | "answer"), None] = shape else {
             return self.parse(expression);
-        }
+        };
         // Longer ones are no names: they are not copied.
         let camera = attachment.filter(|camera| camera.len() <= MAX_NAME_BYTES).unwrap_or_default();
         self.parse(&format!("{expression}/{}", String::from_utf8_lossy(camera)))

@@ -41,6 +41,8 @@ fn on_the_wire_the_camera_is_attached() {
     // The full key is none of the wire, and nothing else takes an attachment.
     assert_eq!(keys().received("waymark/1/site-1/robot/r1", Some(b"scan")), Err(KeyError::Shape));
     assert!(keys().received("waymark/1/site-1/robot/r1/scan", Some(b"front")).is_ok());
+    let of_map = "waymark/1/site-1/server/s1/holds/frame";
+    assert_eq!(keys().received(of_map, None), keys().parse(of_map), "a map of that name");
 }
 
 #[test]
