@@ -69,7 +69,7 @@ impl Tally {
 #[derive(Default)]
 struct Lives {
     current: Option<(u64, Instant)>,
-    tokens: BTreeSet<u64>,
+    tokens: BTreeSet<u8>,
 }
 
 impl Lives {
@@ -77,13 +77,21 @@ impl Lives {
     fn live(&self, now: Instant) -> Option<u64> {
         let (epoch, at) = self.current?;
         let is_recent = now.saturating_duration_since(at) < MESSAGE_LIVE;
-        (is_recent || self.tokens.contains(&epoch)).then_some(epoch)
+        (is_recent || self.tokens.contains(&alive_slot(epoch))).then_some(epoch)
+    }
+
+    /// The same for a message of this epoch: a token of its own slot may be its own.
+    fn live_for(&self, epoch: u64, now: Instant) -> Option<u64> {
+        let (current, at) = self.current?;
+        let is_recent = now.saturating_duration_since(at) < MESSAGE_LIVE;
+        let is_of_other = alive_slot(current) != alive_slot(epoch);
+        self.live(now).filter(|_| is_recent || is_of_other)
     }
 
     /// Another epoch than this one may be live.
     fn is_contested(&self, epoch: u64, now: Instant) -> bool {
         let recent = |at: Instant| now.saturating_duration_since(at) < MESSAGE_LIVE;
-        self.tokens.iter().any(|token| *token != epoch)
+        self.tokens.iter().any(|slot| *slot != alive_slot(epoch))
             || self.current.is_some_and(|(current, at)| current != epoch && recent(at))
     }
 }
@@ -206,15 +214,12 @@ impl World {
     fn token(&mut self, robot: &Name, epoch: u64, appeared: bool) {
         self.tell(|| format!("token of {robot} {epoch:x} {}", if appeared { "appears" } else { "goes" }));
         self.intake.motion.epochs().token(robot, (alive_slot(epoch), appeared), self.now, |_| true);
-        let (now, lives) = (self.now, self.lives.get_mut(robot).expect("a robot of this world"));
+        let lives = self.lives.get_mut(robot).expect("a robot of this world");
         if appeared {
-            lives.tokens.insert(epoch);
-            if lives.live(now).is_none() {
-                lives.current = Some((epoch, now));
-            }
+            lives.tokens.insert(alive_slot(epoch));
         } else {
-            lives.tokens.remove(&epoch);
-            if lives.current.is_some_and(|(current, _)| current == epoch) {
+            lives.tokens.remove(&alive_slot(epoch));
+            if lives.current.is_some_and(|(current, _)| alive_slot(current) == alive_slot(epoch)) {
                 lives.current = None;
             }
         }
@@ -233,7 +238,7 @@ impl World {
             Ok(()) => {
                 assert!(last.is_none_or(|last| id.seq > last), "{id:?} is not newer than {last:?}");
                 assert!(!self.ended.contains(&id), "{id:?} is accepted again after it has ended");
-                let live = lives.live(now);
+                let live = lives.live_for(id.epoch, now);
                 assert!(live.is_none_or(|live| live == id.epoch), "{id:?}: epoch {live:x?} is live");
                 lives.current = Some((id.epoch, now));
                 self.accepted.insert((key.clone(), id.epoch), id.seq);
@@ -256,7 +261,7 @@ impl World {
                 assert!(is(Code::NotNewer) || is(Code::EpochConflict), "{id:?}: {code}");
                 // A robot whose program alone is there, and whose frame is newer, is heard.
                 let is_newer = last.is_none_or(|last| id.seq > last);
-                let is_alone = lives.tokens.contains(&id.epoch) && !contested;
+                let is_alone = lives.tokens.contains(&alive_slot(id.epoch)) && !contested;
                 assert!(!(is_newer && is_alone), "{id:?} of the only program of its robot: {code}");
             }
         }
