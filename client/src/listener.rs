@@ -71,9 +71,7 @@ impl FleetListener {
             let (keys, robots) = (keys.clone(), robots.to_vec());
             let (to, counters) = (to.clone(), counters.clone());
             let receive = move |sample: Sample| {
-                let attached = sample.attachment().map(|attached| attached.to_bytes());
-                let received = keys.received(sample.key_expr().as_str(), attached.as_deref());
-                let Ok(key) = received else { return };
+                let Ok(key) = transport::received(&keys, &sample) else { return };
                 if is_wanted(&key, &robots) {
                     counters.queue(&to, key, &sample);
                 }

@@ -174,9 +174,7 @@ impl RobotClient {
         let to_answers = {
             let (keys, answers, servers) = (keys.clone(), answers.clone(), servers.clone());
             move |sample: Sample| {
-                let attached = sample.attachment().map(|attached| attached.to_bytes());
-                let received = keys.received(sample.key_expr().as_str(), attached.as_deref());
-                let Ok(Key::Answer(_, camera)) = received else { return };
+                let Ok(Key::Answer(_, camera)) = transport::received(&keys, &sample) else { return };
                 let Ok(answer) = v1::Answer::decode(&*sample.payload().to_bytes()) else { return };
                 if !servers.takes_answer(&answer) {
                     return;

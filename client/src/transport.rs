@@ -1,9 +1,11 @@
 //! The zenoh session of a robot: client of one router, no discovery, bounded memory.
 
 use crate::{ClientError, Delivery, RobotOptions, RobotTls};
+use protos::{Key, Keys, keys::KeyError};
 use serde_json::{Value, json};
 use std::time::Duration;
 use tokio::runtime::{Handle, RuntimeFlavor};
+use zenoh::sample::Sample;
 
 /// Largest message taken from the server, in bytes.
 const MAX_MESSAGE_BYTES: usize = 4 << 20;
@@ -26,6 +28,12 @@ pub(crate) async fn open(options: &RobotOptions) -> Result<zenoh::Session, Clien
         }
         opened => opened,
     }
+}
+
+/// What a message is, by its key and its attachment.
+pub(crate) fn received(keys: &Keys, sample: &Sample) -> Result<Key, KeyError> {
+    let attached = sample.attachment().map(zenoh::bytes::ZBytes::to_bytes);
+    keys.received(sample.key_expr().as_str(), attached.as_deref())
 }
 
 /// Opens a session; gives up after `timeout`.

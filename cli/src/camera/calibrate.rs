@@ -79,17 +79,14 @@ fn size(text: &str) -> Result<LandmarkSize, String> {
 
 pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let known = args.constraints.given();
-    let (names, report, evidence) = match &args.corners {
-        Some(file) => {
-            let (names, views, image_px) = views_of_file(file, args.size)?;
-            (names, calibrated(&views, image_px, &known)?, vec![])
-        }
-        None => {
-            let (names, images) = read(&args.images)?;
-            let found = calibrated_from_pictures(&images, args.size, &known)?;
-            let evidence = evidence(&found);
-            (names, found.report, evidence)
-        }
+    let (names, report, evidence) = if let Some(file) = &args.corners {
+        let (names, views, image_px) = views_of_file(file, args.size)?;
+        (names, calibrated(&views, image_px, &known)?, vec![])
+    } else {
+        let (names, images) = read(&args.images)?;
+        let found = calibrated_from_pictures(&images, args.size, &known)?;
+        let evidence = evidence(&found);
+        (names, found.report, evidence)
     };
     screen::say(&if args.json { serde_json::to_string(&report)? } else { table(&report, &names, &evidence) });
     Ok(())

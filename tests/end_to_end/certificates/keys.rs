@@ -11,7 +11,7 @@ use std::{
     sync::{Arc, Mutex},
     time::Duration,
 };
-use tests::{SOON, eventually};
+use tests::eventually;
 use zenoh::{Session, pubsub::Subscriber};
 
 /// Time after which what was sent has arrived, where it may: everything of one session goes one way.

@@ -74,7 +74,7 @@ impl Native {
             let answer = v1::Answer::decode(&*sample.payload().to_bytes()).expect("an answer");
             answers.lock().expect("not poisoned").push((robot(sample.key_expr().as_str()), answer));
         };
-        let declared = session.declare_subscriber("waymark/1/default/robot/*/answer/*").callback(noted);
+        let declared = session.declare_subscriber("waymark/1/default/robot/*/answer").callback(noted);
         declared.background().await.expect("answers");
         let noted = move |sample: zenoh::sample::Sample| {
             let pose = v1::RobotPose::decode(&*sample.payload().to_bytes()).expect("a pose");
@@ -85,8 +85,9 @@ impl Native {
         Self { session, seen, seq: 0 }
     }
 
-    pub(super) async fn put(&self, key: &str, message: Vec<u8>) {
+    pub(super) async fn put(&self, key: &str, camera: Option<&str>, message: Vec<u8>) {
         let put = self.session.put(format!("waymark/1/default/robot/native/{key}"), message);
+        let put = put.attachment(camera);
         // A busy machine may not lose what is compared.
         put.congestion_control(CongestionControl::Block).await.expect("sent");
     }
@@ -96,7 +97,7 @@ impl Native {
         let odom_from_robot = Some(pose2(&readings.step.odom_from_robot));
         let odometry =
             v1::Odometry { epoch: 1, seq: self.seq, captured_ns, odom_from_robot, ..v1::Odometry::default() };
-        self.put("odometry", odometry.encode_to_vec()).await;
+        self.put("odometry", None, odometry.encode_to_vec()).await;
     }
 
     /// A frame of camera `camera`, with the picture in this encoding.
@@ -128,7 +129,7 @@ impl Native {
             odometry: Some(pose2(&readings.step.odom_from_robot)),
             ..v1::Frame::default()
         };
-        self.put(&format!("frame/{camera}"), frame.encode_to_vec()).await;
+        self.put("frame", Some(camera), frame.encode_to_vec()).await;
     }
 }
 

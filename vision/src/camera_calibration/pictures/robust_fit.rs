@@ -152,7 +152,7 @@ fn scale_of(what: &Evidence, [of_lines, of_windows]: [f64; 2]) -> f64 {
     }
 }
 
-/// Trusts of all observations: Geman and McClure's, or all or nothing.
+/// Trusts of all observations: by the curve of Geman and others, or all or nothing.
 fn trust(problem: &mut Adjustment, state: &State, scales: [f64; 2], is_last: bool) {
     let share = |o: &Observation| {
         let e2 = problem.chi2(&o.what, state) / scale_of(&o.what, scales).powi(2);
@@ -164,7 +164,7 @@ fn trust(problem: &mut Adjustment, state: &State, scales: [f64; 2], is_last: boo
     }
 }
 
-/// Geman and McClure's cost.
+/// The cost of Geman and others.
 fn bounded_cost(problem: &Adjustment, state: &State, scales: [f64; 2]) -> f64 {
     let bounded = |o: &Observation| {
         let (e2, s2) = (problem.chi2(&o.what, state), scale_of(&o.what, scales).powi(2));

@@ -113,11 +113,12 @@ pub(crate) fn followed(
         let grey = window.sampled(image, map, shift, samples).filter(|grey| !is_clipped(grey))?;
         // T + dT d = gain I + offset, for d, gain and offset.
         let (mut normal, mut right, mut squares) = (Matrix4::zeros(), Vector4::zeros(), 0.0);
-        for k in 0..grey.len() {
-            let row = Vector4::new(-window.by_x[k], -window.by_y[k], grey[k], 1.0);
+        for ((grey, taught), slope) in grey.iter().zip(&window.grey).zip(window.by_x.iter().zip(&window.by_y))
+        {
+            let row = Vector4::new(-slope.0, -slope.1, *grey, 1.0);
             normal += row * row.transpose();
-            right += row * window.grey[k];
-            squares += window.grey[k] * window.grey[k];
+            right += row * *taught;
+            squares += taught * taught;
         }
         let x = normal.cholesky()?.solve(&right);
         let move_px = Vector2::new(x[0], x[1]);
