@@ -1,5 +1,5 @@
-"""Compares the tree of dependencies with supply-chain.toml: least versions, licences, sources, banned packages, packages
-that are to be patched ones, and exceptions that are reviewed and still needed. Offline: it reads Cargo.lock's packages by `cargo metadata`.
+"""Compares the tree of dependencies with supply-chain.toml: least versions, licences, sources, banned packages, and
+exceptions that are reviewed and still needed. Offline: it reads Cargo.lock's packages by `cargo metadata`.
 
 `python3 .ci/supply_chain.py` checks; `--self-test` plants a fault of each kind and expects it to be found.
 """
@@ -57,11 +57,6 @@ def faults(rules, found, today):
         for package in there or []:
             if version(package["version"]) < version(floor["least"]):
                 out.append(f"{package['name']} {package['version']} is below {floor['least']}: {floor['reason']}")
-    for patched in rules["patched"]:
-        # Cargo only warns where a patch no longer fits the version that is asked for, and takes the published package.
-        for package in by_name.get(patched["package"]) or [{"version": "", "source": "nowhere"}]:
-            if package["source"] is not None:
-                out.append(f"{patched['package']} {package['version']} is not the patched one: {patched['reason']}")
     for exception in rules["exception"]:
         is_there = any(p["version"] == exception["version"] for p in by_name.get(exception["package"], []))
         if not is_there:
@@ -81,10 +76,6 @@ def self_test(rules, found, today):
         "no licence": [*found, ours | {"license": None}],
         "a banned package": [*found, ours | {"name": "openssl-sys"}],
         "an old version": [*found, ours | {"name": "libsqlite3-sys", "version": "0.36.9"}],
-        "a patch that is not used": [
-            p | {"source": rules["sources"][0]} if p["name"] == "zenoh-link-tls" else p for p in found
-        ],
-        "a patched package that is gone": [p for p in found if p["name"] != "zenoh-link-tls"],
         "an exception that is not needed": [p for p in found if p["name"] != "paste"],
     }
     for what, tree in planted.items():

@@ -1,9 +1,11 @@
-//! Claim: an encrypted link of zenoh that carries much in both directions at once loses and changes nothing. The published
-//! link reads and writes one TLS stream from two threads (third_party/zenoh-link-tls). A process of its own: a fault of
-//! memory ends it.
+//! Claim: encrypted links of robots that carry much in both directions at once lose and change nothing, and a thousand
+//! handshakes that do not come keep nobody out. All of it passes the front and the gate twice: two programs of one robot of
+//! ROS 2 speak below their prefix, each over a link of its own. A process of its own: a fault of memory ends it.
 
-use rcgen::{BasicConstraints, CertificateParams, IsCa, Issuer, KeyPair};
-use serde_json::{Value, json};
+use client::{RobotOptions, RobotTls, api::NewMap};
+use link::{Credentials, EncryptedLink};
+use serde_json::json;
+use server::config::{RawConfig, RawRos2, RawRos2Robot, RawTls};
 use std::{
     fs,
     path::Path,
@@ -11,38 +13,57 @@ use std::{
         Arc,
         atomic::{AtomicU64, Ordering},
     },
-    time::Duration,
+    time::{Duration, Instant},
 };
 use tempfile::TempDir;
-use tests::{eventually, router::ExternalRouter};
+use tests::{Inside, SOON, command::waymark, eventually};
+use tokio::net::TcpStream;
 use zenoh::{Session, qos::CongestionControl, sample::Sample};
 
 /// Messages of each direction, and their length: several TLS records each.
 const MESSAGES: u64 = 20_000;
 const BYTES: usize = 40_000;
 /// Longest time for all of them.
-const LONGEST: Duration = Duration::from_mins(3);
+const LONGEST: Duration = Duration::from_mins(5);
+/// Connections that say nothing.
+const HALF_OPEN: usize = 1_000;
 
-/// Settings of both ends, in files of `folder`: an authority, and a certificate of it for 127.0.0.1.
-fn tls(folder: &Path) -> Value {
-    let authority_key = KeyPair::generate().expect("a key");
-    let mut authority = CertificateParams::default();
-    authority.is_ca = IsCa::Ca(BasicConstraints::Unconstrained);
-    let authority_pem = authority.self_signed(&authority_key).expect("an authority").pem();
-    let key = KeyPair::generate().expect("a key");
-    let here = CertificateParams::new(vec!["127.0.0.1".to_owned()]).expect("a name");
-    let issuer = Issuer::new(authority, authority_key);
-    let certificate = here.signed_by(&key, &issuer).expect("a certificate");
-    let written = |name: &str, pem: String| {
-        let path = folder.join(name);
-        fs::write(&path, pem).expect("written");
-        path.display().to_string()
+/// A server, and the file of the robot `r1`, which has a prefix of its own.
+async fn served(folder: &Path) -> (Inside, RobotOptions) {
+    let tls = RawTls { enabled: true, ..RawTls::default() };
+    let robot = RawRos2Robot { robot: "r1".into(), key_prefix: "own".into(), ..RawRos2Robot::default() };
+    let settings = RawConfig { tls, ros2: RawRos2 { robot: vec![robot] }, ..RawConfig::default() };
+    let inside = Inside::start_with(settings).await;
+    inside.maps().create_map(&NewMap::new("hall")).await.expect("a map");
+    inside.maps().put_robot("r1", "hall").await.expect("a robot");
+    let out = folder.join("r1");
+    let run = waymark(
+        ["robot", "enrol", "r1", "--out", out.to_str().expect("a path"), "--server", &inside.url()],
+        SOON,
+    );
+    assert_eq!(run.status, 0, "{run:?}");
+    (inside, RobotOptions::from_file(out.join("robot.json")).expect("the robot's file"))
+}
+
+/// A session of zenoh over a link of its own.
+async fn session(options: &RobotOptions) -> (Session, EncryptedLink) {
+    let RobotTls { certificate, key, authority, .. } = options.tls.clone().expect("certificates");
+    let read = |path: &Path| fs::read(path).expect("a file");
+    let credentials = Credentials {
+        certificate: read(&certificate),
+        key: read(&key),
+        authority: read(&authority.expect("an authority")),
     };
-    json!({
-        "root_ca_certificate": written("authority.pem", authority_pem),
-        "listen_certificate": written("listener.pem", certificate.pem()),
-        "listen_private_key": written("listener.key", key.serialize_pem()),
-    })
+    let address = options.endpoint.strip_prefix("tls/").expect("an encrypted endpoint");
+    let link = EncryptedLink::open(address, &credentials).expect("a link");
+    let config = json!({
+        "mode": "client",
+        "connect": { "endpoints": [link.endpoint()], "timeout_ms": 10_000 },
+        "scouting": { "delay": 0, "multicast": { "enabled": false }, "gossip": { "enabled": false } },
+        "transport": { "shared_memory": { "enabled": false } },
+    });
+    let config = zenoh::Config::from_json5(&config.to_string()).expect("settings");
+    (zenoh::open(config).await.expect("a session"), link)
 }
 
 /// Message number `i`: the number at both ends, and bytes that follow from it.
@@ -80,39 +101,37 @@ async fn publish(session: &Session, key: &str) {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn an_encrypted_link_that_is_busy_in_both_directions_loses_nothing() {
+async fn encrypted_links_that_are_busy_in_both_directions_lose_nothing() {
     let folder = TempDir::new().expect("a temporary directory");
-    let tls = tls(folder.path());
-    let mut router = ExternalRouter::start(Some(tls.clone())).await;
-    let config = json!({
-        "mode": "client",
-        "connect": { "endpoints": [router.endpoint], "timeout_ms": 10_000 },
-        "scouting": { "delay": 0, "multicast": { "enabled": false }, "gossip": { "enabled": false } },
-        "transport": { "shared_memory": { "enabled": false }, "link": { "tls": {
-            "root_ca_certificate": tls["root_ca_certificate"],
-        } } },
-    });
-    let config = zenoh::Config::from_json5(&config.to_string()).expect("settings");
-    let client = zenoh::open(config).await.expect("a client");
-    let (_outward, out) = counted(router.session(), "out").await;
-    let (_homeward, home) = counted(&client, "home").await;
+    let (inside, options) = served(folder.path()).await;
+    let address = options.endpoint.strip_prefix("tls/").expect("an encrypted endpoint").to_owned();
+    let mut silent = Vec::new();
+    for _ in 0..HALF_OPEN {
+        silent.push(TcpStream::connect(&address).await.expect("connected"));
+    }
+    let started = Instant::now();
+    let (one, _one) = session(&options).await;
+    println!("connected beside {HALF_OPEN} silent connections in {:?}", started.elapsed());
+    let (other, _other) = session(&options).await;
+    drop(silent);
+    let (_outward, out) = counted(&other, "own/out").await;
+    let (_homeward, home) = counted(&one, "own/home").await;
     eventually("both ends know of the subscribers", || async {
-        (is_wanted(&client, "out").await && is_wanted(router.session(), "home").await).then_some(())
+        (is_wanted(&one, "own/out").await && is_wanted(&other, "own/home").await).then_some(())
     })
     .await;
+    let started = Instant::now();
     let all = async {
-        tokio::join!(publish(&client, "out"), publish(router.session(), "home"));
+        tokio::join!(publish(&one, "own/out"), publish(&other, "own/home"));
         while out.load(Ordering::Relaxed) < MESSAGES || home.load(Ordering::Relaxed) < MESSAGES {
             tokio::time::sleep(Duration::from_millis(20)).await;
         }
     };
     let in_time = tokio::time::timeout(LONGEST, all).await.is_ok();
-    assert!(
-        in_time,
-        "{} and {} of {MESSAGES} arrived",
-        out.load(Ordering::Relaxed),
-        home.load(Ordering::Relaxed)
-    );
-    client.close().await.expect("closed");
-    router.stop().await;
+    let arrived = (out.load(Ordering::Relaxed), home.load(Ordering::Relaxed));
+    assert!(in_time, "{arrived:?} of {MESSAGES} arrived");
+    println!("{MESSAGES} messages of {BYTES} bytes both ways in {:?}", started.elapsed());
+    one.close().await.expect("closed");
+    other.close().await.expect("closed");
+    inside.server.stop().await;
 }

@@ -27,14 +27,22 @@ pub enum ClientError {
     },
     /// Something listens, and there is no encrypted session.
     #[error(
-        "{endpoint} refuses the encrypted connection: the robot's certificate is not valid there (expired, or signed by \
-         another authority), or the server's own is not signed by the authority in the robot's file, or is for another \
+        "{endpoint} refuses the encrypted connection: the robot's certificate is not valid there (revoked, expired, or \
+         signed by another authority), or the server's own is not signed by the authority in the robot's file, or is for another \
          name; enrol the robot again (waymark robot enrol), and name the server by one of its tls.names ({detail})"
     )]
     TlsRefused {
         /// The endpoint that was tried.
         endpoint: String,
         /// The transport's message.
+        detail: String,
+    },
+    /// The files of an encrypted connection cannot be used.
+    #[error("no encrypted connection to {endpoint}: {detail}; enrol the robot again: waymark robot enrol")]
+    Encryption {
+        /// The endpoint.
+        endpoint: String,
+        /// What is wrong.
         detail: String,
     },
     /// The robot's certificate has ended.

@@ -54,7 +54,7 @@ impl FleetListener {
         robots: &[Name],
         timeout: Duration,
     ) -> Result<Self, ClientError> {
-        let session = transport::open_at(endpoint, Delivery::Latest, timeout, None).await?;
+        let session = transport::open_at(endpoint, Delivery::Latest, timeout).await?;
         let keys = Keys::new(fleet);
         let (to, waiting) = mpsc::channel(MAX_WAITING);
         let counters = Arc::new(Counters::default());

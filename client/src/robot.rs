@@ -5,7 +5,7 @@ use crate::{
     Capture, ClientError, RobotTls,
     error::fault,
     servers::{ServerEvent, Servers},
-    transport,
+    transport::{self, Opened},
 };
 use map::pose2::Pose2;
 use protos::{Key, Keys, Name, convert::geometry::pose2_wire, keys::alive_slot, prost::Message, v1};
@@ -88,24 +88,25 @@ impl RobotOptions {
 /// link that it has seen to begin and to end. The first sessions are given up early, so that there is time for several: rights
 /// may change more than once in a row. That the robot is not admitted is said only if the last session was linked or something
 /// still listens: nobody does while the gate is closed.
-async fn admitted(keys: &Keys, robot: &Name, options: &RobotOptions) -> Result<zenoh::Session, ClientError> {
+async fn admitted(keys: &Keys, robot: &Name, options: &RobotOptions) -> Result<Opened, ClientError> {
     let (key, until) = (keys.build(&Key::Hello(robot.clone())), Instant::now() + options.timeout);
     let endpoint = || options.endpoint.clone();
     let silent = || ClientError::NotAdmitted { robot: robot.to_string(), endpoint: endpoint() };
     let (mut left, mut was_linked, mut patience) = (options.timeout, false, FIRST_GREETED);
     loop {
-        let session = match transport::open(&RobotOptions { timeout: left, ..options.clone() }).await {
-            Ok(session) => session,
+        let opened = match transport::open(&RobotOptions { timeout: left, ..options.clone() }).await {
+            Ok(opened) => opened,
             // The server was there and silent: that says more than that the rest of the time was too short for one more link.
             Err(ClientError::TlsRefused { .. }) if was_linked => return Err(silent()),
             Err(error) => return Err(error),
         };
+        let session = opened.session.clone();
         if is_greeted(&session, &key, until.min(Instant::now() + patience)).await? {
-            return Ok(session);
+            return Ok(opened);
         }
         let is_linked = session.info().routers_zid().await.next().is_some();
         was_linked |= is_linked;
-        session.close().await.map_err(fault("close the session"))?;
+        opened.close().await.map_err(fault("close the session"))?;
         patience = GREETED.min(2 * patience);
         left = until.saturating_duration_since(Instant::now());
         if left < HELLO_WAIT {
@@ -144,6 +145,7 @@ pub struct CameraAnswer {
 /// A robot's connection. Dropping it ends the session and the robot's presence.
 pub struct RobotClient {
     pub(crate) session: zenoh::Session,
+    opened: Opened,
     pub(crate) keys: Keys,
     pub(crate) robot: Name,
     endpoint: String,
@@ -164,10 +166,11 @@ impl RobotClient {
         let fleet = name("fleet", &options.fleet)?;
         let robot = name("robot", &options.robot)?;
         let keys = Keys::new(&fleet);
-        let session = match options.tls {
+        let opened = match options.tls {
             Some(_) => admitted(&keys, &robot, options).await?,
             None => transport::open(options).await?,
         };
+        let session = opened.session.clone();
         let (answers, _) = broadcast::channel(INBOX);
         let (poses, _) = broadcast::channel(INBOX);
         let servers = Servers::new();
@@ -215,6 +218,7 @@ impl RobotClient {
         let alive = alive.await.map_err(fault("declare the liveliness token"))?;
         Ok(Self {
             session,
+            opened,
             keys,
             robot,
             endpoint: options.endpoint.clone(),
@@ -349,7 +353,7 @@ impl RobotClient {
 
     /// Ends the session in order.
     pub async fn close(self) -> Result<(), ClientError> {
-        self.session.close().await.map_err(fault("close the session"))
+        self.opened.close().await.map_err(fault("close the session"))
     }
 
     async fn put(&self, key: &Key, bytes: Vec<u8>, priority: Priority) -> Result<(), ClientError> {

@@ -4,6 +4,7 @@
 //! zenoh appears only in `bus` and `ros2`, sqlx only in `store`, axum only in `http`.
 
 pub mod config;
+mod accepting;
 mod identity;
 mod fleet;
 pub mod audit_files;

@@ -4,7 +4,7 @@ use crate::{
     bus::{Outbox, Pinger},
     config::{Config, Limits},
     http::{self, App},
-    identity::certificates::Certificates,
+    identity::certificates::{Certificates, acceptor},
     live_probes::LiveProbes,
     start_error::StartError,
     store::Store,
@@ -38,7 +38,7 @@ impl Listeners {
         certificates: Option<&Arc<Certificates>>,
     ) -> Result<Self, StartError> {
         crate::metrics::process::started();
-        let tls = certificates.map(|all| http::encryption::acceptor(all.current())).transpose();
+        let tls = certificates.map(|all| acceptor(all.current(), None, &[b"http/1.1"])).transpose();
         let tls = tls.map_err(|e| StartError::Certificates(e.to_string()))?;
         let (http, http_addr) = bind(config.http_addr).await?;
         let metrics = match config.metrics_addr {

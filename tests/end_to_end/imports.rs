@@ -10,7 +10,7 @@ use std::{
 };
 
 /// Crates that are checked.
-const CRATES: [&str; 12] = [
+const CRATES: [&str; 13] = [
     "vision",
     "map",
     "formats",
@@ -18,6 +18,7 @@ const CRATES: [&str; 12] = [
     "ros2",
     "recordings",
     "sim",
+    "link",
     "client",
     "engine",
     "server",

@@ -6,7 +6,7 @@ use std::{
 };
 
 /// Folders with hand-written code.
-const CRATES: [&str; 13] = [
+const CRATES: [&str; 14] = [
     "vision",
     "map",
     "formats",
@@ -14,6 +14,7 @@ const CRATES: [&str; 13] = [
     "ros2",
     "recordings",
     "sim",
+    "link",
     "client",
     "engine",
     "server",

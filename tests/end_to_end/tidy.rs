@@ -8,8 +8,9 @@ const ENDINGS: [&str; 4] = [".rs", ".md", ".sql", ".proto"];
 /// End of the path of a document.
 const DOCUMENT: &str = ".md";
 /// Folders with code and text of this project; missing ones are skipped.
-const FOLDERS: [&str; 15] = [
+const FOLDERS: [&str; 16] = [
     "cli",
+    "link",
     "client",
     "engine",
     "formats",

@@ -8,6 +8,8 @@ use rustls::{
 use std::{
     io::{Read, Write},
     net::TcpStream,
+    os::unix::net::UnixStream,
+    path::Path,
     sync::Arc,
     time::Duration,
 };
@@ -25,6 +27,8 @@ pub(crate) struct RawRobot {
     stream: Box<dyn Stream>,
     seq: u64,
     next_key: u64,
+    /// The other end takes nothing any more.
+    is_closed: bool,
 }
 
 /// A number as zenoh writes it: seven bits a byte, the lowest first.
@@ -47,13 +51,38 @@ impl RawRobot {
         let (_, address) = endpoint.split_once('/').expect("an endpoint");
         let socket = TcpStream::connect(address).expect("connected");
         socket.set_read_timeout(Some(WAIT)).expect("a time-out");
-        let stream: Box<dyn Stream> = match tls {
-            None => Box::new(socket),
-            Some(tls) => Box::new(encrypted(socket, tls)),
-        };
-        let mut robot = Self { stream, seq: 1, next_key: 1 };
+        match tls {
+            None => Self::over(Box::new(socket), id),
+            Some(tls) => Self::over(Box::new(encrypted(socket, tls)), id),
+        }
+    }
+
+    /// Connects to the socket of a router itself, where no front is.
+    pub(crate) fn connect_inside(id: u128, socket: &Path) -> Self {
+        let socket = UnixStream::connect(socket).expect("connected");
+        socket.set_read_timeout(Some(WAIT)).expect("a time-out");
+        Self::over(Box::new(socket), id)
+    }
+
+    fn over(stream: Box<dyn Stream>, id: u128) -> Self {
+        let mut robot = Self { stream, seq: 1, next_key: 1, is_closed: false };
         robot.open(id);
         robot
+    }
+
+    /// Whether the other end says that the session ends, before it closes the connection.
+    pub(crate) fn is_told_off(&mut self) -> bool {
+        let mut length = [0; 2];
+        while self.stream.read_exact(&mut length).is_ok() {
+            let mut batch = vec![0; usize::from(u16::from_le_bytes(length))];
+            if self.stream.read_exact(&mut batch).is_err() {
+                break;
+            }
+            if batch.first().is_some_and(|first| first & 0x1f == 0x03) {
+                return true;
+            }
+        }
+        false
     }
 
     /// The four messages by which a session opens: `InitSyn`, `InitAck`, `OpenSyn`, `OpenAck`.
@@ -84,8 +113,8 @@ impl RawRobot {
 
     fn send(&mut self, batch: &[u8]) {
         let length = u16::try_from(batch.len()).expect("a batch").to_le_bytes();
-        self.stream.write_all(&[&length, batch].concat()).expect("sent");
-        self.stream.flush().expect("sent");
+        let sent = self.stream.write_all(&[&length, batch].concat());
+        self.is_closed |= sent.and_then(|()| self.stream.flush()).is_err();
     }
 
     fn receive(&mut self) -> Vec<u8> {
@@ -158,8 +187,7 @@ pub(crate) enum Kind {
 }
 
 impl Kind {
-    /// What access control checks, or zenoh does not forward.
-    pub(crate) const BOUNDED: [Self; 11] = [
+    pub(crate) const ALL: [Self; 12] = [
         Self::Put,
         Self::Delete,
         Self::Query,
@@ -171,6 +199,7 @@ impl Kind {
         Self::TokenInterest,
         Self::TokenQuestion,
         Self::Interest,
+        Self::AggregateInterest,
     ];
 
     /// Flags and kind of the message, and whether an id follows.

@@ -2,10 +2,10 @@
 //! of robots of ROS 2. Out: rules by which a robot writes its own keys alone, and reads its own answers and its maps' changes.
 //! What no rule allows is dropped.
 //!
-//! zenoh knows of a certificate nothing but its name, and reads the rules once, when a session opens: [`super::gate`] opens
-//! it again when they change.
+//! zenoh knows of a certificate nothing but its name, which the front makes the robot's. It reads the rules once, when a session
+//! opens: [`super::gate`] opens it again when they change.
 
-use crate::{config::Ros2Robot, identity::certificates::common_name};
+use crate::config::Ros2Robot;
 use engine::snapshot::Snapshots;
 use protos::{Key, Keys, Name};
 use serde_json::{Value, json};
@@ -27,11 +27,13 @@ const ALL_MESSAGES: [&str; 9] = [
 const ALL_KEYS: [&str; 4] = ["**", "@ros2_lv/**", "**/@ros2_lv/**", "**/@adv/**"];
 /// The server's own link among the subjects.
 const SERVER: &str = "server";
+/// Kind of the link between the two routers of the server. Robots have others.
+const SERVER_LINK: &str = "unixsock-stream";
 
 /// What one robot is known by, and may.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Grant {
-    /// Names in its valid certificates.
+    /// Names in its certificates.
     common_names: BTreeSet<String>,
     /// Its map, and those linked with it.
     maps: BTreeSet<String>,
@@ -46,40 +48,33 @@ pub(super) struct Policy {
 }
 
 impl Policy {
-    /// What follows from the valid certificates. `by_name`: certificates of the operator's own authority have the robot's
-    /// name, and every registered robot may have one.
-    pub(super) fn new(
-        valid: &BTreeMap<String, Vec<String>>,
-        snapshots: &Snapshots,
-        ros2: &[Ros2Robot],
-        by_name: bool,
-    ) -> Self {
+    /// What registered robots may, of those that have certificates; the front connects each under its name. `by_name`: all
+    /// may have one of the operator's own authority.
+    pub(super) fn new(holders: &[String], snapshots: &Snapshots, ros2: &[Ros2Robot], by_name: bool) -> Self {
         let registered = snapshots.robots();
         let mut linked = BTreeMap::<&str, BTreeSet<String>>::new();
         let mut robots = BTreeMap::new();
         for (robot, map) in &registered {
             let Ok(name) = Name::new(robot.as_str()) else { continue };
-            let serials = valid.get(robot).into_iter().flatten();
-            let mut common_names: BTreeSet<String> =
-                serials.map(|serial| common_name(robot, serial)).collect();
-            if by_name {
-                common_names.insert(robot.clone());
-            }
-            if common_names.is_empty() {
+            if !by_name && !holders.contains(robot) {
                 continue;
             }
             let maps = linked.entry(map).or_insert_with(|| linked_with(snapshots, map)).clone();
             let of_ros2 = ros2.iter().find(|of_ros2| of_ros2.robot == name);
             let ros2_prefix = of_ros2.and_then(Ros2Robot::own_prefix).map(str::to_owned);
-            robots.insert(name, Grant { common_names, maps, ros2_prefix });
+            robots.insert(name, Grant { common_names: [robot.clone()].into(), maps, ros2_prefix });
         }
         Self { robots }
     }
 
-    /// As zenoh's settings want it. `servers`: the names in the certificates of servers, or of the server's other router.
-    pub(super) fn access_control(&self, keys: &Keys, servers: &[String]) -> Value {
+    /// As zenoh's settings want it, for the router that the server's own one reaches by a socket.
+    pub(super) fn access_control_of_gate(&self, keys: &Keys) -> Value {
+        self.access_control(keys, &json!({ "id": SERVER, "link_protocols": [SERVER_LINK] }))
+    }
+
+    fn access_control(&self, keys: &Keys, server: &Value) -> Value {
         let mut rules = vec![rule(SERVER, &ALL_KEYS, &ALL_MESSAGES, &["ingress", "egress"])];
-        let mut subjects = vec![json!({ "id": SERVER, "cert_common_names": servers })];
+        let mut subjects = vec![server.clone()];
         let mut policies = vec![json!({ "rules": [SERVER], "subjects": [SERVER] })];
         rules.extend(shared(keys));
         for (robot, grant) in &self.robots {
@@ -116,7 +111,8 @@ pub fn access_control_for_router(
         ros2_prefix: None,
     };
     let robots = robots.iter().map(|(robot, names)| (robot.clone(), grant(names))).collect();
-    Policy { robots }.access_control(&Keys::new(fleet), servers)
+    Policy { robots }
+        .access_control(&Keys::new(fleet), &json!({ "id": SERVER, "cert_common_names": servers }))
 }
 
 /// The map itself, and every map that lies in the same coordinates.

@@ -1,29 +1,33 @@
-//! The router that robots on other machines meet: TLS with certificates of both sides, and access control. Behind it is the
-//! server's own router, over a link of this process.
+//! The router that robots on other machines meet behind the front: it knows each by its name, and has access control. Behind
+//! it is the server's own router, over a socket of this process.
 //!
-//! Access control is read when a session opens. So when certificates, robots or their maps change what robots may, the gate
-//! closes and opens again: robots connect again by themselves, and the server's own router, its
-//! subscriptions and its other robots stay. What was revoked is refused in code meanwhile ([`super::Receivers::admits`]).
+//! Access control is read when a session opens. So when robots or their maps change what robots may, the gate closes and opens
+//! again: robots connect again by themselves, and the server's own router, its subscriptions and its other robots stay. A
+//! certificate that is revoked or expires changes nothing here: the front ends that robot's connections
+//! ([`super::front::Admission`]).
 
 use super::{
     BusError,
     access::Policy,
+    front::Admission,
     router::{self, RouterSettings, RouterTls},
 };
 use crate::{
     config::Ros2Robot,
-    identity::certificates::{
-        CertificateError, CertificateRegistry, Certificates, LinkCertificates, ServerCertificate,
-    },
+    identity::certificates::{CertificateRegistry, Certificates, LinkCertificates, ServerCertificate},
 };
 use engine::{snapshot::Snapshots, vitals::Pulse};
 use protos::{Key, Keys, Name};
-use std::{sync::Arc, time::Duration};
+use std::{
+    net::{Ipv4Addr, SocketAddr, UdpSocket},
+    sync::Arc,
+    time::Duration,
+};
 use tokio::{sync::watch, task::JoinHandle, time::Instant};
 
 /// Changes so close together are one.
 const GATHER: Duration = Duration::from_millis(20);
-/// How often certificates that have expired are looked for, and whether messages still pass to the server's own router.
+/// How often it is looked whether messages still pass to the server's own router.
 const LOOK_EVERY: Duration = Duration::from_secs(10);
 /// Time between closing a gate and opening the next. zenoh computes its trees of routers at most every 100 ms, and tells
 /// what is declared to routers whose index in them is new. A gate that joined earlier would take the index of the closed
@@ -41,18 +45,19 @@ const ASKS: &str = "gate";
 
 /// What a gate rests on.
 pub(super) struct GateSettings {
-    /// Where robots connect, with a real port.
-    pub(super) endpoint: String,
     /// Where the server's own router listens for it.
-    pub(super) link_endpoint: String,
+    pub(super) inner: String,
     pub(super) link: Arc<LinkCertificates>,
     pub(super) keys: Keys,
     pub(super) certificates: Arc<Certificates>,
     pub(super) registry: Arc<CertificateRegistry>,
+    pub(super) admission: Arc<Admission>,
     pub(super) snapshots: Arc<Snapshots>,
     pub(super) ros2: Vec<Ros2Robot>,
     pub(super) robots: usize,
     pub(super) frame_bytes: usize,
+    /// Told where the gate listens, or that it does not now.
+    pub(super) listens: watch::Sender<Option<SocketAddr>>,
 }
 
 /// What tells the gate that robots may do something else, and that the server shows another certificate.
@@ -66,39 +71,35 @@ pub(super) struct Gate {
 
 impl GateSettings {
     fn policy(&self) -> Policy {
-        let valid = self.registry.valid(crate::store::now_ms());
-        Policy::new(&valid, &self.snapshots, &self.ros2, !self.certificates.enrols_robots())
+        let by_name = !self.certificates.enrols_robots();
+        Policy::new(&self.registry.holders(), &self.snapshots, &self.ros2, by_name)
     }
 
     async fn open(&self, policy: &Policy, join: Duration) -> Result<zenoh::Session, BusError> {
-        let shown = self.certificates.current().borrow().clone();
-        let authorities = self.certificates.client_authorities_pem();
-        let authorities = authorities.map_err(|e| self.fault(&e))?;
-        let (certificate, key) = &self.link.client;
+        let at = free_port().map_err(|e| BusError::Listen {
+            endpoint: format!("quic/{}:0", Ipv4Addr::LOCALHOST),
+            detail: e.to_string(),
+        })?;
         let settings = RouterSettings {
-            listen: vec![self.endpoint.clone()],
-            connect: Some(&self.link_endpoint),
+            listen: vec![format!("quic/{at}")],
+            connect: Some(&self.inner),
             tls: Some(RouterTls {
-                authorities: format!("{authorities}\n{}", self.link.authority_pem),
-                listener: (&shown.chain_pem, &shown.key_pem),
-                client: Some((certificate, key)),
+                authorities: self.link.authority_pem(),
+                listener: (&self.link.listener.0, &self.link.listener.1),
             }),
-            access: Some(policy.access_control(&self.keys, std::slice::from_ref(&self.link.listener_name))),
+            access: Some(policy.access_control_of_gate(&self.keys)),
             robots: self.robots,
             frame_bytes: self.frame_bytes,
         };
         let session = router::open(&settings).await?;
         if self.join(&session, join).await {
+            self.listens.send_replace(Some(at));
             return Ok(session);
         }
         // Robots would be linked, and never heard.
         close(&session).await;
         let detail = "the router of robots and the server's own do not reach each other".to_owned();
-        Err(BusError::Listen { endpoint: self.link_endpoint.clone(), detail })
-    }
-
-    fn fault(&self, error: &CertificateError) -> BusError {
-        BusError::Listen { endpoint: self.endpoint.clone(), detail: error.to_string() }
+        Err(BusError::Listen { endpoint: self.inner.clone(), detail })
     }
 
     /// Waits until messages pass to the server's own router: earlier ones would be lost. False if they do not.
@@ -115,6 +116,11 @@ impl GateSettings {
         }
         false
     }
+}
+
+/// A free port of UDP on loopback: zenoh does not say which one it took.
+fn free_port() -> std::io::Result<SocketAddr> {
+    UdpSocket::bind((Ipv4Addr::LOCALHOST, 0))?.local_addr()
 }
 
 impl Gate {
@@ -173,6 +179,9 @@ async fn keep(
             () = tokio::time::sleep(LOOK_EVERY) => Why::Interval,
         };
         tokio::time::sleep(GATHER).await;
+        if why == Why::Certificate {
+            settings.admission.renew();
+        }
         // A robot would be linked, and told that it is not admitted.
         let is_cut_off = why == Why::Interval
             && tokio::select! {
@@ -180,14 +189,15 @@ async fn keep(
                 is_joined = settings.join(&session, LONGEST_JOIN) => !is_joined,
             };
         if is_cut_off {
-            tracing::error!(endpoint = settings.endpoint, follows = "it opens again", "gate_cut_off");
+            tracing::error!(follows = "it opens again", "gate_cut_off");
         }
         let change = *changes.borrow_and_update();
         let wanted = settings.policy();
-        if wanted == policy && why != Why::Certificate && !is_cut_off {
+        if wanted == policy && !is_cut_off {
             settings.registry.set_applied(change);
             continue;
         }
+        settings.listens.send_replace(None);
         close(&session).await;
         let opened = tokio::select! {
             _ = stopping.wait_for(|stop| *stop) => break,
@@ -195,13 +205,13 @@ async fn keep(
         };
         (session, policy) = (opened, wanted);
         settings.registry.set_applied(change);
-        tracing::info!(endpoint = settings.endpoint, follows = "robots connect again", "access_changed");
+        tracing::info!(follows = "robots connect again", "access_changed");
     }
     close(&session).await;
     pulse.end();
 }
 
-/// Tries until it is open, after another was closed: the port may be taken for a moment.
+/// Tries until it is open, after another was closed.
 async fn reopened(settings: &GateSettings, policy: &Policy) -> zenoh::Session {
     let mut join = FIRST_JOIN;
     loop {
@@ -234,8 +244,9 @@ mod tests {
 
     #[tokio::test(flavor = "multi_thread")]
     async fn a_gate_that_follows_a_closed_one_is_told_what_the_server_declares() {
-        let endpoint = || router::endpoint("tcp/127.0.0.1:0").unwrap();
-        let (inner, gate) = (endpoint(), endpoint());
+        let folder = tempfile::tempdir().unwrap();
+        let endpoint = |name: &str| format!("unixsock-stream/{}", folder.path().join(name).display());
+        let (inner, gate) = (endpoint("inner"), endpoint("gate"));
         let server = joined(&inner, None).await;
         let answer = |query: zenoh::query::Query| {
             zenoh::Wait::wait(query.reply(query.key_expr().clone(), "")).unwrap();

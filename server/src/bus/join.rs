@@ -7,10 +7,11 @@
 use super::{
     BusError, Outbox, Receivers, caught,
     receiving::Receiving,
-    router::{self, Credentials, client_config},
+    router::{self, client_config},
 };
 use crate::{config::JoinedRouter, fleet::Fleet};
 use engine::{decode::ImageLimits, vitals::Pulse};
+use link::{Credentials, EncryptedLink};
 use protos::{Key, Keys, ServerToken};
 use std::{
     collections::{BTreeMap, btree_map::Entry},
@@ -38,7 +39,8 @@ const TELL_EVERY: Duration = Duration::from_mins(1);
 /// What a connection rests on.
 pub(super) struct JoinSettings {
     router: JoinedRouter,
-    credentials: Option<Credentials>,
+    /// Where zenoh connects in place of the router's encrypted endpoints.
+    links: Vec<EncryptedLink>,
     keys: Keys,
     pixels: ImageLimits,
     frame_bytes: usize,
@@ -58,34 +60,48 @@ pub(super) struct Announced {
 }
 
 impl JoinSettings {
-    /// Reads the files.
+    /// Reads the files. Needs a runtime.
     pub(super) fn read(router: &JoinedRouter, keys: Keys, pixels: ImageLimits) -> Result<Self, BusError> {
-        let credentials = router.credentials.as_ref().map(|files| {
-            Ok(Credentials {
+        let mut links = Vec::new();
+        if let Some(files) = &router.credentials {
+            let credentials = Credentials {
                 certificate: pem("router.certificate", &files.certificate)?,
                 key: pem("router.key", &files.key)?,
                 authority: pem("router.authority", &files.authority)?,
-            })
-        });
-        let frame_bytes = pixels.bytes;
-        Ok(Self { router: router.clone(), credentials: credentials.transpose()?, keys, pixels, frame_bytes })
+            };
+            for endpoint in &router.connect {
+                let address = endpoint.strip_prefix("tls/").unwrap_or(endpoint);
+                links.push(
+                    EncryptedLink::open(address, &credentials)
+                        .map_err(|e| BusError::Join { endpoints: endpoint.clone(), detail: e.to_string() })?,
+                );
+            }
+        }
+        Ok(Self { router: router.clone(), links, keys, pixels, frame_bytes: pixels.bytes })
     }
 
     async fn connect(&self) -> Result<Session, BusError> {
-        let endpoints = &self.router.connect;
-        let config = client_config(endpoints, self.credentials.as_ref(), self.frame_bytes);
-        router::opened(&endpoints.join(", "), config).await
+        let mut through: Vec<String> = self.links.iter().map(EncryptedLink::endpoint).collect();
+        if through.is_empty() {
+            through.clone_from(&self.router.connect);
+        }
+        let endpoints = self.router.connect.join(", ");
+        let opened = router::opened(&endpoints, client_config(&through, self.frame_bytes)).await;
+        opened.map_err(|error| match self.links.iter().find_map(|link| link.last_end()?.err()) {
+            Some(detail) => BusError::Join { endpoints, detail },
+            None => error,
+        })
     }
 }
 
-fn pem(field: &'static str, path: &Path) -> Result<String, BusError> {
+fn pem(field: &'static str, path: &Path) -> Result<Vec<u8>, BusError> {
     let fault = |detail: String| BusError::File { field, path: path.to_owned(), detail };
     let size = fs::metadata(path).map_err(|e| fault(e.to_string()))?.len();
     if size > MAX_PEM_BYTES {
         return Err(fault(format!("more than {MAX_PEM_BYTES} bytes")));
     }
     let text = fs::read_to_string(path).map_err(|e| fault(e.to_string()))?;
-    if text.contains("-----BEGIN ") { Ok(text) } else { Err(fault("it is not PEM".into())) }
+    if text.contains("-----BEGIN ") { Ok(text.into_bytes()) } else { Err(fault("it is not PEM".into())) }
 }
 
 impl Join {

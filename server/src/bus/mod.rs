@@ -5,6 +5,7 @@
 //! and its own thread, so a slow link holds up no worker.
 
 mod access;
+mod front;
 mod gate;
 mod gaze;
 mod hello;
@@ -12,6 +13,7 @@ mod inbox;
 mod join;
 mod localise;
 mod outbox;
+mod own;
 mod ping;
 mod receiving;
 mod router;
@@ -25,9 +27,9 @@ pub use outbox::Outbox;
 pub(crate) use ping::Pinger;
 
 use crate::{
-    config::{Config, Middleware, Ros2Robot},
+    config::Config,
     fleet::{Duty, Fleet},
-    identity::certificates::{CertificateRegistry, Certificates, LinkCertificates},
+    identity::certificates::{CertificateRegistry, Certificates},
     store::now_ms,
 };
 use engine::{
@@ -39,11 +41,10 @@ use engine::{
     panics::Edge,
     vitals::{Pulse, Vitals},
 };
-use gate::{Gate, GateSettings};
 use join::{Join, JoinSettings};
+use own::{Doors, OwnRouter};
 use protos::{Key, Keys, Name, v1};
 use receiving::Receiving;
-use router::{RouterSettings, RouterTls};
 use std::{
     path::PathBuf,
     sync::{Arc, OnceLock},
@@ -151,8 +152,8 @@ pub struct Bus {
 
 /// How robots reach the server.
 enum Way {
-    /// By its own router, and a gate before that where connections are encrypted.
-    Own(Box<Receiving>, Option<Gate>),
+    /// By its own router, and what is before it.
+    Own(Box<Receiving>, Doors),
     /// By a router of the operator.
     Joined(Join),
 }
@@ -183,39 +184,15 @@ impl Bus {
             let way = Way::Joined(Join::start(settings, (to, outbox.clone()), fleet, cell, pulse));
             return Ok(Self { endpoint, outbox, changes, way, pinger: None, _pings: None });
         }
-        let endpoint = router::endpoint(&config.zenoh_endpoint)?;
-        let encrypted = certificates.filter(|_| endpoint.starts_with("tls/"));
-        let (session, link) = if encrypted.is_some() {
-            linked(config).await.map(|(session, link)| (session, Some(link)))?
-        } else {
-            (router::open(&plain(config, vec![endpoint.clone()])).await?, None)
-        };
+        let own = OwnRouter::open(config, certificates).await?;
+        let (session, endpoint) = (own.session.clone(), own.endpoint.clone());
         let outbox = Outbox::start(Arc::new(OnceLock::from(session.clone())), keys.clone(), &to)?;
         let changes = begin_changes(&to, &outbox);
-        let asked = link.clone().map_or((endpoint.clone(), None), |(at, link)| (at, Some(link)));
-        let (pings, pinger) = ping::answer_pings(&session, &keys, &to, asked).await?;
+        let (pings, pinger) = ping::answer_pings(&session, &keys, &to, &own.ping_endpoint()).await?;
         let receiving = Receiving::start(session, &keys, (&to, &outbox), pixels).await?;
-        let gate = match encrypted.zip(link) {
-            None => None,
-            Some((certificates, (link_endpoint, link))) => {
-                warn_of_ros2(&config.ros2);
-                let settings = GateSettings {
-                    endpoint: endpoint.clone(),
-                    link_endpoint,
-                    link,
-                    keys,
-                    certificates,
-                    registry: to.certificates.clone().unwrap_or_default(),
-                    snapshots: to.intake.snapshots.clone(),
-                    ros2: config.ros2.clone(),
-                    robots: config.limits.robots,
-                    frame_bytes: config.limits.frame_bytes,
-                };
-                Some(Gate::open(settings, to.vitals.begin("the task that admits robots")).await?)
-            }
-        };
+        let doors = own.admit(config, keys, &to).await?;
         tracing::info!(endpoint, fleet = %config.fleet, "robots may connect");
-        let way = Way::Own(Box::new(receiving), gate);
+        let way = Way::Own(Box::new(receiving), doors);
         Ok(Self { endpoint, outbox, changes, way, pinger: Some(pinger), _pings: Some(pings) })
     }
 
@@ -246,13 +223,10 @@ impl Bus {
     pub async fn close(self) {
         self.changes.abort();
         match self.way {
-            Way::Own(receiving, gate) => {
+            Way::Own(receiving, doors) => {
                 let session = receiving.end().await;
                 self.outbox.drain().await;
-                if let Some(gate) = gate {
-                    gate.close().await;
-                }
-                close(&session).await;
+                doors.close(&session).await;
             }
             Way::Joined(join) => {
                 let announced = join.end().await;
@@ -274,40 +248,6 @@ async fn close(session: &zenoh::Session) {
 fn begin_changes(to: &Receivers, outbox: &Outbox) -> JoinHandle<()> {
     let pulse = to.vitals.begin("the task that forwards map changes");
     tokio::spawn(forward_map_changes(to.clone(), outbox.clone(), pulse))
-}
-
-/// Robots of ROS that access control does not let through.
-fn warn_of_ros2(robots: &[Ros2Robot]) {
-    for Ros2Robot { robot, middleware, .. } in robots.iter().filter(|robot| robot.own_prefix().is_none()) {
-        let follows = "with a certificate it is never heard: give it a `key_prefix`";
-        tracing::warn!(%robot, ?middleware, follows, "ros2_robot_without_prefix");
-    }
-    for Ros2Robot { robot, .. } in robots.iter().filter(|robot| robot.middleware == Middleware::BridgeDds) {
-        let follows =
-            "with a certificate it is never heard: its bridge declares its graph outside of its prefix";
-        tracing::warn!(%robot, follows, "ros2_bridge_in_plain_text_only");
-    }
-}
-
-fn plain(config: &Config, listen: Vec<String>) -> RouterSettings<'_> {
-    let (robots, frame_bytes) = (config.limits.robots, config.limits.frame_bytes);
-    RouterSettings { listen, connect: None, tls: None, access: None, robots, frame_bytes }
-}
-
-/// The server's own router behind a gate: it listens for the gate, and on the plain endpoint of the settings.
-async fn linked(config: &Config) -> Result<(zenoh::Session, (String, Arc<LinkCertificates>)), BusError> {
-    let endpoint = router::endpoint("tls/127.0.0.1:0")?;
-    let made = LinkCertificates::new(now_ms());
-    let link = made.map_err(|e| BusError::Listen { endpoint: endpoint.clone(), detail: e.to_string() })?;
-    let mut listen = vec![endpoint.clone()];
-    listen.extend(config.tls.as_ref().and_then(|tls| tls.local_zenoh.clone()));
-    let tls = RouterTls {
-        authorities: link.authority_pem.clone(),
-        listener: (&link.listener.0, &link.listener.1),
-        client: None,
-    };
-    let session = router::open(&RouterSettings { tls: Some(tls), ..plain(config, listen) }).await?;
-    Ok((session, (endpoint, Arc::new(link))))
 }
 
 /// A zenoh callback that catches panics: a panic would end the task that receives from a robot. `kind` names the message.

@@ -1,13 +1,9 @@
 //! `server/{id}/ping`: the server asks itself, as a robot would: a client of its own, over a link, through the router, to a
 //! callback on the router's session, and back. An answer says that messages of robots arrive and are answered.
 
-use super::{
-    BusError, Receivers, caught,
-    router::{self, RouterTls},
-};
-use crate::identity::certificates::LinkCertificates;
+use super::{BusError, Receivers, caught, router};
 use protos::Keys;
-use std::{sync::Arc, time::Duration};
+use std::time::Duration;
 use tokio::sync::OnceCell;
 use zenoh::{
     Session, Wait,
@@ -21,7 +17,6 @@ const ANSWER: Duration = Duration::from_millis(1500);
 pub(crate) struct Pinger {
     key: String,
     endpoint: String,
-    link: Option<Arc<LinkCertificates>>,
     /// Opened by the first ping: the start of the server does not wait for it.
     session: OnceCell<Session>,
 }
@@ -37,7 +32,7 @@ pub(super) async fn answer_pings(
     session: &Session,
     keys: &Keys,
     to: &Receivers,
-    (endpoint, link): (String, Option<Arc<LinkCertificates>>),
+    endpoint: &str,
 ) -> Result<(Queryable<()>, Pinger), BusError> {
     let key = keys.ping(&session.zid().to_string());
     let answer = |query: Query| {
@@ -48,18 +43,13 @@ pub(super) async fn answer_pings(
     let declared = session.declare_queryable(&key).callback(caught(&to.vitals, "a ping", answer)).await;
     let queryable =
         declared.map_err(|e| BusError::Declare { action: "answer pings", detail: e.to_string() })?;
-    Ok((queryable, Pinger { key, endpoint: reachable(&endpoint), link, session: OnceCell::new() }))
+    Ok((queryable, Pinger { key, endpoint: reachable(endpoint), session: OnceCell::new() }))
 }
 
 impl Pinger {
     /// Opens the link, if it is not open. False: it cannot be opened now.
     pub(crate) async fn open(&self) -> bool {
-        let tls = self.link.as_ref().map(|link| RouterTls {
-            authorities: link.authority_pem.clone(),
-            listener: (&link.listener.0, &link.listener.1),
-            client: Some((&link.client.0, &link.client.1)),
-        });
-        let opened = self.session.get_or_try_init(|| router::open_client(&self.endpoint, tls.as_ref())).await;
+        let opened = self.session.get_or_try_init(|| router::open_client(&self.endpoint)).await;
         opened.inspect_err(|error| tracing::debug!(%error, "ping_not_sent")).is_ok()
     }
 

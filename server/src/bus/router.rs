@@ -4,10 +4,10 @@ use super::BusError;
 use crate::identity::certificates::PemKey;
 use base64::{Engine as _, prelude::BASE64_STANDARD};
 use serde_json::{Value, json};
-use std::{net::TcpListener, time::Duration};
+use std::time::Duration;
 
 /// Sessions beyond the robots: tools, a second connection while the first times out, and the server's own probe.
-const SPARE_SESSIONS: usize = 9;
+pub(super) const SPARE_SESSIONS: usize = 9;
 /// Room for keys and headers besides the largest frame.
 const MESSAGE_SPARE_BYTES: usize = 64 << 10;
 /// A robot whose link is silent for so long is gone.
@@ -28,22 +28,12 @@ const OPEN_TIMEOUT: Duration = Duration::from_secs(10);
 /// Longest attempt to join a router, within [`OPEN_TIMEOUT`].
 const JOIN_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// Certificates of a router, PEM.
+/// Certificates of a router that listens encrypted, PEM.
 pub(super) struct RouterTls<'a> {
     /// Who signs the certificates of the other ends.
-    pub(super) authorities: String,
-    /// What it shows as a listener.
+    pub(super) authorities: &'a str,
+    /// What it shows.
     pub(super) listener: (&'a str, &'a PemKey),
-    /// What it shows where it connects.
-    pub(super) client: Option<(&'a str, &'a PemKey)>,
-}
-
-/// PEM texts for encrypted endpoints.
-#[derive(Clone)]
-pub(super) struct Credentials {
-    pub(super) certificate: String,
-    pub(super) key: String,
-    pub(super) authority: String,
 }
 
 /// What a router is opened with.
@@ -56,17 +46,6 @@ pub(super) struct RouterSettings<'a> {
     pub(super) access: Option<Value>,
     pub(super) robots: usize,
     pub(super) frame_bytes: usize,
-}
-
-/// The endpoint with a real port: port 0 is replaced by a free one, because zenoh does not say which it took.
-pub(super) fn endpoint(asked: &str) -> Result<String, BusError> {
-    let parts = asked.split_once('/').and_then(|(protocol, a)| Some((protocol, a.strip_suffix(":0")?)));
-    let Some((protocol, address)) = parts else {
-        return Ok(asked.to_owned());
-    };
-    let fault = |e: std::io::Error| BusError::Listen { endpoint: asked.to_owned(), detail: e.to_string() };
-    let free = TcpListener::bind(format!("{address}:0")).map_err(fault)?;
-    Ok(format!("{protocol}/{address}:{}", free.local_addr().map_err(fault)?.port()))
 }
 
 /// Opens a router.
@@ -96,31 +75,21 @@ async fn session(
 }
 
 /// Opens a client of a router of this process.
-pub(super) async fn open_client(
-    endpoint: &str,
-    tls: Option<&RouterTls<'_>>,
-) -> Result<zenoh::Session, BusError> {
+pub(super) async fn open_client(endpoint: &str) -> Result<zenoh::Session, BusError> {
     let fault = |detail: String| BusError::Listen { endpoint: endpoint.to_owned(), detail };
-    let mut config = json!({
+    let config = json!({
         "mode": "client",
         "connect": { "endpoints": [endpoint], "timeout_ms": OPEN_TIMEOUT.as_millis() as u64 },
         "scouting": { "delay": 0, "multicast": { "enabled": false }, "gossip": { "enabled": false } },
         "adminspace": { "enabled": false },
         "transport": { "link": { "tx": { "lease": LEASE_MS } }, "shared_memory": { "enabled": false } },
     });
-    if let Some(tls) = tls {
-        config["transport"]["link"]["tls"] = tls_config(tls);
-    }
     let config = zenoh::Config::from_json5(&config.to_string()).map_err(|e| fault(e.to_string()))?;
     zenoh::open(config).await.map_err(|e| fault(e.to_string()))
 }
 
 /// A client of a router at one of `endpoints`; links and queues are as those of the server's own router.
-pub(super) fn client_config(
-    endpoints: &[String],
-    credentials: Option<&Credentials>,
-    frame_bytes: usize,
-) -> zenoh::Result<zenoh::Config> {
+pub(super) fn client_config(endpoints: &[String], frame_bytes: usize) -> zenoh::Result<zenoh::Config> {
     let settings =
         RouterSettings { listen: Vec::new(), connect: None, tls: None, access: None, robots: 0, frame_bytes };
     let mut config = settings_of(&settings);
@@ -131,17 +100,6 @@ pub(super) fn client_config(
         "exit_on_failure": true,
         "retry": { "period_init_ms": 100, "period_max_ms": 1000, "period_increase_factor": 2 },
     });
-    if let Some(Credentials { certificate, key, authority }) = credentials {
-        let encoded = |pem: &str| BASE64_STANDARD.encode(pem);
-        config["transport"]["link"]["tls"] = json!({
-            "root_ca_certificate_base64": encoded(authority),
-            "connect_certificate_base64": encoded(certificate),
-            "connect_private_key_base64": encoded(key),
-            "enable_mtls": true,
-            "verify_name_on_connect": true,
-            "close_link_on_expiration": true,
-        });
-    }
     zenoh::Config::from_json5(&config.to_string())
 }
 
@@ -192,21 +150,16 @@ fn settings_of(settings: &RouterSettings<'_>) -> Value {
     config
 }
 
-fn tls_config(RouterTls { authorities, listener, client }: &RouterTls<'_>) -> Value {
+fn tls_config(RouterTls { authorities, listener }: &RouterTls<'_>) -> Value {
     let encoded = |pem: &str| BASE64_STANDARD.encode(pem);
-    let mut tls = json!({
+    json!({
         "root_ca_certificate_base64": encoded(authorities),
         "listen_certificate_base64": encoded(listener.0),
         "listen_private_key_base64": encoded(&listener.1.0),
         "enable_mtls": true,
         "verify_name_on_connect": true,
         "close_link_on_expiration": true,
-    });
-    if let Some((certificate, key)) = client {
-        tls["connect_certificate_base64"] = encoded(certificate).into();
-        tls["connect_private_key_base64"] = encoded(&key.0).into();
-    }
-    tls
+    })
 }
 
 #[cfg(test)]
@@ -216,18 +169,6 @@ mod tests {
     fn plain(endpoint: &str) -> RouterSettings<'_> {
         let listen = vec![endpoint.to_owned()];
         RouterSettings { listen, connect: None, tls: None, access: None, robots: 10, frame_bytes: 1000 }
-    }
-
-    #[test]
-    fn port_0_becomes_a_real_one() {
-        for protocol in ["tcp", "tls"] {
-            let endpoint = endpoint(&format!("{protocol}/127.0.0.1:0")).unwrap();
-            let port: u16 =
-                endpoint.strip_prefix(&format!("{protocol}/127.0.0.1:")).unwrap().parse().unwrap();
-            assert_ne!(port, 0);
-        }
-        assert_eq!(super::endpoint("tcp/[::1]:7447").unwrap(), "tcp/[::1]:7447");
-        assert_eq!(super::endpoint("tcp/127.0.0.1:70").unwrap(), "tcp/127.0.0.1:70");
     }
 
     #[test]
@@ -245,7 +186,7 @@ mod tests {
 
     #[tokio::test(flavor = "multi_thread")]
     async fn a_taken_port_is_an_error_that_names_it() {
-        let taken = TcpListener::bind("127.0.0.1:0").unwrap();
+        let taken = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
         let endpoint = format!("tcp/{}", taken.local_addr().unwrap());
         let error = open(&plain(&endpoint)).await.unwrap_err().to_string();
         assert!(error.contains(&endpoint), "{error}");

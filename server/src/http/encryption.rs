@@ -2,30 +2,12 @@
 //! plain text that would have been readable on the way, which is refused.
 
 use super::error::ApiError;
-use crate::identity::certificates::ServerCertificate;
 use axum::{Router, http::StatusCode};
-use rustls::{
-    ServerConfig,
-    crypto::ring,
-    server::{ClientHello, ResolvesServerCert},
-    sign::CertifiedKey,
-};
-use std::{io, net::SocketAddr, sync::Arc};
-use tokio::{net::TcpStream, sync::watch};
-use tokio_rustls::TlsAcceptor;
+use std::{io, net::SocketAddr};
+use tokio::net::TcpStream;
 
 /// First byte of a handshake of TLS. No method of HTTP begins so.
 const HANDSHAKE: u8 = 0x16;
-
-/// The certificate in use, looked up for each connection.
-#[derive(Debug)]
-struct Current(watch::Receiver<Arc<ServerCertificate>>);
-
-impl ResolvesServerCert for Current {
-    fn resolve(&self, _: ClientHello<'_>) -> Option<Arc<CertifiedKey>> {
-        Some(self.0.borrow().certified.clone())
-    }
-}
 
 /// What is spoken on a connection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -36,17 +18,6 @@ pub(super) enum Spoken {
     LocalPlain,
     /// Plain text from another machine.
     Plain,
-}
-
-/// TLS 1.2 or 1.3 with the server's certificate in use.
-pub(crate) fn acceptor(
-    certificate: watch::Receiver<Arc<ServerCertificate>>,
-) -> Result<TlsAcceptor, rustls::Error> {
-    let provider = Arc::new(ring::default_provider());
-    let builder = ServerConfig::builder_with_provider(provider).with_safe_default_protocol_versions()?;
-    let mut config = builder.with_no_client_auth().with_cert_resolver(Arc::new(Current(certificate)));
-    config.alpn_protocols = vec![b"http/1.1".to_vec()];
-    Ok(TlsAcceptor::from(Arc::new(config)))
 }
 
 /// Looks at the first byte, which stays to be read. Errors: the connection ends before it.

@@ -1,31 +1,26 @@
-//! The accept loop: bounded connections, of which one address has its part, a deadline for the handshake, for the head of a request and for the reading of an
-//! answer, a graceful end. axum's own `serve` installs no timer, so hyper's deadline would not work there.
+//! Connections of HTTP: a deadline for the handshake, for the head of a request and for the reading of an answer, a graceful end.
+//! axum's own `serve` installs no timer, so hyper's deadline would not work there.
 
 use super::{
     encryption::{self, Spoken},
     head_timer::HeadTimer,
     peer::Peer,
 };
-use crate::config::Limits;
+use crate::{
+    accepting::{Bounds, accept_each},
+    config::Limits,
+};
 use axum::{Router, body::Body, extract::Request, response::Response};
 use hyper::{body::Incoming, server::conn::http1, service::service_fn};
 use hyper_util::{
     rt::TokioIo,
     server::graceful::{GracefulShutdown, Watcher},
 };
-use std::{
-    collections::BTreeMap,
-    convert::Infallible,
-    io,
-    net::{IpAddr, SocketAddr},
-    pin::Pin,
-    sync::{Arc, Mutex, PoisonError},
-    time::Duration,
-};
+use std::{convert::Infallible, io, net::SocketAddr, pin::Pin, time::Duration};
 use tokio::{
     io::{AsyncRead, AsyncWrite},
     net::{TcpListener, TcpStream},
-    sync::{Semaphore, watch},
+    sync::watch,
 };
 use tokio_io_timeout::TimeoutStream;
 use tokio_rustls::TlsAcceptor;
@@ -35,44 +30,6 @@ use tower::ServiceExt as _;
 const HEAD_MAX: usize = 32 << 10;
 /// Time that open requests have to end when the server stops.
 const STOP_GRACE: Duration = Duration::from_secs(5);
-/// Pause after a failed accept: usually too many open files.
-const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
-
-/// Open connections by address. An address without any is forgotten, so there are no more than connections.
-#[derive(Debug, Default)]
-struct Addresses(Mutex<BTreeMap<IpAddr, usize>>);
-
-/// One connection of an address.
-struct OfAddress {
-    all: Arc<Addresses>,
-    ip: IpAddr,
-}
-
-impl Addresses {
-    /// One more of an address; `None` if it has as many as it may have.
-    fn take(self: &Arc<Self>, ip: IpAddr, most: usize) -> Option<OfAddress> {
-        let mut open = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let count = open.entry(ip).or_default();
-        if *count >= most {
-            return None;
-        }
-        *count += 1;
-        Some(OfAddress { all: self.clone(), ip })
-    }
-}
-
-impl Drop for OfAddress {
-    fn drop(&mut self) {
-        let mut open = self.all.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(count) = open.get_mut(&self.ip) {
-            *count -= 1;
-            if *count == 0 {
-                open.remove(&self.ip);
-            }
-        }
-    }
-}
-
 /// How connections are served.
 #[derive(Clone)]
 struct Serving<Answer> {
@@ -91,10 +48,8 @@ pub(crate) async fn serve<Answering: Future<Output = Result<Response, Infallible
     answer: impl Fn(Request) -> Answering + Clone + Send + Sync + 'static,
     tls: Option<TlsAcceptor>,
     limits: Limits,
-    mut stopping: watch::Receiver<bool>,
+    stopping: watch::Receiver<bool>,
 ) {
-    let places = Arc::new(Semaphore::new(limits.connections));
-    let addresses = Arc::<Addresses>::default();
     let graceful = GracefulShutdown::new();
     let header_timeout = Duration::from_secs(limits.header_timeout_s);
     let mut http = http1::Builder::new();
@@ -107,25 +62,17 @@ pub(crate) async fn serve<Answering: Future<Output = Result<Response, Infallible
         header_timeout,
         write_timeout: Duration::from_secs(limits.write_timeout_s),
     };
-    loop {
-        let accepted = tokio::select! {
-            _ = stopping.wait_for(|stop| *stop) => break,
-            accepted = accept(&listener, &places) => accepted,
-        };
-        let Some((stream, peer, place)) = accepted else { continue };
-        let ip = peer.ip().to_canonical();
-        let Some(of_address) = addresses.take(ip, limits.connections_per_address) else {
-            tracing::debug!(%ip, most = limits.connections_per_address, "connection_closed_too_many_of_address");
-            continue;
-        };
+    let bounds = Bounds { all: limits.connections, of_address: limits.connections_per_address };
+    accept_each(&listener, bounds, stopping, |stream, peer, place| {
         let (serving, watcher) = (serving.clone(), graceful.watcher());
         tokio::spawn(async move {
             if let Err(error) = serving.connection(stream, peer, watcher).await {
                 tracing::debug!(error, "connection");
             }
-            drop((of_address, place));
+            drop(place);
         });
-    }
+    })
+    .await;
     drop(listener);
     if tokio::time::timeout(STOP_GRACE, graceful.shutdown()).await.is_err() {
         tracing::warn!("some HTTP requests did not end in time");
@@ -190,30 +137,10 @@ fn within<T>(done: Result<io::Result<T>, tokio::time::error::Elapsed>) -> Result
     done.map_err(|elapsed| elapsed.to_string())?.map_err(|error| error.to_string())
 }
 
-async fn accept(
-    listener: &TcpListener,
-    places: &Arc<Semaphore>,
-) -> Option<(tokio::net::TcpStream, SocketAddr, tokio::sync::OwnedSemaphorePermit)> {
-    // Place first: beyond the bound, connections wait in the system's queue and cost no memory here.
-    let place = places.clone().acquire_owned().await.ok()?;
-    match listener.accept().await {
-        Ok((stream, peer)) => {
-            // Answers are small and whole; waiting to fill a packet only delays them.
-            drop(stream.set_nodelay(true));
-            Some((stream, peer, place))
-        }
-        Err(error) => {
-            tracing::warn!(%error, "accept");
-            tokio::time::sleep(ACCEPT_PAUSE).await;
-            None
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::identity::certificates::Certificates;
+    use crate::identity::certificates::{Certificates, acceptor};
     use axum::{
         body::Bytes,
         response::{Sse, sse::Event},
@@ -255,19 +182,6 @@ mod tests {
         let head = format!("GET {path} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n");
         stream.write_all(head.as_bytes()).await.unwrap();
         stream
-    }
-
-    #[test]
-    fn connections_of_an_address_at_the_bound() {
-        let all = Arc::<Addresses>::default();
-        let ip = |last| IpAddr::from([192, 0, 2, last]);
-        let held: Vec<_> = (0..3).map(|_| all.take(ip(1), 3)).collect();
-        assert!(held.iter().all(Option::is_some));
-        assert!(all.take(ip(1), 3).is_none());
-        assert!(all.take(ip(2), 3).is_some(), "another address has its own");
-        drop(held);
-        assert!(all.0.lock().unwrap().is_empty());
-        assert!(all.take(ip(1), 3).is_some());
     }
 
     #[tokio::test]
@@ -312,7 +226,7 @@ mod tests {
         let secret = Router::new().fallback(async || "secret");
         let serving = Serving {
             http: http1::Builder::new(),
-            tls: Some(encryption::acceptor(certificates.current()).unwrap()),
+            tls: Some(acceptor(certificates.current(), None, &[b"http/1.1"]).unwrap()),
             answer: move |request| secret.clone().oneshot(request),
             refusing: encryption::refusing(),
             header_timeout: second,

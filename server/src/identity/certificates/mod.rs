@@ -1,6 +1,7 @@
 //! Certificates. In: the settings of encryption and the folder `tls` of the data directory. Out: the server's certificate in
 //! use, for HTTP and zenoh, and certificates of robots.
 
+mod acceptor;
 mod authority;
 mod link;
 mod registry;
@@ -8,6 +9,7 @@ mod server;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use acceptor::acceptor;
 pub(crate) use authority::{Authority, common_name};
 pub(crate) use link::LinkCertificates;
 pub(crate) use registry::CertificateRegistry;

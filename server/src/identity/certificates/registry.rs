@@ -1,6 +1,7 @@
 //! Robots' certificates in memory. In: the rows after each commit. Out: which of them are valid, and robots that have lost
 //! theirs.
 
+use super::common_name;
 use arc_swap::ArcSwap;
 use protos::{Name, api::RobotCertificate};
 use std::{collections::BTreeMap, sync::Arc, time::Duration};
@@ -55,13 +56,18 @@ impl CertificateRegistry {
         matches!(tokio::time::timeout(APPLY, applied.wait_for(|count| *count >= wanted)).await, Ok(Ok(_)))
     }
 
-    /// Serials of the valid certificates of each robot.
-    pub(crate) fn valid(&self, now_ms: i64) -> BTreeMap<String, Vec<String>> {
-        let of = |all: &Vec<RobotCertificate>| -> Vec<String> {
-            all.iter().filter(|c| is_valid(c, now_ms)).map(|c| c.serial.clone()).collect()
-        };
+    /// Robots that have, or had, a certificate.
+    pub(crate) fn holders(&self) -> Vec<String> {
+        self.by_robot.load().keys().cloned().collect()
+    }
+
+    /// The robot with a valid certificate of this common name.
+    pub(crate) fn holder(&self, name: &str, now_ms: i64) -> Option<String> {
         let all = self.by_robot.load();
-        all.iter().map(|(robot, all)| (robot.clone(), of(all))).filter(|(_, all)| !all.is_empty()).collect()
+        let of = |certificate: &&RobotCertificate| {
+            is_valid(certificate, now_ms) && common_name(&certificate.robot, &certificate.serial) == name
+        };
+        all.values().flatten().find(of).map(|certificate| certificate.robot.clone())
     }
 
     /// Whether messages of a robot are taken: not where it had certificates and none is valid any more. One that never had
@@ -95,6 +101,9 @@ mod tests {
         let admits = |robot: &str, now_ms| registry.admits(&Name::new(robot).unwrap(), now_ms);
         assert_eq!((admits("r1", 99), admits("r1", 100)), (true, false));
         assert_eq!((admits("r2", 1), admits("r3", 1)), (false, true));
-        assert_eq!(registry.valid(99), [("r1".to_owned(), vec!["b".to_owned()])].into());
+        let holder = |name: &str, now_ms| registry.holder(name, now_ms);
+        assert_eq!((holder("r1.b", 99), holder("r1.b", 100)), (Some("r1".into()), None));
+        assert_eq!((holder("r1.a", 1), holder("r1", 1), holder("r2.c", 1)), (None, None, None));
+        assert_eq!(registry.holders(), ["r1", "r2"]);
     }
 }

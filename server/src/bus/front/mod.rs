@@ -1,0 +1,213 @@
+//! Where robots connect. In: TCP connections, with TLS where it is on. Out: each is relayed to a router of this process, which
+//! no other program reaches: plain ones to the server's own, those with a certificate to the gate, under the robot's name.
+//!
+//! zenoh's own listener of TLS reads and writes one stream from two threads at once (eclipse-zenoh/zenoh#2557); this one does
+//! not. Handshakes have a deadline and places of their own, a robot has [`LINKS_OF_ROBOT`] connections, and what a connection
+//! sends is read before a router gets it ([`inspection`]), at a bounded pace ([`pace`]).
+
+mod admission;
+mod inspection;
+mod pace;
+mod relay;
+#[cfg(test)]
+mod tests;
+mod to_gate;
+
+pub(super) use admission::Admission;
+pub(super) use to_gate::ToGate;
+
+use super::{BusError, router::SPARE_SESSIONS};
+use crate::accepting::{Bounds, Place, Shares, accept_each};
+use protos::Name;
+use relay::{End, ToRouter, relay};
+use std::{
+    collections::BTreeMap,
+    net::SocketAddr,
+    path::PathBuf,
+    sync::{Arc, Mutex, PoisonError},
+    time::{Duration, Instant},
+};
+use tokio::{
+    io::{AsyncRead, AsyncWrite, AsyncWriteExt as _},
+    net::{TcpListener, TcpStream, UnixStream},
+    sync::{Semaphore, watch},
+    task::{JoinHandle, JoinSet},
+    time::timeout,
+};
+
+/// Handshakes at once: of all, and of one address.
+const HANDSHAKES: Bounds = Bounds { all: 4096, of_address: 2048 };
+/// Longest handshake.
+const HANDSHAKE: Duration = Duration::from_secs(10);
+/// Connections of one robot: its programs, and one that ends while the next begins.
+pub(crate) const LINKS_OF_ROBOT: usize = 16;
+/// How often the same refusal of the same robot is in the log.
+const TELL_EVERY: Duration = Duration::from_mins(1);
+/// Refusals that are remembered for that. Further ones are told each time.
+const TOLD: usize = 1024;
+/// Time that connections have to end in order.
+const STOP_GRACE: Duration = Duration::from_secs(3);
+
+/// Where connections lead.
+pub(super) enum Way {
+    /// To the server's own router, whoever it is.
+    Plain(PathBuf),
+    /// To the gate, where the client's certificate is a robot's.
+    Certified(Arc<Admission>, ToGate),
+}
+
+/// A listener at work.
+pub(super) struct Front {
+    stop: watch::Sender<bool>,
+    task: JoinHandle<()>,
+}
+
+/// What all connections of a listener share.
+struct Connections {
+    way: Way,
+    places: Arc<Semaphore>,
+    of_robot: Arc<Shares<Name>>,
+    told: Mutex<BTreeMap<(String, String), Instant>>,
+}
+
+/// A socket of the address of an endpoint, and the endpoint with its real port.
+pub(super) async fn bind(endpoint: &str) -> Result<(TcpListener, String), BusError> {
+    let fault = |detail: String| BusError::Listen { endpoint: endpoint.to_owned(), detail };
+    let (protocol, address) =
+        endpoint.split_once('/').ok_or_else(|| fault("it is no endpoint".to_owned()))?;
+    let listener = TcpListener::bind(address).await.map_err(|e| fault(e.to_string()))?;
+    let port = listener.local_addr().map_err(|e| fault(e.to_string()))?.port();
+    let real = match address.strip_suffix(":0") {
+        Some(host) => format!("{protocol}/{host}:{port}"),
+        None => endpoint.to_owned(),
+    };
+    Ok((listener, real))
+}
+
+impl Front {
+    /// Takes connections from now on; at most `robots`, and some to spare.
+    pub(super) fn open(listener: TcpListener, way: Way, robots: usize) -> Self {
+        let connections = Arc::new(Connections {
+            way,
+            places: Arc::new(Semaphore::new(robots + SPARE_SESSIONS)),
+            of_robot: Arc::default(),
+            told: Mutex::default(),
+        });
+        let (stop, stopping) = watch::channel(false);
+        let task = tokio::spawn(async move {
+            let mut open = JoinSet::new();
+            accept_each(&listener, HANDSHAKES, stopping, |stream, peer, place| {
+                while open.try_join_next().is_some() {}
+                open.spawn(connections.clone().connection(stream, peer, place));
+            })
+            .await;
+            drop(listener);
+            // The routers close their sessions next; what is left after that is cut.
+            drop(timeout(STOP_GRACE, async { while open.join_next().await.is_some() {} }).await);
+        });
+        Self { stop, task }
+    }
+
+    /// Takes no connection any more. Those that are open end with their routers.
+    pub(super) fn stop(&self) {
+        self.stop.send_replace(true);
+    }
+
+    /// Waits until all have ended, which they do three seconds after [`Front::stop`] at the latest.
+    pub(super) async fn ended(self) {
+        if let Err(error) = self.task.await {
+            tracing::error!(%error, "front_panicked");
+        }
+    }
+}
+
+/// Closes an encrypted connection, and reads what was on the way: the client can tell this end from a certificate that is not
+/// believed.
+async fn end_in_order(mut stream: impl AsyncRead + AsyncWrite + Unpin) {
+    let ended = async {
+        stream.shutdown().await?;
+        tokio::io::copy(&mut stream, &mut tokio::io::sink()).await
+    };
+    drop(timeout(STOP_GRACE, ended).await);
+}
+
+impl Connections {
+    async fn connection(self: Arc<Self>, stream: TcpStream, peer: SocketAddr, place: Place) {
+        match &self.way {
+            Way::Plain(router) => {
+                let router = match timeout(HANDSHAKE, UnixStream::connect(router)).await {
+                    Ok(Ok(router)) => router,
+                    failed => return tracing::error!(?failed, "router_not_reached"),
+                };
+                drop(place);
+                let (read, write) = router.into_split();
+                self.relayed(None, peer, stream, ToRouter { read, write }).await;
+            }
+            Way::Certified(admission, gate) => {
+                let handshake = admission.acceptor().accept(stream);
+                let stream = match timeout(HANDSHAKE, handshake).await {
+                    Ok(Ok(stream)) => stream,
+                    Ok(Err(error)) => return self.refused(&peer.ip().to_string(), &error.to_string()),
+                    Err(_) => return self.refused(&peer.ip().to_string(), "the handshake is not complete"),
+                };
+                drop(place);
+                let certificate = stream.get_ref().1.peer_certificates().and_then(<[_]>::first);
+                let admitted = match admission.admit(certificate.map_or(&[], |certificate| certificate)) {
+                    Ok(admitted) => admitted,
+                    Err(error) => {
+                        self.refused(&peer.ip().to_string(), &error.to_string());
+                        return end_in_order(stream).await;
+                    }
+                };
+                let robot = &admitted.robot;
+                let Some(_share) = self.of_robot.take(robot.clone(), LINKS_OF_ROBOT) else {
+                    let why = format!("it has {LINKS_OF_ROBOT} connections: end some of its programs");
+                    self.refused(robot.as_str(), &why);
+                    return end_in_order(stream).await;
+                };
+                let mut at_gate = match gate.connect(robot).await {
+                    Ok(at_gate) => at_gate,
+                    Err(error) => return tracing::error!(%error, %robot, "gate_not_reached"),
+                };
+                let ToRouter { read, write } = &mut at_gate.ends;
+                tokio::select! {
+                    () = self.relayed(Some(robot), peer, stream, ToRouter { read, write }) => {}
+                    why = admission.lapse(&admitted) => self.refused(robot.as_str(), why),
+                }
+            }
+        }
+    }
+
+    /// Relays until it ends, if there is a place.
+    async fn relayed<R: AsyncRead + Unpin, W: AsyncWrite + Unpin>(
+        &self,
+        robot: Option<&Name>,
+        peer: SocketAddr,
+        stream: impl AsyncRead + AsyncWrite + Unpin,
+        router: ToRouter<R, W>,
+    ) {
+        let who = robot.map_or_else(|| peer.ip().to_string(), ToString::to_string);
+        let Ok(_place) = self.places.clone().try_acquire_owned() else {
+            return self.refused(&who, "there are as many connections as `limits.robots` allows");
+        };
+        match relay(stream, router).await {
+            End::Closed(error) => tracing::debug!(%error, who, %peer, "robot_connection_closed"),
+            End::Violation(violation) => self.refused(&who, &violation.to_string()),
+        }
+    }
+
+    /// Tells whoever runs the server, once in a while for each reason.
+    fn refused(&self, who: &str, why: &str) {
+        let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
+        let now = Instant::now();
+        told.retain(|_, at| now.duration_since(*at) < TELL_EVERY);
+        let key = (who.to_owned(), why.to_owned());
+        if told.contains_key(&key) {
+            return tracing::debug!(who, why, "robot_connection_refused");
+        }
+        tracing::warn!(who, why, follows = "its connection is closed", "robot_connection_refused");
+        if told.len() < TOLD {
+            told.insert(key, now);
+        }
+    }
+}
