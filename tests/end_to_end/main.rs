@@ -39,6 +39,7 @@ mod moved_landmark;
 mod other_map;
 mod packages;
 mod planted;
+mod private_files;
 mod promises;
 mod recordings;
 mod repeated_creations;
