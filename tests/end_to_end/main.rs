@@ -11,6 +11,7 @@ mod certificates;
 mod clock_jumps;
 mod clocks;
 mod command_line;
+mod damaged_index;
 mod demo;
 mod detect_command;
 mod disk_errors;

@@ -2410,6 +2410,25 @@ export interface components {
             /** @description What it is. */
             token: components["schemas"]["Token"];
         };
+        /** @description The check of every page, row and index of the database that runs once after each start. */
+        DatabaseCheckBody: {
+            /** @description What to do where it failed. */
+            advice?: string | null;
+            /**
+             * Format: int64
+             * @description When it ended, ms since the Unix epoch.
+             */
+            ended_ms?: number | null;
+            /** @description What is wrong, at most 20; empty for whoever does not see all maps. */
+            faults?: string[];
+            /** @description How far it is. */
+            state: components["schemas"]["DatabaseCheckState"];
+        };
+        /**
+         * @description How far the check of the database is.
+         * @enum {string}
+         */
+        DatabaseCheckState: "running" | "ok" | "failed";
         /** @description What differs between a map at two commits. */
         Difference: {
             /**
@@ -4402,6 +4421,7 @@ export interface components {
              *     without one. The picture is not used; the same photograph, uploaded again, mends it.
              */
             damaged_pictures?: string[];
+            database_check?: components["schemas"]["DatabaseCheckBody"] | null;
             /**
              * @description Maps whose stored version cannot be made ready, with the reason: an earlier version is used, or none since the
              *     server started. A later change of the map tries again. Only maps of the token that asks: none without one.
@@ -4437,7 +4457,7 @@ export interface components {
             router?: string | null;
             /**
              * @description `ready`, or `degraded`: everything runs, but one of `counts` is not 0, the disk has no room, the server has no part in
-             *     its router, another server has one of its maps, or the last scheduled backup failed.
+             *     its router, another server has one of its maps, the last scheduled backup failed, or the check of the database did.
              */
             status: string;
             storage?: components["schemas"]["StorageHealth"] | null;
