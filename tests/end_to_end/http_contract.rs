@@ -22,6 +22,10 @@ const ROWS: &[Row<'_>] = &[
     ("POST", "/maps", r#"{"name": 3}"#, 422, "invalid_value", "name"),
     ("POST", "/maps", r#"{"name": "a", "colour": 1}"#, 422, "invalid_value", "colour"),
     ("POST", "/maps", r#"{"name": "a", "distance": "cosine"}"#, 422, "invalid_value", "distance"),
+    // A list where the schema says object.
+    ("POST", "/maps", r#"["other"]"#, 422, "invalid_value", "body"),
+    ("PATCH", "/maps/hall", "[]", 422, "invalid_value", "body"),
+    ("PATCH", "/maps/hall/landmarks/p1", r#"{"size": [0.6, 0.84]}"#, 422, "invalid_value", "size"),
     ("POST", "/maps", r#"{"name": ""}"#, 422, "bad_name", "name"),
     ("POST", "/maps", r#"{"name": "A/B"}"#, 422, "bad_name", "name"),
     ("POST", "/maps", r#"{"name": "hall"}"#, 409, "exists", "name"),

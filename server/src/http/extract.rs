@@ -1,7 +1,7 @@
 //! From bytes to checked values: JSON bodies within their bound, names in paths, pages in queries. Every failure is a
 //! problem with a code and a field.
 
-use super::{AppState, error::ApiError};
+use super::{AppState, error::ApiError, objects::Objects};
 use axum::{
     body::HttpBody,
     extract::{FromRequest, FromRequestParts, OptionalFromRequest, Path, Query, Request},
@@ -71,10 +71,11 @@ pub(super) fn too_large(max: usize) -> ApiError {
     ApiError::new(StatusCode::PAYLOAD_TOO_LARGE, "too_large", detail).field("body")
 }
 
-/// Reads JSON; what is wrong is named by its path, inside `outer` if that is not empty.
+/// Reads JSON; what is wrong is named by its path, inside `outer` if that is not empty. A list is no object anywhere
+/// ([`Objects`]): every body and every part of a form comes this way.
 pub(super) fn json<T: DeserializeOwned>(bytes: &[u8], outer: &str) -> Result<T, ApiError> {
     let mut reader = serde_json::Deserializer::from_slice(bytes);
-    let value = serde_path_to_error::deserialize(&mut reader).map_err(|error| {
+    let value = serde_path_to_error::deserialize(Objects(&mut reader)).map_err(|error| {
         let path = error.path().to_string();
         // "." is the whole, "?" a place that was not reached.
         let path = if path == "." || path == "?" { String::new() } else { path };

@@ -64,6 +64,7 @@ mod views;
 mod visibility;
 mod visibility_settings;
 mod walls;
+mod objects;
 pub(crate) mod listen;
 #[cfg(test)]
 mod tests;

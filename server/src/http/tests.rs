@@ -8,6 +8,7 @@ mod lists;
 mod metrics;
 mod localise;
 mod numbers;
+mod objects;
 mod openapi;
 mod page_sessions;
 mod readiness;
