@@ -1,6 +1,7 @@
 //! End-to-end claims, one file each, against a real server.
 
 mod administration;
+mod ambiguous_requests;
 mod api_client;
 mod audit;
 mod backups;

@@ -5,7 +5,7 @@
 //! changes anything, come from its own pages or from no page at all. Who asks is the matter of `authorise`.
 
 use super::{
-    App, authorise,
+    App, ambiguous, authorise,
     error::ApiError,
     peer::Peer,
     request_id::{REQUEST_ID, RequestId},
@@ -50,7 +50,9 @@ pub(super) async fn guard<Answering: Future<Output = Response>>(
     let token = is_bound.then(|| authorise::token(app, request.headers(), started)).flatten();
     let asking = is_bound.then(|| asking(token, peer.as_ref())).flatten();
     let may_ask = asking.map_or(Ok(()), |who| app.rates.take(who, started));
-    let checked = check_origin(request.method(), request.headers(), loopback).and(may_ask);
+    let checked = ambiguous::check(&request)
+        .and_then(|()| check_origin(request.method(), request.headers(), loopback))
+        .and(may_ask);
     let kept = token.filter(|_| checked.is_ok()).and_then(|token| reused_answers::kept(app, &request, token));
     let kept_route = kept.as_ref().map(|kept| kept.route);
     let mut response = match (checked, kept) {

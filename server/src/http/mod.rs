@@ -64,6 +64,7 @@ mod views;
 mod visibility;
 mod visibility_settings;
 mod walls;
+mod ambiguous;
 mod objects;
 pub(crate) mod listen;
 #[cfg(test)]

@@ -5624,7 +5624,7 @@ export interface operations {
                     "application/json": components["schemas"]["Page_StoredAnswerSummary"];
                 };
             };
-            /** @description bad_query */
+            /** @description repeated_header, foreign_authority, bad_query */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -5715,6 +5715,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["StoredAnswer"];
+                };
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
             /** @description unauthenticated: the role viewer is needed */
@@ -5809,6 +5818,15 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content?: never;
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
             };
             /** @description unauthenticated: the role viewer is needed */
             401: {
@@ -5905,7 +5923,7 @@ export interface operations {
                     "application/json": components["schemas"]["Page_AuditEntry"];
                 };
             };
-            /** @description bad_query */
+            /** @description repeated_header, foreign_authority, bad_query */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -6001,7 +6019,7 @@ export interface operations {
                     "application/json": components["schemas"]["AuditCheck"];
                 };
             };
-            /** @description bad_query */
+            /** @description repeated_header, foreign_authority, bad_query */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -6097,7 +6115,7 @@ export interface operations {
                     "application/json": components["schemas"]["Page_Backup"];
                 };
             };
-            /** @description bad_query */
+            /** @description repeated_header, foreign_authority, bad_query */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -6186,6 +6204,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["Backup"];
+                };
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
             /** @description unauthenticated: the role admin is needed */
@@ -6281,6 +6308,15 @@ export interface operations {
                     "application/json": components["schemas"]["Backup"];
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role admin is needed */
             401: {
                 headers: {
@@ -6362,6 +6398,15 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content?: never;
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
             };
             /** @description unauthenticated: the role admin is needed */
             401: {
@@ -6454,6 +6499,15 @@ export interface operations {
                 };
                 content: {
                     "application/octet-stream": unknown;
+                };
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
             /** @description unauthenticated: the role admin is needed */
@@ -6551,7 +6605,7 @@ export interface operations {
                     "application/json": components["schemas"]["Map"];
                 };
             };
-            /** @description bad_query, bad_body */
+            /** @description repeated_header, foreign_authority, bad_query, bad_body */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -6700,7 +6754,7 @@ export interface operations {
                     "text/event-stream": components["schemas"]["ServerEvent"];
                 };
             };
-            /** @description bad_query */
+            /** @description repeated_header, foreign_authority, bad_query */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -6800,6 +6854,15 @@ export interface operations {
                     "application/json": components["schemas"]["Health"];
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description host_not_allowed, origin_not_allowed */
             403: {
                 headers: {
@@ -6873,7 +6936,7 @@ export interface operations {
                     "application/json": components["schemas"]["Page_Job"];
                 };
             };
-            /** @description bad_query */
+            /** @description repeated_header, foreign_authority, bad_query */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -6966,6 +7029,15 @@ export interface operations {
                     "application/json": components["schemas"]["Job"];
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role viewer is needed */
             401: {
                 headers: {
@@ -7048,6 +7120,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["Job"];
+                };
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
             /** @description unauthenticated: the role teacher is needed */
@@ -7143,6 +7224,15 @@ export interface operations {
                     "text/event-stream": components["schemas"]["Job"];
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role viewer is needed */
             401: {
                 headers: {
@@ -7234,7 +7324,7 @@ export interface operations {
                     "application/json": components["schemas"]["Page_Map"];
                 };
             };
-            /** @description bad_query */
+            /** @description repeated_header, foreign_authority, bad_query */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -7340,7 +7430,7 @@ export interface operations {
                     "application/json": components["schemas"]["Map"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -7480,6 +7570,15 @@ export interface operations {
                     "application/json": components["schemas"]["Map"];
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role viewer is needed */
             401: {
                 headers: {
@@ -7569,6 +7668,15 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content?: never;
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
             };
             /** @description unauthenticated: the role admin is needed */
             401: {
@@ -7720,7 +7828,7 @@ export interface operations {
                     "application/json": components["schemas"]["Map"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -7901,7 +8009,7 @@ export interface operations {
                     "application/json": components["schemas"]["BulkOutcome"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -8055,7 +8163,7 @@ export interface operations {
                     "application/json": components["schemas"]["BulkOutcome"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -8193,6 +8301,15 @@ export interface operations {
                     "application/zip": unknown;
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role teacher is needed */
             401: {
                 headers: {
@@ -8291,7 +8408,7 @@ export interface operations {
                     "application/json": components["schemas"]["Page_Commit"];
                 };
             };
-            /** @description bad_query */
+            /** @description repeated_header, foreign_authority, bad_query */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -8394,6 +8511,15 @@ export interface operations {
                     "application/json": components["schemas"]["Commit"];
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role viewer is needed */
             401: {
                 headers: {
@@ -8487,6 +8613,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["RollbackOutcome"];
+                };
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
             /** @description unauthenticated: the role operator is needed */
@@ -8632,7 +8767,7 @@ export interface operations {
                     "application/json": components["schemas"]["Map"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -8792,7 +8927,7 @@ export interface operations {
                     "application/json": components["schemas"]["CoverageResponse"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -8930,7 +9065,7 @@ export interface operations {
                     "application/json": components["schemas"]["Difference"];
                 };
             };
-            /** @description bad_query */
+            /** @description repeated_header, foreign_authority, bad_query */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -9032,6 +9167,15 @@ export interface operations {
                     "application/json": components["schemas"]["Page_Draft"];
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role viewer is needed */
             401: {
                 headers: {
@@ -9130,7 +9274,7 @@ export interface operations {
                     "application/json": components["schemas"]["Draft"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -9270,6 +9414,15 @@ export interface operations {
                 };
                 content?: never;
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role teacher is needed */
             401: {
                 headers: {
@@ -9387,7 +9540,7 @@ export interface operations {
                     "application/json": components["schemas"]["DraftDifference"];
                 };
             };
-            /** @description bad_query */
+            /** @description repeated_header, foreign_authority, bad_query */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -9507,6 +9660,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["RollbackOutcome"];
+                };
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
             /** @description unauthenticated: the role operator is needed */
@@ -9645,7 +9807,7 @@ export interface operations {
                     "application/json": components["schemas"]["Replay"];
                 };
             };
-            /** @description bad_query */
+            /** @description repeated_header, foreign_authority, bad_query */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -9765,7 +9927,7 @@ export interface operations {
                     "application/json": components["schemas"]["Page_DuplicatePair"];
                 };
             };
-            /** @description bad_query */
+            /** @description repeated_header, foreign_authority, bad_query */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -9872,7 +10034,7 @@ export interface operations {
                     "application/json": components["schemas"]["Page_Gathering"];
                 };
             };
-            /** @description bad_query */
+            /** @description repeated_header, foreign_authority, bad_query */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -9989,7 +10151,7 @@ export interface operations {
                     "application/json": components["schemas"]["Gathering"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -10128,6 +10290,15 @@ export interface operations {
                     "application/json": components["schemas"]["Gathering"];
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role viewer is needed */
             401: {
                 headers: {
@@ -10213,6 +10384,15 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content?: never;
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
             };
             /** @description unauthenticated: the role teacher is needed */
             401: {
@@ -10346,7 +10526,7 @@ export interface operations {
                     "application/json": components["schemas"]["AcceptanceBody"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -10488,6 +10668,15 @@ export interface operations {
                     "application/json": components["schemas"]["Gathering"];
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role teacher is needed */
             401: {
                 headers: {
@@ -10591,6 +10780,15 @@ export interface operations {
                     "application/json": components["schemas"]["TrackList"];
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role viewer is needed */
             401: {
                 headers: {
@@ -10677,6 +10875,15 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content?: never;
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
             };
             /** @description unauthenticated: the role teacher is needed */
             401: {
@@ -10789,6 +10996,15 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content?: never;
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
             };
             /** @description unauthenticated: the role viewer is needed */
             401: {
@@ -10912,7 +11128,7 @@ export interface operations {
                     "application/json": components["schemas"]["GazeRankingBody"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -11056,7 +11272,7 @@ export interface operations {
                     "application/json": components["schemas"]["Page_Landmark"];
                 };
             };
-            /** @description bad_query */
+            /** @description repeated_header, foreign_authority, bad_query */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -11182,7 +11398,7 @@ export interface operations {
                     "application/json": components["schemas"]["Landmark"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -11323,6 +11539,15 @@ export interface operations {
                     "application/json": components["schemas"]["Landmark"];
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role viewer is needed */
             401: {
                 headers: {
@@ -11413,6 +11638,15 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content?: never;
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
             };
             /** @description unauthenticated: the role teacher is needed */
             401: {
@@ -11565,7 +11799,7 @@ export interface operations {
                     "application/json": components["schemas"]["Landmark"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -11722,6 +11956,15 @@ export interface operations {
                     "application/json": components["schemas"]["LandmarkDistances"];
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role viewer is needed */
             401: {
                 headers: {
@@ -11805,6 +12048,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["LandmarkEvidence"];
+                };
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
             /** @description unauthenticated: the role viewer is needed */
@@ -11898,6 +12150,15 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content?: never;
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
             };
             /** @description unauthenticated: the role viewer is needed */
             401: {
@@ -11998,7 +12259,7 @@ export interface operations {
                     "application/json": components["schemas"]["Job"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -12156,7 +12417,7 @@ export interface operations {
                     "application/json": components["schemas"]["Landmark"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -12313,6 +12574,15 @@ export interface operations {
                     "application/json": components["schemas"]["LandmarkModelDetail"];
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role viewer is needed */
             401: {
                 headers: {
@@ -12396,6 +12666,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["Page_RefusedView"];
+                };
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
             /** @description unauthenticated: the role viewer is needed */
@@ -12490,6 +12769,15 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content?: never;
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
             };
             /** @description unauthenticated: the role viewer is needed */
             401: {
@@ -12589,7 +12877,7 @@ export interface operations {
                     "application/json": components["schemas"]["Page_TrainingView"];
                 };
             };
-            /** @description bad_query */
+            /** @description repeated_header, foreign_authority, bad_query */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -12718,7 +13006,7 @@ export interface operations {
                     "application/json": components["schemas"]["TrainingView"];
                 };
             };
-            /** @description bad_multipart, bad_json */
+            /** @description repeated_header, foreign_authority, bad_multipart, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -12859,6 +13147,15 @@ export interface operations {
                 };
                 content?: never;
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role teacher is needed */
             401: {
                 headers: {
@@ -12970,6 +13267,15 @@ export interface operations {
                 };
                 content?: never;
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role viewer is needed */
             401: {
                 headers: {
@@ -13062,6 +13368,15 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content?: never;
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
             };
             /** @description unauthenticated: the role viewer is needed */
             401: {
@@ -13177,7 +13492,7 @@ export interface operations {
                     "application/json": Record<string, never>;
                 };
             };
-            /** @description bad_query */
+            /** @description bad_query, repeated_header, foreign_authority */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -13305,7 +13620,7 @@ export interface operations {
                     "application/json": components["schemas"]["Job"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -13443,6 +13758,15 @@ export interface operations {
                     "text/event-stream": unknown;
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role viewer is needed */
             401: {
                 headers: {
@@ -13542,7 +13866,7 @@ export interface operations {
                     "application/json": components["schemas"]["LocaliseResult"];
                 };
             };
-            /** @description bad_multipart, bad_json */
+            /** @description repeated_header, foreign_authority, bad_multipart, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -13671,6 +13995,15 @@ export interface operations {
                     "application/json": components["schemas"]["MappingProgressBody"];
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role viewer is needed */
             401: {
                 headers: {
@@ -13772,7 +14105,7 @@ export interface operations {
                     "application/json": components["schemas"]["MappingProgressBody"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -13911,6 +14244,15 @@ export interface operations {
                 };
                 content?: never;
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role teacher is needed */
             401: {
                 headers: {
@@ -14016,6 +14358,15 @@ export interface operations {
                     "application/json": components["schemas"]["MappingProgressBody"];
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role teacher is needed */
             401: {
                 headers: {
@@ -14118,6 +14469,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["ModalityMapBody"];
+                };
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
             /** @description unauthenticated: the role viewer is needed */
@@ -14246,7 +14606,7 @@ export interface operations {
                     "application/json": components["schemas"]["ModalityMapBody"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -14400,7 +14760,7 @@ export interface operations {
                     "application/json": components["schemas"]["AreaStatsBody"];
                 };
             };
-            /** @description bad_query */
+            /** @description repeated_header, foreign_authority, bad_query */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -14516,7 +14876,7 @@ export interface operations {
                     "application/json": Record<string, never>;
                 };
             };
-            /** @description bad_multipart, bad_json */
+            /** @description repeated_header, foreign_authority, bad_multipart, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -14645,6 +15005,15 @@ export interface operations {
                     "application/json": components["schemas"]["ReferenceRuns"];
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role viewer is needed */
             401: {
                 headers: {
@@ -14730,6 +15099,15 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content?: never;
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
             };
             /** @description unauthenticated: the role operator is needed */
             401: {
@@ -14852,7 +15230,7 @@ export interface operations {
                     "application/json": components["schemas"]["RollbackOutcome"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -15017,7 +15395,7 @@ export interface operations {
                     "application/json": components["schemas"]["TransformResponse"];
                 };
             };
-            /** @description bad_query */
+            /** @description bad_query, repeated_header, foreign_authority */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -15130,6 +15508,15 @@ export interface operations {
                     "application/json": components["schemas"]["Underlay"];
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role viewer is needed */
             401: {
                 headers: {
@@ -15237,7 +15624,7 @@ export interface operations {
                     "application/json": components["schemas"]["Underlay"];
                 };
             };
-            /** @description bad_multipart, bad_json */
+            /** @description repeated_header, foreign_authority, bad_multipart, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -15390,6 +15777,15 @@ export interface operations {
                 };
                 content?: never;
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role teacher is needed */
             401: {
                 headers: {
@@ -15517,6 +15913,15 @@ export interface operations {
                 };
                 content?: never;
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role viewer is needed */
             401: {
                 headers: {
@@ -15601,6 +16006,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["VisibilitySettingsBody"];
+                };
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
             /** @description unauthenticated: the role viewer is needed */
@@ -15709,7 +16123,7 @@ export interface operations {
                     "application/json": components["schemas"]["VisibilitySettingsBody"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -15872,7 +16286,7 @@ export interface operations {
                     "application/json": components["schemas"]["VisibleResponse"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -16001,6 +16415,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["WallsBody"];
+                };
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
             /** @description unauthenticated: the role viewer is needed */
@@ -16132,7 +16555,7 @@ export interface operations {
                     "application/json": components["schemas"]["WallsBody"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -16278,6 +16701,15 @@ export interface operations {
                     "application/openmetrics-text": string;
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role viewer is needed */
             401: {
                 headers: {
@@ -16349,6 +16781,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["Readiness"];
+                };
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
             /** @description host_not_allowed, origin_not_allowed */
@@ -16424,7 +16865,7 @@ export interface operations {
                     "application/json": components["schemas"]["Page_Robot"];
                 };
             };
-            /** @description bad_query */
+            /** @description repeated_header, foreign_authority, bad_query */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -16515,6 +16956,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["Robot"];
+                };
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
             /** @description unauthenticated: the role viewer is needed */
@@ -16610,7 +17060,7 @@ export interface operations {
                     "application/json": components["schemas"]["Robot"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -16745,6 +17195,15 @@ export interface operations {
                 };
                 content?: never;
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role operator is needed */
             401: {
                 headers: {
@@ -16838,6 +17297,15 @@ export interface operations {
                     "application/json": components["schemas"]["Cameras"];
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role viewer is needed */
             401: {
                 headers: {
@@ -16922,6 +17390,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": Record<string, never>;
+                };
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
             /** @description unauthenticated: the role viewer is needed */
@@ -17188,7 +17665,7 @@ export interface operations {
                     "application/json": components["schemas"]["CalibrationReport"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -17327,6 +17804,15 @@ export interface operations {
                     "image/jpeg": unknown;
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role viewer is needed */
             401: {
                 headers: {
@@ -17416,7 +17902,7 @@ export interface operations {
                     "application/json": components["schemas"]["Page_RobotCertificate"];
                 };
             };
-            /** @description bad_query */
+            /** @description repeated_header, foreign_authority, bad_query */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -17531,7 +18017,7 @@ export interface operations {
                     "application/json": components["schemas"]["EnrolledRobot"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -17668,6 +18154,15 @@ export interface operations {
                 };
                 content?: never;
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role operator is needed */
             401: {
                 headers: {
@@ -17759,6 +18254,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["CorrectionsBody"];
+                };
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
             /** @description unauthenticated: the role viewer is needed */
@@ -17858,7 +18362,7 @@ export interface operations {
                     "application/json": components["schemas"]["RobotPose"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -17996,6 +18500,15 @@ export interface operations {
                     "application/json": components["schemas"]["RecordingStatusBody"];
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role viewer is needed */
             401: {
                 headers: {
@@ -18078,6 +18591,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["RecordingStatusBody"];
+                };
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
             /** @description unauthenticated: the role operator is needed */
@@ -18179,6 +18701,15 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content?: never;
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
             };
             /** @description unauthenticated: the role operator is needed */
             401: {
@@ -18318,7 +18849,7 @@ export interface operations {
                     "application/json": components["schemas"]["ReferenceRunBody"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -18456,6 +18987,15 @@ export interface operations {
                     "application/json": components["schemas"]["RelocalisationStatus"];
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role viewer is needed */
             401: {
                 headers: {
@@ -18538,6 +19078,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["Ros2Status"];
+                };
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
             /** @description unauthenticated: the role viewer is needed */
@@ -18625,6 +19174,15 @@ export interface operations {
                     "application/json": Record<string, never>;
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role viewer is needed */
             401: {
                 headers: {
@@ -18707,6 +19265,15 @@ export interface operations {
                     "application/json": components["schemas"]["Servers"];
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role viewer is needed */
             401: {
                 headers: {
@@ -18778,6 +19345,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["PageLink"];
+                };
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
             /** @description unauthenticated: the role viewer is needed */
@@ -18867,7 +19443,7 @@ export interface operations {
                     "application/json": components["schemas"]["Page_Token"];
                 };
             };
-            /** @description bad_query */
+            /** @description repeated_header, foreign_authority, bad_query */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -18972,7 +19548,7 @@ export interface operations {
                     "application/json": components["schemas"]["CreatedToken"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -19108,6 +19684,15 @@ export interface operations {
                 };
                 content?: never;
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role admin is needed */
             401: {
                 headers: {
@@ -19199,6 +19784,15 @@ export interface operations {
                     "application/json": components["schemas"]["UnknownRobots"];
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role operator is needed */
             401: {
                 headers: {
@@ -19272,6 +19866,15 @@ export interface operations {
                     "application/json": components["schemas"]["Version"];
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description host_not_allowed, origin_not_allowed */
             403: {
                 headers: {
@@ -19334,6 +19937,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["Whoami"];
+                };
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
             /** @description unauthenticated: the role viewer is needed */
