@@ -5,6 +5,7 @@
 
 pub mod config;
 mod identity;
+mod label;
 mod private_file;
 mod fleet;
 pub mod audit_files;

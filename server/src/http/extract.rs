@@ -2,6 +2,7 @@
 //! problem with a code and a field.
 
 use super::{AppState, error::ApiError, objects::Objects};
+use crate::label::{LabelError, check_label};
 use axum::{
     body::HttpBody,
     extract::{FromRequest, FromRequestParts, OptionalFromRequest, Path, Query, Request},
@@ -103,6 +104,14 @@ pub(super) fn json<T: DeserializeOwned>(bytes: &[u8], outer: &str) -> Result<T, 
 /// Checks a name and says which field it is.
 pub(super) fn name(field: &'static str, text: String) -> Result<Name, ApiError> {
     Name::new(text).map_err(|e| ApiError::invalid("bad_name", field, e.to_string()))
+}
+
+/// Checks a text of one line for people and says which field it is.
+pub(super) fn label(field: impl Into<String>, text: &str, max: usize) -> Result<(), ApiError> {
+    check_label(text, max).map_err(|e| {
+        let code = if matches!(e, LabelError::Length(_)) { "out_of_range" } else { "invalid_value" };
+        ApiError::invalid(code, field, e.to_string())
+    })
 }
 
 /// Path parameters. A path with wrong percent-encoding or a number that is none is a thing that does not exist.
