@@ -16,6 +16,7 @@ mod revision;
 mod refused_views;
 mod stored_answers;
 mod teaching;
+mod uploads;
 
 use super::*;
 use crate::{
