@@ -1,5 +1,7 @@
 import { svelte } from "@sveltejs/vite-plugin-svelte";
 import { defineConfig } from "vitest/config";
+// @ts-expect-error: a tool without types
+import { licences } from "./tools/licences.js";
 
 // `npm run dev` shows the pages of this folder with the data of a running server.
 const server = process.env.WAYMARK_URL ?? "http://127.0.0.1:8080";
@@ -11,7 +13,7 @@ const proxied = {
 };
 
 export default defineConfig({
-  plugins: [svelte()],
+  plugins: [svelte(), licences()],
   build: {
     target: "es2022",
     assetsInlineLimit: 0,

@@ -128,6 +128,9 @@ impl Serve {
     }
 
     pub(super) async fn run(self) -> anyhow::Result<()> {
+        // This process is the server's own: what its libraries make is private, too, not only what it makes itself.
+        #[cfg(unix)]
+        rustix::process::umask(rustix::fs::Mode::from_raw_mode(0o077));
         let config = self.settings()?;
         warn_of_plain_text(&config);
         end_after_a_panic_of_zenoh();

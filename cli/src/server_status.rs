@@ -7,7 +7,7 @@ use super::{
 };
 use client::{
     ClientError,
-    api::{BackupHealth, Readiness, Servers, Version},
+    api::{BackupHealth, DatabaseCheckState, Readiness, Servers, Version},
 };
 use serde_json::json;
 
@@ -61,6 +61,9 @@ async fn status(session: &Session) -> anyhow::Result<()> {
         "The server is degraded: another server has one of its maps."
     } else if readiness.counts.maps_not_in_use > 0 {
         "The server is degraded: not every map is in use."
+    } else if readiness.database_check.as_ref().is_some_and(|check| check.state == DatabaseCheckState::Failed)
+    {
+        "The server is degraded: its database is damaged."
     } else if readiness.counts.damaged_pictures > 0 {
         "The server is degraded: stored pictures are damaged."
     } else if readiness.storage.as_ref().is_some_and(|disk| disk.refused.is_some()) {
@@ -148,6 +151,10 @@ fn text(version: &Version, readiness: &Readiness, counts: &Counts) -> String {
     lines.extend((hidden > 0).then(|| format!("  {} not named here", counted(hidden, "damaged picture"))));
     let refused = readiness.storage.iter().filter_map(|disk| disk.refused.as_ref());
     lines.extend(refused.map(|why| format!("  nothing is added: {why}")));
+    if let Some(check) = &readiness.database_check {
+        lines.extend(check.faults.iter().map(|fault| format!("  damage of the database: {fault}")));
+        lines.extend(check.advice.iter().map(|advice| format!("  {advice}")));
+    }
     let unused = readiness.maps_not_in_use.iter();
     lines.extend(unused.map(|(map, why)| format!("  map {map} is not in use: {why}")));
     let damaged = readiness.damaged_pictures.iter();
@@ -160,7 +167,7 @@ fn text(version: &Version, readiness: &Readiness, counts: &Counts) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use client::api::{ReadinessCounts, ServedMap, ServerBody, StorageHealth};
+    use client::api::{DatabaseCheckBody, ReadinessCounts, ServedMap, ServerBody, StorageHealth};
 
     #[test]
     fn a_list_of_servers_names_what_several_have() {
@@ -211,6 +218,12 @@ mod tests {
                 refused: Some("the disk is full".into()),
                 ..StorageHealth::default()
             }),
+            database_check: Some(DatabaseCheckBody {
+                state: DatabaseCheckState::Failed,
+                ended_ms: Some(7),
+                faults: vec!["row 3 missing from index landmarks_by_name".into()],
+                advice: Some("stop the server, and restore a backup".into()),
+            }),
             panics: [("a frame".to_owned(), 2), ("a write".to_owned(), 0)].into(),
         };
         let counts = Counts { maps: 1, landmarks: 2, robots: 0, connected: 0 };
@@ -231,6 +244,8 @@ mod tests {
         assert!(lines.contains("  2 maps of other tokens not in use\n"), "{lines}");
         assert!(!lines.contains("not named here"), "{lines}");
         assert!(lines.contains("\n  nothing is added: the disk is full\n"), "{lines}");
+        let damage = "  damage of the database: row 3 missing from index landmarks_by_name\n  stop the server, and restore";
+        assert!(lines.contains(damage), "{lines}");
         assert!(lines.contains("damaged picture: view 3 of landmark door, map office; "), "{lines}");
         assert!(lines.ends_with("2 faults of the program caught in a frame: see its log"), "{lines}");
     }

@@ -6,6 +6,8 @@
 pub mod config;
 mod accepting;
 mod identity;
+mod label;
+mod private_file;
 mod fleet;
 pub mod audit_files;
 mod events;

@@ -62,7 +62,8 @@ pub(crate) struct Tasks {
     /// Of findings, stored answers and events.
     pub(crate) recorders: [JoinHandle<()>; 3],
     pub(crate) gather: JoinHandle<()>,
-    pub(crate) pictures: JoinHandle<()>,
+    /// Of the pictures and of the database.
+    pub(crate) checks: [JoinHandle<()>; 2],
     pub(crate) disk: JoinHandle<()>,
     pub(crate) backups: JoinHandle<()>,
     pub(crate) writer: CatalogueTasks,
@@ -113,8 +114,8 @@ impl RunningServer {
         self.vitals.stop();
         self.local_token.remove();
         self.stop.send_replace(true);
-        let Tasks { workers, bus, mut serving, jobs, recorders, gather, pictures, disk, backups, writer } =
-            self.tasks;
+        let Tasks { workers, bus, mut serving, jobs, recorders, gather, writer, .. } = self.tasks;
+        let Tasks { checks, disk, backups, .. } = self.tasks;
         serving.unwatch().await;
         // Workers first: what they have in work is still answered over the open bus.
         let workers = tokio::task::spawn_blocking(move || workers.stop());
@@ -123,7 +124,7 @@ impl RunningServer {
         }
         self.ros2.close().await;
         bus.close().await;
-        let [findings, answers, events] = recorders;
+        let ([findings, answers, events], [pictures, database]) = (recorders, checks);
         let others = [
             ("jobs", jobs),
             ("findings", findings),
@@ -131,6 +132,7 @@ impl RunningServer {
             ("events", events),
             ("gathering", gather),
             ("the check of the pictures", pictures),
+            ("the check of the database", database),
             ("the look at the disk", disk),
             ("the timetable of backups", backups),
         ];

@@ -24,7 +24,7 @@ use crate::{
         StoreError,
         actor::Actor,
         disk_guard::{self, DiskGuard},
-        landmarks, now_ms, pictures,
+        integrity, landmarks, now_ms, pictures,
     },
 };
 use engine::{
@@ -73,7 +73,7 @@ impl Server {
         resume_mappings(&engine, &config, &snapshots);
         let recorders = recorders(&config, &store, (found, recorded, &engine.live), &stopping);
         let disk = watch_disk(&store, &local_token, &engine, &stopping);
-        let pictures = tokio::spawn(pictures::check_all((*store).clone(), stopping.clone()));
+        let checks = checks(&store, &stopping);
         // Whoever owns the router decides who is a robot.
         let of_robots = certificates.as_ref().filter(|_| config.router.is_none());
         let to = receivers(&config, &engine, of_robots.map(|_| store.certificates().clone()))?;
@@ -104,7 +104,7 @@ impl Server {
             jobs: teaching.jobs_task,
             recorders,
             gather: teaching.gather_task,
-            pictures,
+            checks,
             disk,
             backups: backups_task,
             writer,
@@ -178,6 +178,13 @@ fn write_local_token(config: &Config, store: &Catalogue, port: u16) -> Result<Ar
     let written = written.map_err(|e| StartError::LocalToken(e.to_string()))?;
     store.tokens().set_local(written.secret());
     Ok(written)
+}
+
+/// Checks of what is stored that would hold up the start: of the pictures and of the database.
+fn checks(store: &Catalogue, stopping: &watch::Receiver<bool>) -> [JoinHandle<()>; 2] {
+    let pictures = pictures::check_all((**store).clone(), stopping.clone());
+    let database = integrity::check((**store).clone(), stopping.clone());
+    [tokio::spawn(pictures), tokio::spawn(database)]
 }
 
 /// Looks at the disk: while it is nearly full, journals of mappings get no more scans; when there is room again, what had none

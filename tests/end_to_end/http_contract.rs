@@ -22,6 +22,21 @@ const ROWS: &[Row<'_>] = &[
     ("POST", "/maps", r#"{"name": 3}"#, 422, "invalid_value", "name"),
     ("POST", "/maps", r#"{"name": "a", "colour": 1}"#, 422, "invalid_value", "colour"),
     ("POST", "/maps", r#"{"name": "a", "distance": "cosine"}"#, 422, "invalid_value", "distance"),
+    // A list where the schema says object.
+    ("POST", "/maps", r#"["other"]"#, 422, "invalid_value", "body"),
+    ("PATCH", "/maps/hall", "[]", 422, "invalid_value", "body"),
+    ("PATCH", "/maps/hall/landmarks/p1", r#"{"size": [0.6, 0.84]}"#, 422, "invalid_value", "size"),
+    // Text that reads otherwise than it is written.
+    ("PATCH", "/maps/hall", r#"{"floor": "a\u202eb"}"#, 422, "invalid_value", "floor"),
+    ("PATCH", "/maps/hall", r#"{"site": "a\u200bb"}"#, 422, "invalid_value", "site"),
+    (
+        "PUT",
+        "/maps/hall/modalities",
+        r#"{"areas": [{"name": "a\u2066b", "corners_m": [[0, 0], [1, 0], [1, 1]]}]}"#,
+        422,
+        "invalid_value",
+        "areas[0].name",
+    ),
     ("POST", "/maps", r#"{"name": ""}"#, 422, "bad_name", "name"),
     ("POST", "/maps", r#"{"name": "A/B"}"#, 422, "bad_name", "name"),
     ("POST", "/maps", r#"{"name": "hall"}"#, 409, "exists", "name"),

@@ -1,6 +1,7 @@
 //! End-to-end claims, one file each, against a real server.
 
 mod administration;
+mod ambiguous_requests;
 mod api_client;
 mod audit;
 mod backups;
@@ -11,6 +12,7 @@ mod certificates;
 mod clock_jumps;
 mod clocks;
 mod command_line;
+mod damaged_index;
 mod demo;
 mod detect_command;
 mod disk_errors;
@@ -39,6 +41,7 @@ mod moved_landmark;
 mod other_map;
 mod packages;
 mod planted;
+mod private_files;
 mod promises;
 mod recordings;
 mod repeated_creations;

@@ -5,7 +5,7 @@ import { readFileSync, readdirSync, statSync, writeFileSync } from "node:fs";
 import { gzipSync } from "node:zlib";
 
 const root = new URL("..", import.meta.url).pathname;
-const BUILT_OF = ["index.html", "package.json", "package-lock.json", "public", "src", "svelte.config.js", "tsconfig.json", "vite.config.ts"];
+const BUILT_OF = ["index.html", "package.json", "package-lock.json", "public", "src", "svelte.config.js", "tools/licences.js", "tsconfig.json", "vite.config.ts"];
 
 function files(path) {
   if (!statSync(root + path).isDirectory()) return [path];

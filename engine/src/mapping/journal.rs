@@ -76,7 +76,15 @@ impl Journal {
     /// A new journal; replaces any other of the map.
     pub(super) fn create(dir: &Path, head: &JournalHeader) -> io::Result<Self> {
         std::fs::create_dir_all(dir)?;
-        let file = File::create(path(dir, head.map.as_str()))?;
+        let mut options = OpenOptions::new();
+        options.write(true).create(true).truncate(true);
+        // Where robots drove is for the server's user alone, whatever the umask.
+        #[cfg(unix)]
+        {
+            std::fs::set_permissions(dir, std::os::unix::fs::PermissionsExt::from_mode(0o700))?;
+            std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
+        }
+        let file = options.open(path(dir, head.map.as_str()))?;
         let mut made = Self { file, bytes: 0, unsynced: 0 };
         made.put(&serde_json::to_vec(head)?)?;
         made.file.sync_all()?;

@@ -17,7 +17,7 @@ pub struct Health {
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct Readiness {
     /// `ready`, or `degraded`: everything runs, but one of `counts` is not 0, the disk has no room, the server has no part in
-    /// its router, another server has one of its maps, or the last scheduled backup failed.
+    /// its router, another server has one of its maps, the last scheduled backup failed, or the check of the database did.
     pub status: String,
     /// How many there are of what is wrong, for whoever asks.
     #[serde(default)]
@@ -37,6 +37,9 @@ pub struct Readiness {
     /// asks.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub maps_not_served: BTreeMap<String, String>,
+    /// The check of the whole database after the start; absent where an earlier build answers.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub database_check: Option<DatabaseCheckBody>,
     /// The newest backup, and why the last attempt failed. A token for all maps is told the name and the reason.
     #[serde(default)]
     pub backup: BackupHealth,
@@ -50,6 +53,36 @@ pub struct Readiness {
     /// Panics caught since the start, by where: what they met was refused or dropped, everything else went on. Each is in
     /// the log. Anything but 0 is a fault of the program.
     pub panics: BTreeMap<String, u64>,
+}
+
+/// How far the check of the database is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+#[serde(rename_all = "snake_case")]
+pub enum DatabaseCheckState {
+    /// It goes on: in the background, for seconds a gigabyte.
+    Running,
+    /// Every page, row and index is as it was written.
+    Ok,
+    /// The database is damaged. Robots are served; `advice` says what to do.
+    Failed,
+}
+
+/// The check of every page, row and index of the database that runs once after each start.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct DatabaseCheckBody {
+    /// How far it is.
+    pub state: DatabaseCheckState,
+    /// When it ended, ms since the Unix epoch.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ended_ms: Option<i64>,
+    /// What is wrong, at most 20; empty for whoever does not see all maps.
+    #[serde(default)]
+    pub faults: Vec<String>,
+    /// What to do where it failed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub advice: Option<String>,
 }
 
 /// How many things are wrong, named or not.

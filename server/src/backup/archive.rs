@@ -10,7 +10,10 @@
 //!
 //! The manifest has the SHA-256 of the database, so that no byte of the file can change unseen.
 
-use crate::store::{copies::Contents, pictures};
+use crate::{
+    private_file,
+    store::{copies::Contents, pictures},
+};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 use std::{
@@ -119,7 +122,7 @@ pub(super) fn digest_of(path: &Path, length: u64) -> io::Result<String> {
 
 /// Copies the first `length` bytes to a new file, and brings it to the disk. Returns their SHA-256, hexadecimal.
 pub(super) fn copy_database(from: &Path, length: u64, to: &Path) -> io::Result<String> {
-    let (mut hash, mut copy) = (Sha256::new(), File::create(to)?);
+    let (mut hash, mut copy) = (Sha256::new(), private_file::create(to)?);
     each_part(from, length, |part| {
         hash.update(part);
         copy.write_all(part)

@@ -14,6 +14,7 @@ pub use restore::{DirectoryError, RestoreError, StoppedServer, Verified, verify}
 use crate::{
     config::{BackupSettings, Config, MAX_KEPT},
     events::EventLog,
+    private_file,
     store::{StoreError, copies, disk_guard::DiskGuard, kind::Kind, now_ms, open, pictures, restored},
 };
 use archive::{ArchiveError, Manifest};
@@ -166,7 +167,7 @@ impl Backups {
     async fn written(&self, part: &Path, created_ms: i64) -> Result<(), BackupError> {
         // About as large as the file that it is copied from.
         self.disk.check_for(fs::metadata(self.data.join(open::FILE))?.len())?;
-        fs::create_dir_all(&self.folder)?;
+        private_file::folder(&self.folder)?;
         copies::copy(&self.data, part).await?;
         let (contents, faults) = copies::examine(part).await?;
         for fault in &faults {

@@ -1,17 +1,20 @@
 //! Files of a bundle about the map itself: `map.json`, `walls.geojson`, `modalities.json`, `visibility.json`, `underlay.json`.
 
 use super::{BundleError, MAP, MODALITIES, UNDERLAY, VISIBILITY, WALLS, invalid};
-use crate::store::{
-    contents::{MapSettings, RunContents},
-    map_locations::MapLocation,
-    pictures::hex,
-    underlays::UnderlayRow,
-    walls::StoredWall,
+use crate::{
+    label::check_label,
+    store::{
+        contents::{MapSettings, RunContents},
+        map_locations::MapLocation,
+        pictures::hex,
+        underlays::UnderlayRow,
+        walls::StoredWall,
+    },
 };
 use map::{
     check::MAX_COORDINATE_M,
     map_links::MapLink,
-    modality_stats::{FusionMode, MAX_AREAS, NamedArea, PoseCell, StatsByModality},
+    modality_stats::{FusionMode, MAX_AREAS, MAX_NAME_BYTES, NamedArea, PoseCell, StatsByModality},
     pose2::{Pose2, Pose2Covariance},
     visibility::VisibilitySettings,
 };
@@ -121,10 +124,7 @@ impl MapRecord {
     pub(super) fn checked(self) -> Result<(DistanceKind, MapLocation), BundleError> {
         for (field, word) in [("site", &self.site), ("building", &self.building), ("floor", &self.floor)] {
             let Some(text) = word else { continue };
-            let fits = (1..=MAX_WORD).contains(&text.chars().count()) && !text.chars().any(char::is_control);
-            if !fits || text.trim().is_empty() {
-                return Err(invalid(MAP, field, format!("1 to {MAX_WORD} characters on one line")));
-            }
+            check_label(text, MAX_WORD).map_err(|e| invalid(MAP, field, e))?;
         }
         let link = self.parent.map(link_of).transpose()?;
         let Self { distance, site, building, floor, .. } = self;
@@ -172,6 +172,8 @@ impl ModalitiesRecord {
         }
         for (index, area) in self.areas.iter().enumerate() {
             area.check().map_err(|e| invalid(MODALITIES, format!("areas[{index}]"), e))?;
+            check_label(&area.name, MAX_NAME_BYTES)
+                .map_err(|e| invalid(MODALITIES, format!("areas[{index}].name"), e))?;
         }
         let areas = serde_json::to_string(&self.areas).map_err(|e| invalid(MODALITIES, "areas", e))?;
         let run = |(index, run): (usize, RunRecord)| {

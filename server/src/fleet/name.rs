@@ -3,6 +3,7 @@
 //! It is a file beside the database, and not in it: a backup that is restored on another machine makes no second server of
 //! the same name.
 
+use crate::private_file;
 use getrandom::fill;
 use protos::Name;
 use std::{fs, io, path::Path};
@@ -41,9 +42,7 @@ fn read(path: &Path) -> io::Result<String> {
 
 /// It appears whole or not at all.
 fn write(path: &Path, name: &str) -> io::Result<()> {
-    let draft = path.with_extension("new");
-    fs::write(&draft, format!("{name}\n"))?;
-    fs::rename(draft, path)
+    private_file::write(path, &format!("{name}\n"))
 }
 
 #[cfg(test)]

@@ -8,7 +8,8 @@ use utoipa::openapi::{
 };
 
 /// Status and codes of any request: of the guard, and of a server that fails or stops.
-const ALWAYS: [(&str, &str); 5] = [
+const ALWAYS: [(&str, &str); 6] = [
+    ("400", "repeated_header, foreign_authority"),
     ("403", "host_not_allowed, origin_not_allowed"),
     ("408", "timeout; `may_be_done: true` if it is a change that had begun"),
     ("429", "rate_limited; `Retry-After`"),

@@ -1,7 +1,8 @@
 //! From bytes to checked values: JSON bodies within their bound, names in paths, pages in queries. Every failure is a
 //! problem with a code and a field.
 
-use super::{AppState, error::ApiError};
+use super::{AppState, error::ApiError, objects::Objects};
+use crate::label::{LabelError, check_label};
 use axum::{
     body::HttpBody,
     extract::{FromRequest, FromRequestParts, OptionalFromRequest, Path, Query, Request},
@@ -71,10 +72,11 @@ pub(super) fn too_large(max: usize) -> ApiError {
     ApiError::new(StatusCode::PAYLOAD_TOO_LARGE, "too_large", detail).field("body")
 }
 
-/// Reads JSON; what is wrong is named by its path, inside `outer` if that is not empty.
+/// Reads JSON; what is wrong is named by its path, inside `outer` if that is not empty. A list is no object anywhere
+/// ([`Objects`]): every body and every part of a form comes this way.
 pub(super) fn json<T: DeserializeOwned>(bytes: &[u8], outer: &str) -> Result<T, ApiError> {
     let mut reader = serde_json::Deserializer::from_slice(bytes);
-    let value = serde_path_to_error::deserialize(&mut reader).map_err(|error| {
+    let value = serde_path_to_error::deserialize(Objects(&mut reader)).map_err(|error| {
         let path = error.path().to_string();
         // "." is the whole, "?" a place that was not reached.
         let path = if path == "." || path == "?" { String::new() } else { path };
@@ -102,6 +104,14 @@ pub(super) fn json<T: DeserializeOwned>(bytes: &[u8], outer: &str) -> Result<T, 
 /// Checks a name and says which field it is.
 pub(super) fn name(field: &'static str, text: String) -> Result<Name, ApiError> {
     Name::new(text).map_err(|e| ApiError::invalid("bad_name", field, e.to_string()))
+}
+
+/// Checks a text of one line for people and says which field it is.
+pub(super) fn label(field: impl Into<String>, text: &str, max: usize) -> Result<(), ApiError> {
+    check_label(text, max).map_err(|e| {
+        let code = if matches!(e, LabelError::Length(_)) { "out_of_range" } else { "invalid_value" };
+        ApiError::invalid(code, field, e.to_string())
+    })
 }
 
 /// Path parameters. A path with wrong percent-encoding or a number that is none is a thing that does not exist.

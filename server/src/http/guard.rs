@@ -5,12 +5,13 @@
 //! changes anything, come from its own pages or from no page at all. Who asks is the matter of `authorise`.
 
 use super::{
-    App, authorise,
+    App, ambiguous, authorise,
     error::ApiError,
     peer::Peer,
     request_id::{REQUEST_ID, RequestId},
     request_rates::asking,
     reused_answers, safe_headers,
+    upload_places::Uploader,
 };
 use crate::config::Limits;
 use axum::{
@@ -50,7 +51,9 @@ pub(super) async fn guard<Answering: Future<Output = Response>>(
     let token = is_bound.then(|| authorise::token(app, request.headers(), started)).flatten();
     let asking = is_bound.then(|| asking(token, peer.as_ref())).flatten();
     let may_ask = asking.map_or(Ok(()), |who| app.rates.take(who, started));
-    let checked = check_origin(request.method(), request.headers(), loopback).and(may_ask);
+    let checked = ambiguous::check(&request)
+        .and_then(|()| check_origin(request.method(), request.headers(), loopback))
+        .and(may_ask);
     let kept = token.filter(|_| checked.is_ok()).and_then(|token| reused_answers::kept(app, &request, token));
     let kept_route = kept.as_ref().map(|kept| kept.route);
     let mut response = match (checked, kept) {
@@ -58,7 +61,8 @@ pub(super) async fn guard<Answering: Future<Output = Response>>(
         (Ok(()), Some(kept)) => kept.into_response(),
         (Ok(()), None) => {
             let deadline = Duration::from_secs(deadline_s(&app.config.limits, uri.path()));
-            in_span(app, request, inner, &id, deadline).await
+            let uploader = Uploader::of(token, peer.as_ref());
+            in_span(app, (request, uploader), inner, &id, deadline).await
         }
     };
     let took = started.elapsed();
@@ -78,14 +82,14 @@ pub(super) async fn guard<Answering: Future<Output = Response>>(
 /// Handles a request until its deadline. What is logged meanwhile has its id; how it ended is for traces.
 async fn in_span<Answering: Future<Output = Response>>(
     app: &App,
-    request: Request,
+    (request, uploader): (Request, Uploader),
     inner: impl FnOnce(Request) -> Answering,
     id: &HeaderValue,
     deadline: Duration,
 ) -> Response {
     let (id, method) = (id.to_str().unwrap_or_default(), request.method().clone());
     let span = tracing::info_span!("request", id, %method, route = Empty, status = Empty);
-    let handled = placed(app, request, inner).instrument(span.clone());
+    let handled = placed(app, (request, uploader), inner).instrument(span.clone());
     let response = match tokio::time::timeout(deadline, handled).await {
         Ok(response) => response,
         Err(_elapsed) => timed_out(&method, deadline).into_response(),
@@ -109,14 +113,14 @@ fn is_change(method: &Method, status: StatusCode) -> bool {
 /// Handles a request. One with a large body has a place from before its body is read until it is answered.
 async fn placed<Answering: Future<Output = Response>>(
     app: &App,
-    request: Request,
+    (request, uploader): (Request, Uploader),
     inner: impl FnOnce(Request) -> Answering,
 ) -> Response {
     let small = request.body().size_hint().upper().is_some_and(|bytes| bytes <= SMALL_BODY);
     let _place = if small {
         None
     } else {
-        match app.upload_place().await {
+        match app.uploads.take(uploader).await {
             Ok(place) => Some(place),
             Err(error) => return error.into_response(),
         }

@@ -11,7 +11,10 @@ use axum::{
     http::{StatusCode, request::Parts},
 };
 use engine::{heartbeats::Heartbeat, panics::Edge, vitals::Failure};
-use protos::api::{BackupHealth, Health, Problem, Readiness, ReadinessCounts, StorageHealth, Version};
+use protos::api::{
+    BackupHealth, DatabaseCheckBody, DatabaseCheckState, Health, Problem, Readiness, ReadinessCounts,
+    StorageHealth, Version,
+};
 use serde_json::json;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
@@ -60,7 +63,9 @@ async fn readyz(State(app): State<AppState>, parts: Parts) -> Result<Json<Readin
     maps_not_served.retain(|map, _| asker.as_ref().is_some_and(|asker: &Principal| asker.may_see(map)));
     let storage = storage(app.store.disk().space());
     let has_no_room = storage.refused.is_some();
-    let has_faults = counts != ReadinessCounts::default() || scheduled_failed;
+    let database_check = database_check(&app, sees_all, backup.newest.as_deref());
+    let is_damaged = database_check.state == DatabaseCheckState::Failed;
+    let has_faults = is_damaged || counts != ReadinessCounts::default() || scheduled_failed;
     let status = if has_faults || has_no_room || is_alone { "degraded" } else { "ready" }.to_owned();
     let panics =
         Edge::ALL.into_iter().map(|edge| (edge.name().to_owned(), vitals.panics().at(edge))).collect();
@@ -75,11 +80,30 @@ async fn readyz(State(app): State<AppState>, parts: Parts) -> Result<Json<Readin
         damaged_pictures,
         router,
         maps_not_served,
+        database_check: Some(database_check),
         backup,
         parts_still_s,
         storage,
         panics,
     }))
+}
+
+/// What the check of the database has found. Names of rows, paths and backups are for who sees all maps.
+fn database_check(app: &AppState, sees_all: bool, newest: Option<&str>) -> DatabaseCheckBody {
+    let check = app.store.last_check().get();
+    let state = check.state();
+    let advice = (state == DatabaseCheckState::Failed).then(|| {
+        let data = sees_all.then(|| app.config.data.display().to_string());
+        let file = newest.and_then(|name| app.backups.file(name).ok()).filter(|_| sees_all);
+        let file = file.map_or_else(|| "FILE".to_owned(), |file| file.display().to_string());
+        format!(
+            "stop the server, and restore a backup in the place of the damaged database: \
+             waymark restore {file} --data {}",
+            data.as_deref().unwrap_or("DIR")
+        )
+    });
+    let faults = if sees_all { check.faults().to_vec() } else { Vec::new() };
+    DatabaseCheckBody { state, ended_ms: check.ended_ms(), faults, advice }
 }
 
 fn storage(space: DiskSpace) -> StorageHealth {

@@ -7,10 +7,13 @@ use super::{
     extract::{Body, PathParams, QueryParams, after_number, number_cursor, page_limit},
     revision::IfMatch,
 };
-use crate::store::{
-    history::{self, CommitRow, LandmarkChange, MAX_WHY},
-    maps,
-    revisions::{self, Subject},
+use crate::{
+    label::check_label,
+    store::{
+        history::{self, CommitRow, LandmarkChange, MAX_WHY},
+        maps,
+        revisions::{self, Subject},
+    },
 };
 use axum::{
     Json,
@@ -215,18 +218,13 @@ pub(super) fn why(headers: &HeaderMap) -> Result<Option<String>, ApiError> {
     let mut given = headers.get_all(WHY).iter();
     let Some(value) = given.next() else { return Ok(None) };
     let text = decoded(value).filter(|_| given.next().is_none()).map(|text| text.trim().to_owned());
-    match text {
-        Some(text)
-            if (1..=MAX_WHY).contains(&text.chars().count()) && !text.chars().any(char::is_control) =>
-        {
-            Ok(Some(text))
-        }
-        _ => {
-            let detail =
-                format!("one line of 1 to {MAX_WHY} characters, percent-encoded where it is not ASCII");
-            Err(ApiError::invalid("invalid_value", WHY.as_str(), detail))
-        }
-    }
+    let refused = |detail| ApiError::invalid("invalid_value", WHY.as_str(), detail);
+    let Some(text) = text else {
+        let detail = format!("one line of 1 to {MAX_WHY} characters, percent-encoded where it is not ASCII");
+        return Err(refused(detail));
+    };
+    check_label(&text, MAX_WHY).map_err(|error| refused(error.to_string()))?;
+    Ok(Some(text))
 }
 
 /// Percent-encoded UTF-8 as text.
@@ -284,7 +282,7 @@ mod tests {
         assert_eq!(read(&["the poster hangs elsewhere"]), text("the poster hangs elsewhere"));
         assert_eq!(read(&["t%C3%BCr%20zu",]), text("tür zu"));
         assert_eq!(read(&[&"x".repeat(MAX_WHY)]), text(&"x".repeat(MAX_WHY)));
-        for wrong in ["", " ", "100%", "%0", "%0a", "%ff", "%zz"] {
+        for wrong in ["", " ", "100%", "%0", "%0a", "%ff", "%zz", "a%E2%80%AEb"] {
             assert_eq!(read(&[wrong]), Err("invalid_value"), "{wrong}");
         }
         assert_eq!(read(&[&"x".repeat(MAX_WHY + 1)]), Err("invalid_value"));

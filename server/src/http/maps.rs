@@ -5,7 +5,7 @@ use super::{
     answers::{Listed, created, row_major, selected},
     authorise::check_map,
     error::{ApiError, out_of_range},
-    extract::{Body, PathParams, QueryParams, name},
+    extract::{Body, PathParams, QueryParams, label, name},
     revision::{IfMatch, Revised},
 };
 use crate::{
@@ -89,12 +89,8 @@ const MAX_WORD: usize = 64;
 /// A word for people: something to read, on one line.
 fn word(field: &'static str, text: Option<String>) -> Result<Option<String>, ApiError> {
     let Some(text) = text else { return Ok(None) };
-    let fits = (1..=MAX_WORD).contains(&text.chars().count()) && !text.chars().any(char::is_control);
-    if fits && !text.trim().is_empty() {
-        Ok(Some(text))
-    } else {
-        Err(ApiError::invalid("out_of_range", field, format!("1 to {MAX_WORD} characters on one line")))
-    }
+    label(field, &text, MAX_WORD)?;
+    Ok(Some(text))
 }
 
 /// The field of a parent that does not exist is not the map of the path.

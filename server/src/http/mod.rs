@@ -64,6 +64,9 @@ mod views;
 mod visibility;
 mod visibility_settings;
 mod walls;
+mod ambiguous;
+mod objects;
+mod upload_places;
 pub(crate) mod listen;
 #[cfg(test)]
 mod tests;
@@ -162,7 +165,7 @@ pub(crate) struct App {
     /// Places for event streams.
     streams: Arc<Semaphore>,
     /// Places for requests with large bodies.
-    uploads: Semaphore,
+    uploads: upload_places::UploadPlaces,
     /// The place for a bundle that is written or read: its map is in memory as a whole.
     bundles: Semaphore,
 }
@@ -197,7 +200,8 @@ impl App {
         let Services { local_token_file, backups, enrolment, server, fleet, .. } = services;
         let vision = Arc::new(Semaphore::new(config.workers));
         let streams = Arc::new(Semaphore::new(config.limits.streams));
-        let uploads = Semaphore::new(config.limits.uploads);
+        let upload_wait = Duration::from_secs(config.limits.upload_wait_s);
+        let uploads = upload_places::UploadPlaces::new(config.limits.uploads, upload_wait);
         let rates = request_rates::RequestRates::new(&config.limits);
         let (live, motion) = (engine.live.clone(), engine.motion.clone());
         let (slots, frame_times) = (engine.slots.clone(), engine.times.clone());
@@ -253,19 +257,6 @@ impl App {
     /// The place for a bundle.
     async fn bundle_place(&self) -> Result<SemaphorePermit<'_>, ApiError> {
         self.bundles.acquire().await.map_err(|closed| ApiError::internal(&closed))
-    }
-
-    /// A place for a request with a large body, or 503.
-    async fn upload_place(&self) -> Result<SemaphorePermit<'_>, ApiError> {
-        let limits = &self.config.limits;
-        let wait = Duration::from_secs(limits.upload_wait_s);
-        match tokio::time::timeout(wait, self.uploads.acquire()).await {
-            Ok(place) => place.map_err(|closed| ApiError::internal(&closed)),
-            Err(_elapsed) => {
-                let detail = format!("all {} places for large requests are in use", limits.uploads);
-                Err(ApiError::new(StatusCode::SERVICE_UNAVAILABLE, "too_many_uploads", detail))
-            }
-        }
     }
 
     /// A place for an event stream, or 503.

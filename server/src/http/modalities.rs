@@ -3,7 +3,7 @@
 use super::{
     AppState,
     error::ApiError,
-    extract::{Body, PathParams, QueryParams},
+    extract::{Body, PathParams, QueryParams, label},
     revision::{IfMatch, Revised},
 };
 use crate::store::kind::Kind;
@@ -15,8 +15,8 @@ use crate::store::{
 use axum::{Json, extract::State};
 use map::{
     modality_stats::{
-        CELL_M, FusionMode, MAX_AREAS, Modality, ModalityAdvice, ModalityMap, NamedArea, PoseCell,
-        StatsByModality, StatsScope,
+        CELL_M, FusionMode, MAX_AREAS, MAX_NAME_BYTES, Modality, ModalityAdvice, ModalityMap, NamedArea,
+        PoseCell, StatsByModality, StatsScope,
     },
     pose2::Pose2,
 };
@@ -179,6 +179,7 @@ fn checked(areas: Vec<AreaBody>) -> Result<Vec<NamedArea>, ApiError> {
         area.check().map_err(|e| {
             ApiError::invalid("out_of_range", format!("areas[{i}].{}", e.field), e.to_string())
         })?;
+        label(format!("areas[{i}].name"), &area.name, MAX_NAME_BYTES)?;
         if named.iter().any(|other| other.name == area.name) {
             let detail = format!("two areas are named `{}`", area.name);
             return Err(ApiError::invalid("exists", format!("areas[{i}].name"), detail));

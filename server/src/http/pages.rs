@@ -82,6 +82,7 @@ fn media_type(path: &str) -> HeaderValue {
         Some("js") => "text/javascript; charset=utf-8",
         Some("css") => "text/css; charset=utf-8",
         Some("svg") => "image/svg+xml",
+        Some("txt") => "text/plain; charset=utf-8",
         _ => "application/octet-stream",
     })
 }
@@ -96,13 +97,14 @@ mod tests {
     }
 
     /// What the pages are built of; the same list is in `web/tools/stamp.js`.
-    const BUILT_OF: [&str; 8] = [
+    const BUILT_OF: [&str; 9] = [
         "index.html",
         "package-lock.json",
         "package.json",
         "public",
         "src",
         "svelte.config.js",
+        "tools/licences.js",
         "tsconfig.json",
         "vite.config.ts",
     ];
@@ -149,6 +151,19 @@ mod tests {
                 assert!(served.contains(asked), "{page} asks for {asked}");
             }
         }
+    }
+
+    #[test]
+    fn the_licences_of_what_the_pages_are_made_of_are_served_as_text() {
+        let file = FILES.iter().find(|(path, ..)| *path == "licences.txt").expect("npm run build writes it");
+        let served = answer(file, "\"a\"", &HeaderMap::new());
+        assert_eq!(served.headers()[header::CONTENT_TYPE], "text/plain; charset=utf-8");
+        let text = std::str::from_utf8(file.1).unwrap();
+        for package in ["ol", "svelte", "uplot"] {
+            assert!(text.contains(&format!("\n{package} ")), "{package}");
+        }
+        let health = fs::read_to_string(web().join("src/pages/admin/Health.svelte")).unwrap();
+        assert!(health.contains("href=\"/licences.txt\""), "a page has a link to them");
     }
 
     #[test]

@@ -83,7 +83,7 @@ pub(super) fn asking(token: Option<TokenId>, peer: Option<&Peer>) -> Option<Aski
 }
 
 /// An address; of IPv6 the network of 64 bits, of which one customer has at least one.
-fn site(ip: IpAddr) -> IpAddr {
+pub(super) fn site(ip: IpAddr) -> IpAddr {
     match ip.to_canonical() {
         IpAddr::V6(v6) => {
             let [a, b, c, d, ..] = v6.segments();

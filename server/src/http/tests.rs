@@ -8,6 +8,7 @@ mod lists;
 mod metrics;
 mod localise;
 mod numbers;
+mod objects;
 mod openapi;
 mod page_sessions;
 mod readiness;
@@ -15,6 +16,7 @@ mod revision;
 mod refused_views;
 mod stored_answers;
 mod teaching;
+mod uploads;
 
 use super::*;
 use crate::{

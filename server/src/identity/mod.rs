@@ -9,11 +9,11 @@
 pub(crate) mod authorisation;
 pub(crate) mod certificates;
 pub(crate) mod local_token;
-pub(crate) mod private_file;
 mod registry;
 mod secret;
 mod sessions;
 
+pub(crate) use crate::private_file;
 pub(crate) use registry::{Denial, PublishedToken, TokenRegistry};
 pub(crate) use secret::{Secret, TokenText};
 pub(crate) use sessions::{CODE_VALID, SESSION_VALID, Sessions};

@@ -73,6 +73,13 @@ fn write_parts(all: &mut Exposition, app: &App) {
     for edge in Edge::ALL {
         panics.value(&[("edge", edge.name())], vitals.panics().at(edge));
     }
+    let check = app.store.last_check().get();
+    let faults = check.ended_ms().map(|_| check.faults().len());
+    all.gauge(
+        "waymark_database_faults",
+        "Faults that the check of the database after the start found, at most 20; absent while it runs.",
+    )
+    .known(&[], faults);
     let queue = app.store.queue();
     all.gauge("waymark_writes_waiting", "Writes that wait for the writer.").value(&[], queue.waiting);
     all.gauge("waymark_write_wait_seconds", "Time that the last probe of the writer waited in its queue.")

@@ -10,6 +10,7 @@ use super::{
     schema::schema,
     statements::statements,
 };
+use crate::private_file;
 use futures::TryStreamExt as _;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
@@ -75,6 +76,8 @@ pub(crate) struct Contents {
 /// Writes one committed state of the database in `data` to the new file `to`. Returns once it is on the disk.
 pub(crate) async fn copy(data: &Path, to: &Path) -> Result<(), StoreError> {
     let at = || StoreError::during("copy the database");
+    // SQLite writes into an empty file, and leaves its mode. An error here is one of the copy, too.
+    drop(private_file::create(to));
     let mut conn = open_live(&data.join(FILE)).await?;
     let copied =
         sqlx::query("VACUUM INTO ?1").bind(to.to_string_lossy().into_owned()).execute(&mut conn).await;

@@ -19,6 +19,7 @@ pub(crate) mod map_locations;
 pub(crate) mod landmarks;
 pub(crate) mod underlays;
 pub(crate) mod copies;
+pub(crate) mod integrity;
 pub(crate) mod schema;
 pub(crate) mod restored;
 pub(crate) mod pictures;
@@ -88,6 +89,7 @@ pub(crate) struct Store {
     heart: Arc<Heartbeat>,
     /// Wait of the last probe, ms.
     probe_ms: Arc<AtomicU64>,
+    last_check: integrity::LastCheck,
 }
 
 /// What waits for the writer.
@@ -172,8 +174,14 @@ impl Store {
             audit_entries,
             heart,
             probe_ms,
+            last_check: integrity::LastCheck::default(),
         };
         Ok((store, task))
+    }
+
+    /// The check of the whole database after this start.
+    pub(crate) fn last_check(&self) -> &integrity::LastCheck {
+        &self.last_check
     }
 
     /// Runs `write` in its own transaction. When this returns `Ok`, it is committed and visible. A caller that drops this

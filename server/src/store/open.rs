@@ -15,6 +15,7 @@ use super::{
     StoreError, checkpoint::renew_log, disk_guard, error::is_without_room, history, migrations, pictures,
     restored, schema,
 };
+use crate::private_file::{self, OpenToOthers};
 
 /// First version without the write-ahead-log corruption of 3.7.0 to 3.51.2 (sqlite.org/wal.html#walresetbug).
 pub(crate) const SQLITE_MIN: (u32, u32, u32) = (3, 51, 3);
@@ -136,6 +137,8 @@ async fn connect(
     data: &Path,
     vfs: Option<&'static str>,
 ) -> Result<(SqliteConnection, SqlitePool), OpenError> {
+    // SQLite gives the log and its index the mode of the database. An error here is one of the next line, too.
+    drop(private_file::open(&data.join(FILE)));
     let options = options(&data.join(FILE));
     let options = if let Some(vfs) = vfs { options.vfs(vfs) } else { options };
     let mut writer = options.clone().create_if_missing(true).connect().await.map_err(OpenError::Open)?;
@@ -219,12 +222,27 @@ pub(super) fn read_options(file: &Path) -> SqliteConnectOptions {
     options(file).read_only(true)
 }
 
-/// Takes the data directory, which is made if it is not there: nobody else uses it while the file is held.
+/// Takes the data directory, which is made if it is not there, and closes it to other users: nobody else uses it while the
+/// file is held.
 pub(crate) fn lock(data: &Path) -> Result<File, OpenError> {
     let at = |source| OpenError::Directory { path: data.to_owned(), source };
-    std::fs::create_dir_all(data).map_err(at)?;
-    let file = File::options().create(true).truncate(false).write(true).open(data.join(LOCK)).map_err(at)?;
-    held(file, data)
+    let was_open = private_file::data_directory(data).map_err(at)?;
+    tell_open(data, was_open);
+    held(private_file::open(&data.join(LOCK)).map_err(at)?, data)
+}
+
+/// One line of the log for everything that others could read.
+fn tell_open(data: &Path, OpenToOthers { files, folders, left }: OpenToOthers) {
+    let path = data.display();
+    if files + folders > 0 {
+        let follows = "only the server's user can read them now; whoever could before may have copied them";
+        tracing::warn!(files, folders, %path, follows, "data_directory_closed_to_others");
+    }
+    if left > 0 {
+        let follows =
+            "others may read the maps and pictures: give the directory to the server's user, mode 0700";
+        tracing::warn!(left, %path, follows, "data_directory_open_to_others");
+    }
 }
 
 fn held(file: File, data: &Path) -> Result<File, OpenError> {

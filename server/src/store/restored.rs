@@ -4,6 +4,7 @@
 //! The file `restored-TIME.sqlite` decides: from the moment that it has this name, whoever holds the lock finishes the
 //! replacement, the restoring program or the next start of the server. Each step may be done again.
 
+use crate::private_file;
 use std::{
     fs::{self, File},
     io,
@@ -33,7 +34,7 @@ pub(crate) fn put_in_place(data: &Path, file: &str) -> io::Result<Option<PathBuf
         for old in std::iter::once(file.to_owned()).chain(others(file)) {
             let path = data.join(&old);
             if path.exists() {
-                fs::create_dir_all(&aside)?;
+                private_file::folder(&aside)?;
                 fs::rename(path, aside.join(old))?;
             }
         }

@@ -15,6 +15,7 @@ async fn every_statement_prepares_on_the_migrated_schema() {
         visibility_areas::ALL,
         landmarks::ALL,
         copies::ALL,
+        integrity::ALL,
         schema::ALL,
         pictures::ALL,
         views::ALL,

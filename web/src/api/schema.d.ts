@@ -2410,6 +2410,25 @@ export interface components {
             /** @description What it is. */
             token: components["schemas"]["Token"];
         };
+        /** @description The check of every page, row and index of the database that runs once after each start. */
+        DatabaseCheckBody: {
+            /** @description What to do where it failed. */
+            advice?: string | null;
+            /**
+             * Format: int64
+             * @description When it ended, ms since the Unix epoch.
+             */
+            ended_ms?: number | null;
+            /** @description What is wrong, at most 20; empty for whoever does not see all maps. */
+            faults?: string[];
+            /** @description How far it is. */
+            state: components["schemas"]["DatabaseCheckState"];
+        };
+        /**
+         * @description How far the check of the database is.
+         * @enum {string}
+         */
+        DatabaseCheckState: "running" | "ok" | "failed";
         /** @description What differs between a map at two commits. */
         Difference: {
             /**
@@ -4402,6 +4421,7 @@ export interface components {
              *     without one. The picture is not used; the same photograph, uploaded again, mends it.
              */
             damaged_pictures?: string[];
+            database_check?: components["schemas"]["DatabaseCheckBody"] | null;
             /**
              * @description Maps whose stored version cannot be made ready, with the reason: an earlier version is used, or none since the
              *     server started. A later change of the map tries again. Only maps of the token that asks: none without one.
@@ -4437,7 +4457,7 @@ export interface components {
             router?: string | null;
             /**
              * @description `ready`, or `degraded`: everything runs, but one of `counts` is not 0, the disk has no room, the server has no part in
-             *     its router, another server has one of its maps, or the last scheduled backup failed.
+             *     its router, another server has one of its maps, the last scheduled backup failed, or the check of the database did.
              */
             status: string;
             storage?: components["schemas"]["StorageHealth"] | null;
@@ -5604,7 +5624,7 @@ export interface operations {
                     "application/json": components["schemas"]["Page_StoredAnswerSummary"];
                 };
             };
-            /** @description bad_query */
+            /** @description repeated_header, foreign_authority, bad_query */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -5695,6 +5715,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["StoredAnswer"];
+                };
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
             /** @description unauthenticated: the role viewer is needed */
@@ -5789,6 +5818,15 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content?: never;
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
             };
             /** @description unauthenticated: the role viewer is needed */
             401: {
@@ -5885,7 +5923,7 @@ export interface operations {
                     "application/json": components["schemas"]["Page_AuditEntry"];
                 };
             };
-            /** @description bad_query */
+            /** @description repeated_header, foreign_authority, bad_query */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -5981,7 +6019,7 @@ export interface operations {
                     "application/json": components["schemas"]["AuditCheck"];
                 };
             };
-            /** @description bad_query */
+            /** @description repeated_header, foreign_authority, bad_query */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -6077,7 +6115,7 @@ export interface operations {
                     "application/json": components["schemas"]["Page_Backup"];
                 };
             };
-            /** @description bad_query */
+            /** @description repeated_header, foreign_authority, bad_query */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -6166,6 +6204,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["Backup"];
+                };
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
             /** @description unauthenticated: the role admin is needed */
@@ -6261,6 +6308,15 @@ export interface operations {
                     "application/json": components["schemas"]["Backup"];
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role admin is needed */
             401: {
                 headers: {
@@ -6342,6 +6398,15 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content?: never;
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
             };
             /** @description unauthenticated: the role admin is needed */
             401: {
@@ -6434,6 +6499,15 @@ export interface operations {
                 };
                 content: {
                     "application/octet-stream": unknown;
+                };
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
             /** @description unauthenticated: the role admin is needed */
@@ -6531,7 +6605,7 @@ export interface operations {
                     "application/json": components["schemas"]["Map"];
                 };
             };
-            /** @description bad_query, bad_body */
+            /** @description repeated_header, foreign_authority, bad_query, bad_body */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -6680,7 +6754,7 @@ export interface operations {
                     "text/event-stream": components["schemas"]["ServerEvent"];
                 };
             };
-            /** @description bad_query */
+            /** @description repeated_header, foreign_authority, bad_query */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -6780,6 +6854,15 @@ export interface operations {
                     "application/json": components["schemas"]["Health"];
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description host_not_allowed, origin_not_allowed */
             403: {
                 headers: {
@@ -6853,7 +6936,7 @@ export interface operations {
                     "application/json": components["schemas"]["Page_Job"];
                 };
             };
-            /** @description bad_query */
+            /** @description repeated_header, foreign_authority, bad_query */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -6946,6 +7029,15 @@ export interface operations {
                     "application/json": components["schemas"]["Job"];
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role viewer is needed */
             401: {
                 headers: {
@@ -7028,6 +7120,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["Job"];
+                };
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
             /** @description unauthenticated: the role teacher is needed */
@@ -7123,6 +7224,15 @@ export interface operations {
                     "text/event-stream": components["schemas"]["Job"];
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role viewer is needed */
             401: {
                 headers: {
@@ -7214,7 +7324,7 @@ export interface operations {
                     "application/json": components["schemas"]["Page_Map"];
                 };
             };
-            /** @description bad_query */
+            /** @description repeated_header, foreign_authority, bad_query */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -7320,7 +7430,7 @@ export interface operations {
                     "application/json": components["schemas"]["Map"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -7460,6 +7570,15 @@ export interface operations {
                     "application/json": components["schemas"]["Map"];
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role viewer is needed */
             401: {
                 headers: {
@@ -7549,6 +7668,15 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content?: never;
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
             };
             /** @description unauthenticated: the role admin is needed */
             401: {
@@ -7700,7 +7828,7 @@ export interface operations {
                     "application/json": components["schemas"]["Map"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -7881,7 +8009,7 @@ export interface operations {
                     "application/json": components["schemas"]["BulkOutcome"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -8035,7 +8163,7 @@ export interface operations {
                     "application/json": components["schemas"]["BulkOutcome"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -8173,6 +8301,15 @@ export interface operations {
                     "application/zip": unknown;
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role teacher is needed */
             401: {
                 headers: {
@@ -8271,7 +8408,7 @@ export interface operations {
                     "application/json": components["schemas"]["Page_Commit"];
                 };
             };
-            /** @description bad_query */
+            /** @description repeated_header, foreign_authority, bad_query */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -8374,6 +8511,15 @@ export interface operations {
                     "application/json": components["schemas"]["Commit"];
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role viewer is needed */
             401: {
                 headers: {
@@ -8467,6 +8613,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["RollbackOutcome"];
+                };
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
             /** @description unauthenticated: the role operator is needed */
@@ -8612,7 +8767,7 @@ export interface operations {
                     "application/json": components["schemas"]["Map"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -8772,7 +8927,7 @@ export interface operations {
                     "application/json": components["schemas"]["CoverageResponse"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -8910,7 +9065,7 @@ export interface operations {
                     "application/json": components["schemas"]["Difference"];
                 };
             };
-            /** @description bad_query */
+            /** @description repeated_header, foreign_authority, bad_query */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -9012,6 +9167,15 @@ export interface operations {
                     "application/json": components["schemas"]["Page_Draft"];
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role viewer is needed */
             401: {
                 headers: {
@@ -9110,7 +9274,7 @@ export interface operations {
                     "application/json": components["schemas"]["Draft"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -9250,6 +9414,15 @@ export interface operations {
                 };
                 content?: never;
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role teacher is needed */
             401: {
                 headers: {
@@ -9367,7 +9540,7 @@ export interface operations {
                     "application/json": components["schemas"]["DraftDifference"];
                 };
             };
-            /** @description bad_query */
+            /** @description repeated_header, foreign_authority, bad_query */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -9487,6 +9660,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["RollbackOutcome"];
+                };
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
             /** @description unauthenticated: the role operator is needed */
@@ -9625,7 +9807,7 @@ export interface operations {
                     "application/json": components["schemas"]["Replay"];
                 };
             };
-            /** @description bad_query */
+            /** @description repeated_header, foreign_authority, bad_query */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -9745,7 +9927,7 @@ export interface operations {
                     "application/json": components["schemas"]["Page_DuplicatePair"];
                 };
             };
-            /** @description bad_query */
+            /** @description repeated_header, foreign_authority, bad_query */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -9852,7 +10034,7 @@ export interface operations {
                     "application/json": components["schemas"]["Page_Gathering"];
                 };
             };
-            /** @description bad_query */
+            /** @description repeated_header, foreign_authority, bad_query */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -9969,7 +10151,7 @@ export interface operations {
                     "application/json": components["schemas"]["Gathering"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -10108,6 +10290,15 @@ export interface operations {
                     "application/json": components["schemas"]["Gathering"];
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role viewer is needed */
             401: {
                 headers: {
@@ -10193,6 +10384,15 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content?: never;
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
             };
             /** @description unauthenticated: the role teacher is needed */
             401: {
@@ -10326,7 +10526,7 @@ export interface operations {
                     "application/json": components["schemas"]["AcceptanceBody"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -10468,6 +10668,15 @@ export interface operations {
                     "application/json": components["schemas"]["Gathering"];
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role teacher is needed */
             401: {
                 headers: {
@@ -10571,6 +10780,15 @@ export interface operations {
                     "application/json": components["schemas"]["TrackList"];
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role viewer is needed */
             401: {
                 headers: {
@@ -10657,6 +10875,15 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content?: never;
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
             };
             /** @description unauthenticated: the role teacher is needed */
             401: {
@@ -10769,6 +10996,15 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content?: never;
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
             };
             /** @description unauthenticated: the role viewer is needed */
             401: {
@@ -10892,7 +11128,7 @@ export interface operations {
                     "application/json": components["schemas"]["GazeRankingBody"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -11036,7 +11272,7 @@ export interface operations {
                     "application/json": components["schemas"]["Page_Landmark"];
                 };
             };
-            /** @description bad_query */
+            /** @description repeated_header, foreign_authority, bad_query */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -11162,7 +11398,7 @@ export interface operations {
                     "application/json": components["schemas"]["Landmark"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -11303,6 +11539,15 @@ export interface operations {
                     "application/json": components["schemas"]["Landmark"];
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role viewer is needed */
             401: {
                 headers: {
@@ -11393,6 +11638,15 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content?: never;
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
             };
             /** @description unauthenticated: the role teacher is needed */
             401: {
@@ -11545,7 +11799,7 @@ export interface operations {
                     "application/json": components["schemas"]["Landmark"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -11702,6 +11956,15 @@ export interface operations {
                     "application/json": components["schemas"]["LandmarkDistances"];
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role viewer is needed */
             401: {
                 headers: {
@@ -11785,6 +12048,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["LandmarkEvidence"];
+                };
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
             /** @description unauthenticated: the role viewer is needed */
@@ -11878,6 +12150,15 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content?: never;
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
             };
             /** @description unauthenticated: the role viewer is needed */
             401: {
@@ -11978,7 +12259,7 @@ export interface operations {
                     "application/json": components["schemas"]["Job"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -12136,7 +12417,7 @@ export interface operations {
                     "application/json": components["schemas"]["Landmark"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -12293,6 +12574,15 @@ export interface operations {
                     "application/json": components["schemas"]["LandmarkModelDetail"];
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role viewer is needed */
             401: {
                 headers: {
@@ -12376,6 +12666,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["Page_RefusedView"];
+                };
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
             /** @description unauthenticated: the role viewer is needed */
@@ -12470,6 +12769,15 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content?: never;
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
             };
             /** @description unauthenticated: the role viewer is needed */
             401: {
@@ -12569,7 +12877,7 @@ export interface operations {
                     "application/json": components["schemas"]["Page_TrainingView"];
                 };
             };
-            /** @description bad_query */
+            /** @description repeated_header, foreign_authority, bad_query */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -12698,7 +13006,7 @@ export interface operations {
                     "application/json": components["schemas"]["TrainingView"];
                 };
             };
-            /** @description bad_multipart, bad_json */
+            /** @description repeated_header, foreign_authority, bad_multipart, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -12839,6 +13147,15 @@ export interface operations {
                 };
                 content?: never;
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role teacher is needed */
             401: {
                 headers: {
@@ -12950,6 +13267,15 @@ export interface operations {
                 };
                 content?: never;
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role viewer is needed */
             401: {
                 headers: {
@@ -13042,6 +13368,15 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content?: never;
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
             };
             /** @description unauthenticated: the role viewer is needed */
             401: {
@@ -13157,7 +13492,7 @@ export interface operations {
                     "application/json": Record<string, never>;
                 };
             };
-            /** @description bad_query */
+            /** @description bad_query, repeated_header, foreign_authority */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -13285,7 +13620,7 @@ export interface operations {
                     "application/json": components["schemas"]["Job"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -13423,6 +13758,15 @@ export interface operations {
                     "text/event-stream": unknown;
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role viewer is needed */
             401: {
                 headers: {
@@ -13522,7 +13866,7 @@ export interface operations {
                     "application/json": components["schemas"]["LocaliseResult"];
                 };
             };
-            /** @description bad_multipart, bad_json */
+            /** @description repeated_header, foreign_authority, bad_multipart, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -13651,6 +13995,15 @@ export interface operations {
                     "application/json": components["schemas"]["MappingProgressBody"];
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role viewer is needed */
             401: {
                 headers: {
@@ -13752,7 +14105,7 @@ export interface operations {
                     "application/json": components["schemas"]["MappingProgressBody"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -13891,6 +14244,15 @@ export interface operations {
                 };
                 content?: never;
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role teacher is needed */
             401: {
                 headers: {
@@ -13996,6 +14358,15 @@ export interface operations {
                     "application/json": components["schemas"]["MappingProgressBody"];
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role teacher is needed */
             401: {
                 headers: {
@@ -14098,6 +14469,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["ModalityMapBody"];
+                };
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
             /** @description unauthenticated: the role viewer is needed */
@@ -14226,7 +14606,7 @@ export interface operations {
                     "application/json": components["schemas"]["ModalityMapBody"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -14380,7 +14760,7 @@ export interface operations {
                     "application/json": components["schemas"]["AreaStatsBody"];
                 };
             };
-            /** @description bad_query */
+            /** @description repeated_header, foreign_authority, bad_query */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -14496,7 +14876,7 @@ export interface operations {
                     "application/json": Record<string, never>;
                 };
             };
-            /** @description bad_multipart, bad_json */
+            /** @description repeated_header, foreign_authority, bad_multipart, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -14625,6 +15005,15 @@ export interface operations {
                     "application/json": components["schemas"]["ReferenceRuns"];
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role viewer is needed */
             401: {
                 headers: {
@@ -14710,6 +15099,15 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content?: never;
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
             };
             /** @description unauthenticated: the role operator is needed */
             401: {
@@ -14832,7 +15230,7 @@ export interface operations {
                     "application/json": components["schemas"]["RollbackOutcome"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -14997,7 +15395,7 @@ export interface operations {
                     "application/json": components["schemas"]["TransformResponse"];
                 };
             };
-            /** @description bad_query */
+            /** @description bad_query, repeated_header, foreign_authority */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -15110,6 +15508,15 @@ export interface operations {
                     "application/json": components["schemas"]["Underlay"];
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role viewer is needed */
             401: {
                 headers: {
@@ -15217,7 +15624,7 @@ export interface operations {
                     "application/json": components["schemas"]["Underlay"];
                 };
             };
-            /** @description bad_multipart, bad_json */
+            /** @description repeated_header, foreign_authority, bad_multipart, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -15370,6 +15777,15 @@ export interface operations {
                 };
                 content?: never;
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role teacher is needed */
             401: {
                 headers: {
@@ -15497,6 +15913,15 @@ export interface operations {
                 };
                 content?: never;
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role viewer is needed */
             401: {
                 headers: {
@@ -15581,6 +16006,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["VisibilitySettingsBody"];
+                };
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
             /** @description unauthenticated: the role viewer is needed */
@@ -15689,7 +16123,7 @@ export interface operations {
                     "application/json": components["schemas"]["VisibilitySettingsBody"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -15852,7 +16286,7 @@ export interface operations {
                     "application/json": components["schemas"]["VisibleResponse"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -15981,6 +16415,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["WallsBody"];
+                };
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
             /** @description unauthenticated: the role viewer is needed */
@@ -16112,7 +16555,7 @@ export interface operations {
                     "application/json": components["schemas"]["WallsBody"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -16258,6 +16701,15 @@ export interface operations {
                     "application/openmetrics-text": string;
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role viewer is needed */
             401: {
                 headers: {
@@ -16329,6 +16781,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["Readiness"];
+                };
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
             /** @description host_not_allowed, origin_not_allowed */
@@ -16404,7 +16865,7 @@ export interface operations {
                     "application/json": components["schemas"]["Page_Robot"];
                 };
             };
-            /** @description bad_query */
+            /** @description repeated_header, foreign_authority, bad_query */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -16495,6 +16956,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["Robot"];
+                };
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
             /** @description unauthenticated: the role viewer is needed */
@@ -16590,7 +17060,7 @@ export interface operations {
                     "application/json": components["schemas"]["Robot"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -16725,6 +17195,15 @@ export interface operations {
                 };
                 content?: never;
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role operator is needed */
             401: {
                 headers: {
@@ -16818,6 +17297,15 @@ export interface operations {
                     "application/json": components["schemas"]["Cameras"];
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role viewer is needed */
             401: {
                 headers: {
@@ -16902,6 +17390,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": Record<string, never>;
+                };
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
             /** @description unauthenticated: the role viewer is needed */
@@ -17168,7 +17665,7 @@ export interface operations {
                     "application/json": components["schemas"]["CalibrationReport"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -17307,6 +17804,15 @@ export interface operations {
                     "image/jpeg": unknown;
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role viewer is needed */
             401: {
                 headers: {
@@ -17396,7 +17902,7 @@ export interface operations {
                     "application/json": components["schemas"]["Page_RobotCertificate"];
                 };
             };
-            /** @description bad_query */
+            /** @description repeated_header, foreign_authority, bad_query */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -17511,7 +18017,7 @@ export interface operations {
                     "application/json": components["schemas"]["EnrolledRobot"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -17648,6 +18154,15 @@ export interface operations {
                 };
                 content?: never;
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role operator is needed */
             401: {
                 headers: {
@@ -17739,6 +18254,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["CorrectionsBody"];
+                };
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
             /** @description unauthenticated: the role viewer is needed */
@@ -17838,7 +18362,7 @@ export interface operations {
                     "application/json": components["schemas"]["RobotPose"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -17976,6 +18500,15 @@ export interface operations {
                     "application/json": components["schemas"]["RecordingStatusBody"];
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role viewer is needed */
             401: {
                 headers: {
@@ -18058,6 +18591,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["RecordingStatusBody"];
+                };
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
             /** @description unauthenticated: the role operator is needed */
@@ -18159,6 +18701,15 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content?: never;
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
             };
             /** @description unauthenticated: the role operator is needed */
             401: {
@@ -18298,7 +18849,7 @@ export interface operations {
                     "application/json": components["schemas"]["ReferenceRunBody"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -18436,6 +18987,15 @@ export interface operations {
                     "application/json": components["schemas"]["RelocalisationStatus"];
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role viewer is needed */
             401: {
                 headers: {
@@ -18518,6 +19078,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["Ros2Status"];
+                };
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
             /** @description unauthenticated: the role viewer is needed */
@@ -18605,6 +19174,15 @@ export interface operations {
                     "application/json": Record<string, never>;
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role viewer is needed */
             401: {
                 headers: {
@@ -18687,6 +19265,15 @@ export interface operations {
                     "application/json": components["schemas"]["Servers"];
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role viewer is needed */
             401: {
                 headers: {
@@ -18758,6 +19345,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["PageLink"];
+                };
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
             /** @description unauthenticated: the role viewer is needed */
@@ -18847,7 +19443,7 @@ export interface operations {
                     "application/json": components["schemas"]["Page_Token"];
                 };
             };
-            /** @description bad_query */
+            /** @description repeated_header, foreign_authority, bad_query */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -18952,7 +19548,7 @@ export interface operations {
                     "application/json": components["schemas"]["CreatedToken"];
                 };
             };
-            /** @description bad_json */
+            /** @description repeated_header, foreign_authority, bad_json */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -19088,6 +19684,15 @@ export interface operations {
                 };
                 content?: never;
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role admin is needed */
             401: {
                 headers: {
@@ -19179,6 +19784,15 @@ export interface operations {
                     "application/json": components["schemas"]["UnknownRobots"];
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description unauthenticated: the role operator is needed */
             401: {
                 headers: {
@@ -19252,6 +19866,15 @@ export interface operations {
                     "application/json": components["schemas"]["Version"];
                 };
             };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             /** @description host_not_allowed, origin_not_allowed */
             403: {
                 headers: {
@@ -19314,6 +19937,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["Whoami"];
+                };
+            };
+            /** @description repeated_header, foreign_authority */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
             /** @description unauthenticated: the role viewer is needed */

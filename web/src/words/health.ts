@@ -42,7 +42,7 @@ export function faultsOf(health: Health, servers?: Servers): Fault[] {
   if (isProblem(health)) {
     return [{ sentence: sentence(health.detail), advice: PARTS[health.code] ?? "Look at the log of the server.", is_grave: true }];
   }
-  const { storage, backup, counts } = health;
+  const { storage, backup, counts, database_check: check } = health;
   const damaged = counts?.damaged_pictures ?? 0;
   const panics = Object.entries(health.panics).filter(([, number]) => number > 0);
   const all: (Fault | false | undefined)[] = [
@@ -70,6 +70,11 @@ export function faultsOf(health: Health, servers?: Servers): Fault[] {
     backup?.failed != null && {
       sentence: sentence(`The last backup has failed: ${backup.failed}`),
       advice: "Make room on the disk, then back up now, under Backups.",
+      is_grave: false,
+    },
+    check?.state === "failed" && {
+      sentence: sentence(`The database is damaged${check.faults?.length ? `: ${check.faults.join("; ")}` : ""}`),
+      advice: sentence(check.advice ?? "Stop the server and restore a backup"),
       is_grave: false,
     },
     damaged > 0 && {

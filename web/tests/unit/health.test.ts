@@ -37,13 +37,15 @@ test("every fault is a sentence with an advice", () => {
       counts: { maps_not_in_use: 1, damaged_pictures: 2 },
       damaged_pictures: ["view 3", "view 4"],
       backup: { every_hours: 24, failed: "no space left" },
+      database_check: { state: "failed", ended_ms: 7, faults: ["row 3 missing from index landmarks_by_name"], advice: "stop the server, and restore a backup: waymark restore FILE --data DIR" },
       panics: { job: 0, request: 2 },
     }),
     servers,
   );
-  expect(faults).toHaveLength(7);
+  expect(faults).toHaveLength(8);
   for (const { sentence, advice } of faults) for (const text of [sentence, advice]) expect(text).toMatch(/^[A-Z\d].* .*\.$/);
   expect(faults[1]).toEqual({ sentence: "Robots are refused on the map hall.", advice: "It is also on annex-server: delete or rename it on one of the servers.", is_grave: true });
+  expect(faults[5]?.sentence).toBe("The database is damaged: row 3 missing from index landmarks_by_name.");
   const graves = faults.map(({ is_grave }) => is_grave);
   expect(graves).toEqual([...graves].sort((a, b) => Number(b) - Number(a)));
 });

@@ -184,12 +184,12 @@ fn every_operation_names_what_guard_extractors_and_store_may_answer() {
         for (method, operation) in item.as_object().unwrap() {
             count += 1;
             let responses = operation["responses"].as_object().unwrap();
-            let mut needed = vec!["403", "408", "500", "503"];
+            let mut needed = vec!["400", "403", "408", "500", "503"];
             if path.contains('{') {
                 needed.push("404");
             }
             if !operation["requestBody"].is_null() {
-                needed.extend(["400", "413", "415", "422"]);
+                needed.extend(["413", "415", "422"]);
             }
             if method != "get" {
                 needed.push("507");

@@ -82,6 +82,7 @@ from waymark.api.live import (
 )
 from waymark.api.localise import LocaliseHypothesisBody, LocaliseResult, LocaliseStatus
 from waymark.api.maps import (
+    DatabaseCheckBody,
     Distance,
     Health,
     Job,
@@ -209,6 +210,7 @@ __all__ = [
     "CoverageResponse",
     "CoverageSampleBody",
     "CreatedToken",
+    "DatabaseCheckBody",
     "Difference",
     "Distance",
     "DistanceHistogram",

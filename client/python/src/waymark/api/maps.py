@@ -151,6 +151,17 @@ class StorageHealth:
 
 
 @dataclass(frozen=True, slots=True)
+class DatabaseCheckBody:
+    """The check of every page, row and index that runs once after each start: `state` is `running`, `ok` or `failed`.
+    `faults` are for a token for all maps; `advice` says what to do where it failed."""
+
+    state: str
+    ended_ms: int | None = None
+    faults: tuple[str, ...] = ()
+    advice: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Readiness:
     """`ready`, or `degraded`: everything runs, but some maps use an earlier version, or none, stored pictures are
     damaged, the last scheduled backup failed, or the disk has no room. `counts` has all of them; only those of the
@@ -168,6 +179,7 @@ class Readiness:
     router: str | None = None
     # Maps that another server has, too, with the reason: robots are refused on them here.
     maps_not_served: dict[str, str] = field(default_factory=dict)
+    database_check: DatabaseCheckBody | None = None
 
 
 @dataclass(frozen=True, slots=True)
