@@ -80,14 +80,11 @@ impl RobotOptions {
     }
 }
 
-/// Opens an encrypted session and waits until the server answers a hello: with a certificate that gives no access, everything
-/// is dropped without a word.
+/// Opens an encrypted session and waits for the answer to a hello: without access, everything is dropped without a word.
 ///
-/// A session that is not greeted is opened anew. One that meets the server's gate in the moment in which that closes, to open
-/// again with other rights, may keep a link to what was closed, or none at all, for ever: zenoh connects again only after a
-/// link that it has seen to begin and to end. The first sessions are given up early, so that there is time for several: rights
-/// may change more than once in a row. That the robot is not admitted is said only if the last session was linked or something
-/// still listens: nobody does while the gate is closed.
+/// A session that is not greeted is opened anew: one that meets the server's gate as that closes, to open again with other
+/// rights, may keep a link to what was closed, for ever. The first sessions are given up early, so that there is time for
+/// several. That the robot is not admitted is said only if the last session was linked or something still listens.
 async fn admitted(keys: &Keys, robot: &Name, options: &RobotOptions) -> Result<Opened, ClientError> {
     let (key, until) = (keys.build(&Key::Hello(robot.clone())), Instant::now() + options.timeout);
     let endpoint = || options.endpoint.clone();
@@ -111,8 +108,8 @@ async fn admitted(keys: &Keys, robot: &Name, options: &RobotOptions) -> Result<O
         left = until.saturating_duration_since(Instant::now());
         if left < HELLO_WAIT {
             let detail = "the connection was closed, and there is no other".to_owned();
-            let lost = || ClientError::Unreachable { endpoint: endpoint(), detail };
-            return Err(if is_linked { silent() } else { lost() });
+            let lost = ClientError::Unreachable { endpoint: endpoint(), detail };
+            return Err(if is_linked { silent() } else { lost });
         }
     }
 }
@@ -379,8 +376,7 @@ pub(crate) fn name(field: &'static str, text: &str) -> Result<Name, ClientError>
     Name::new(text).map_err(|error| ClientError::Name { field, text: text.to_owned(), error })
 }
 
-/// A random epoch: a fresh hasher of the standard library is keyed by the system's randomness. 53 bits, so that JSON
-/// readers with doubles keep it whole.
+/// A random epoch by the system's randomness: 53 bits, so that JSON readers with doubles keep it whole.
 fn new_epoch() -> u64 {
     (RandomState::new().hash_one(std::process::id()) >> 11).max(1)
 }

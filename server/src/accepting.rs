@@ -119,7 +119,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn shares_of_a_key_at_the_bound() {
+    fn connections_of_an_address_at_the_bound() {
         let all = Arc::<Shares<IpAddr>>::default();
         let ip = |last| IpAddr::from([192, 0, 2, last]);
         let held: Vec<_> = (0..3).map(|_| all.take(ip(1), 3)).collect();

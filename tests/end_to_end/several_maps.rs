@@ -100,7 +100,7 @@ async fn refusals(url: &str) {
         ),
         (Method::PATCH, "/maps/upper", Some(json!({ "floor": "" })), 422, "out_of_range", "floor"),
         (Method::PATCH, "/maps/upper", Some(json!({ "site": "x".repeat(65) })), 422, "out_of_range", "site"),
-        (Method::PATCH, "/maps/upper", Some(json!({ "building": "a\nb" })), 422, "out_of_range", "building"),
+        (Method::PATCH, "/maps/upper", Some(json!({ "building": "a\nb" })), 422, "invalid_value", "building"),
         (Method::DELETE, "/maps/house", None, 409, "in_use", ""),
     ] {
         let (got, problem) = call(url, method, path, body).await;
