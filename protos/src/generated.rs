@@ -809,6 +809,9 @@ pub enum QuadKind {
     ThreeSided = 2,
     /// Not detected: a landmark that was found where the pose known before expects it. Corners may lie outside of the image.
     Expected = 3,
+    /// Not detected: a landmark that its texture alone shows, in a frame with too few landmarks of known borders. Corners are
+    /// those of the landmark's own border and may lie outside of the image.
+    Texture = 4,
 }
 impl QuadKind {
     /// String value of the enum field names used in the ProtoBuf definition.
@@ -821,6 +824,7 @@ impl QuadKind {
             Self::Full => "QUAD_KIND_FULL",
             Self::ThreeSided => "QUAD_KIND_THREE_SIDED",
             Self::Expected => "QUAD_KIND_EXPECTED",
+            Self::Texture => "QUAD_KIND_TEXTURE",
         }
     }
     /// Creates an enum from field names used in the ProtoBuf definition.
@@ -830,6 +834,7 @@ impl QuadKind {
             "QUAD_KIND_FULL" => Some(Self::Full),
             "QUAD_KIND_THREE_SIDED" => Some(Self::ThreeSided),
             "QUAD_KIND_EXPECTED" => Some(Self::Expected),
+            "QUAD_KIND_TEXTURE" => Some(Self::Texture),
             _ => None,
         }
     }

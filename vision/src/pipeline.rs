@@ -17,6 +17,7 @@ use crate::{
     pose::{landmark_pose::LandmarkPose, measurement::LandmarkSize},
     recognise::{
         decision::{
+            by_texture::by_texture,
             matched_border::texture_border,
             result::{RecognitionResult, Verdict},
             verdict::recognise,
@@ -166,6 +167,10 @@ fn analyse(
     let mut verdicts: Vec<Option<RecognitionResult>> = quads.iter().enumerate().map(verdict).collect();
     recognise_turned(image.grey(), (&mut quads, &mut verdicts), landmarks, p);
     trace.finished(Stage::Recognition);
+    if by == BorderBy::Picture {
+        add_by_texture(image.grey(), (&mut quads, &mut verdicts), camera, landmarks, p);
+        trace.finished(Stage::Texture);
+    }
     let quads = quads
         .into_iter()
         .zip(verdicts)
@@ -220,6 +225,35 @@ fn recognise_turned(
     if matches!(found.verdict, Verdict::Unique(_)) {
         (*quad, *verdict) = (turned, Some(found));
     }
+}
+
+/// While no pose of a robot is supported, adds those of landmarks that the texture shows without a border.
+fn add_by_texture(
+    image: &GrayImage,
+    (quads, verdicts): (&mut Vec<Quad>, &mut Vec<Option<RecognitionResult>>),
+    camera: FrameCamera<'_>,
+    landmarks: LandmarkDatabase<'_>,
+    p: &Params,
+) {
+    let named: Vec<(LandmarkId, Corners)> =
+        quads.iter().zip(&*verdicts).filter_map(|(quad, verdict)| named(quad, verdict.as_ref()?)).collect();
+    let texture = &p.recognise.texture;
+    let are_points_asked = landmarks.kind == DistanceKind::Both && p.recognise.verdict.points;
+    let is_supported = camera.up.is_some() && named.len() >= texture.enough;
+    if !texture.search || !are_points_asked || is_supported {
+        return;
+    }
+    let camera = (camera.up.as_ref(), camera.intrinsics);
+    for (quad, verdict) in by_texture(image, &named, camera, landmarks.models, p) {
+        quads.push(quad);
+        verdicts.push(Some(verdict));
+    }
+}
+
+/// The landmark of a quad and where it is, if it is exactly one.
+fn named(quad: &Quad, verdict: &RecognitionResult) -> Option<(LandmarkId, Corners)> {
+    let Verdict::Unique(landmark) = verdict.verdict else { return None };
+    Some((landmark, verdict.aligned_px.unwrap_or(quad.corners_px)))
 }
 
 /// Which of the landmarks a single quad may be, by its picture alone, and their common border in the image; `None`

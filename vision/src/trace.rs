@@ -24,19 +24,22 @@ pub enum Stage {
     Quads,
     /// Points, descriptors and distances to the models.
     Recognition,
+    /// Landmarks without a border.
+    Texture,
     /// Poses from recognised landmarks.
     Poses,
 }
 
 impl Stage {
     /// Every stage, in order.
-    pub const ALL: [Stage; 7] = [
+    pub const ALL: [Stage; 8] = [
         Stage::Edges,
         Stage::Chains,
         Stage::Segments,
         Stage::Pairs,
         Stage::Quads,
         Stage::Recognition,
+        Stage::Texture,
         Stage::Poses,
     ];
 
@@ -49,6 +52,7 @@ impl Stage {
             Stage::Pairs => "pairs",
             Stage::Quads => "quads",
             Stage::Recognition => "recognition",
+            Stage::Texture => "texture",
             Stage::Poses => "poses",
         }
     }

@@ -54,7 +54,7 @@ impl Up {
     /// The direction of gravity at `px`, in pixels (unit length): towards the vanishing point of what is vertical.
     /// `None` where the line of sight is too steep. Without intrinsics, every line of sight is taken as the optical
     /// axis.
-    fn down_at(&self, px: &Point2<f64>, intrinsics: Option<&Intrinsics>) -> Option<Vector2<f64>> {
+    pub(crate) fn down_at(&self, px: &Point2<f64>, intrinsics: Option<&Intrinsics>) -> Option<Vector2<f64>> {
         let up = self.camera_up;
         let straight = intrinsics.map(|k| {
             let px = k.undistort(px).unwrap_or(*px);

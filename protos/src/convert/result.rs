@@ -21,6 +21,7 @@ pub fn kind(kind: QuadKind) -> v1::QuadKind {
     match kind {
         QuadKind::Full => v1::QuadKind::Full,
         QuadKind::ThreeSided => v1::QuadKind::ThreeSided,
+        QuadKind::Texture => v1::QuadKind::Texture,
     }
 }
 

@@ -12,6 +12,8 @@ pub enum QuadKind {
     Full,
     /// Three sides, the fourth is the chord of the free ends: topology only, never a metric pose.
     ThreeSided,
+    /// Not detected: the border of a landmark that its texture alone shows. Corners may lie outside of the image.
+    Texture,
 }
 
 /// Standard deviation per coordinate of a border beyond the noise of its edges: another edge of the frame, a

@@ -233,4 +233,5 @@ fn the_number_of_recognised_quads_is_bounded() {
     assert!(!asked[MAX_RECOGNISED_QUADS]);
 }
 
+mod borderless;
 mod rolled;

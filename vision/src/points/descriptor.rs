@@ -95,9 +95,15 @@ pub struct Window {
 
 /// The descriptor of `window` on its octave, and the mean gradient there, in grey levels a pixel of the octave.
 pub fn describe(octave: &Octave, window: &Window) -> (Descriptor, f32) {
+    describe_stretched(octave, window, [1.0, 1.0])
+}
+
+/// The same of a window whose sides are longer than its scale says by the factors `stretch`: what [`describe`] would
+/// give after the picture was shrunk by them.
+pub fn describe_stretched(octave: &Octave, window: &Window, stretch: [f32; 2]) -> (Descriptor, f32) {
     let line = &*LINE;
     dispatch!(Level::new(), s => {
-        let (values, gradient) = histogram(s, octave, window, line);
+        let (values, gradient) = histogram(s, octave, window, stretch, line);
         (quantised(&values), gradient)
     })
 }
@@ -131,23 +137,34 @@ static LINE: LazyLock<Line> = LazyLock::new(|| {
     reason = "an instruction set holds only in what is inlined where it was chosen"
 )]
 #[inline(always)]
-fn histogram<S: Simd>(s: S, octave: &Octave, window: &Window, line: &Line) -> ([f32; VALUES], f32) {
+fn histogram<S: Simd>(
+    s: S,
+    octave: &Octave,
+    window: &Window,
+    [across, down]: [f32; 2],
+    line: &Line,
+) -> ([f32; VALUES], f32) {
     let picture = &octave.levels[window.level];
-    let n = octave.side;
+    let (n, height) = (octave.width, octave.height);
     let (x, y, sigma) = (window.x / octave.step, window.y / octave.step, window.sigma / octave.step);
     // Pixels of the samples and their neighbours, repeated beyond the border of the picture.
-    let nearest = |centre: f32, i: usize| centre + line.from_centre[i] * CELL_SIGMAS * sigma + 0.5;
-    let pixel = |nearest: f32, beside: f32| (nearest.floor() + beside).clamp(0.0, (n - 1) as f32) as u32;
+    let nearest = |centre: f32, i: usize, stretch: f32| {
+        centre + line.from_centre[i] * CELL_SIGMAS * sigma * stretch + 0.5
+    };
+    let pixel = |nearest: f32, beside: f32, side: usize| {
+        (nearest.floor() + beside).clamp(0.0, (side - 1) as f32) as u32
+    };
     let (mut left, mut middle, mut right) = ([0; PADDED], [0; PADDED], [0; PADDED]);
     for i in 0..PADDED {
-        let at = nearest(x, i);
-        (left[i], middle[i], right[i]) = (pixel(at, -1.0), pixel(at, 0.0), pixel(at, 1.0));
+        let at = nearest(x, i, across);
+        (left[i], middle[i], right[i]) = (pixel(at, -1.0, n), pixel(at, 0.0, n), pixel(at, 1.0, n));
     }
     let mut cells = [[f32x8::splat(s, 0.0); CELLS + 2]; CELLS + 2];
     let mut lengths = [0.0; PADDED];
     for j in 0..SAMPLES {
-        let at = nearest(y, j);
-        let [above, own, below] = [-1.0, 0.0, 1.0].map(|b| &picture[pixel(at, b) as usize * n..][..n]);
+        let at = nearest(y, j, down);
+        let [above, own, below] =
+            [-1.0, 0.0, 1.0].map(|b| &picture[pixel(at, b, height) as usize * n..][..n]);
         let [mut gx, mut gy, mut length] = [[0.0; PADDED]; 3];
         for i in 0..SAMPLES {
             gx[i] = own[right[i] as usize] - own[left[i] as usize];
@@ -155,7 +172,7 @@ fn histogram<S: Simd>(s: S, octave: &Octave, window: &Window, line: &Line) -> ([
         }
         for i in 0..PADDED {
             let weight = line.weight[i] * line.weight[j];
-            (gx[i], gy[i]) = (weight * gx[i], weight * gy[i]);
+            (gx[i], gy[i]) = (weight * across * gx[i], weight * down * gy[i]);
             length[i] = (gx[i] * gx[i] + gy[i] * gy[i]).sqrt();
             lengths[i] += length[i];
         }

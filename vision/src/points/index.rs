@@ -2,8 +2,9 @@
 //! of them. Half of each descriptor is kept here, enough for votes.
 
 use crate::points::{
+    descriptor::Descriptor,
     point::Point,
-    taught::{TaughtPoint, scale_step},
+    taught::{TaughtPoint, scale_of_step, scale_step},
     vocabulary::{VOCABULARY, words},
 };
 use fearless_simd::{Level, dispatch};
@@ -31,6 +32,19 @@ struct Entry {
     model: u32,
     at: [u8; 2],
     sigma: u8,
+}
+
+/// A taught point near a descriptor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Neighbour {
+    /// Index of its model.
+    pub model: usize,
+    /// How much nearer it is than the next landmark's, at least 1.
+    pub weight: u32,
+    /// Its place on the landmark, landmark units.
+    pub at: [f32; 2],
+    /// Its scale, landmark units.
+    pub sigma: f32,
 }
 
 /// Points by word, in each by their place from the top.
@@ -95,6 +109,51 @@ impl PointIndex {
         best.sort_by(|a, b| b.1.cmp(&a.1).then(a.0.cmp(&b.0)));
         best.truncate(count);
         best
+    }
+
+    /// The nearest taught points of at most [`NEIGHBOURS`] landmarks, one of each, wherever they are on it: for points
+    /// of which nobody knows where on a landmark they would be.
+    pub fn nearest(&self, descriptor: &Descriptor) -> Vec<Neighbour> {
+        if self.is_empty() {
+            return Vec::new();
+        }
+        let nearest = dispatch!(Level::new(), _s => self.nearest_anywhere(descriptor));
+        let common = nearest[NEIGHBOURS].0;
+        let of = |(d, model, entry): (u32, u32, u32)| {
+            let entry = self.entries.get(entry as usize)?;
+            let at = entry.at.map(|at| f32::from(at) / PLACES);
+            Some(Neighbour {
+                model: model as usize,
+                weight: (common - d).max(1),
+                at,
+                sigma: scale_of_step(entry.sigma),
+            })
+        };
+        nearest.into_iter().take(NEIGHBOURS).filter_map(of).collect()
+    }
+
+    /// Distance, model and index of the entry.
+    #[expect(clippy::inline_always, reason = "as below")]
+    #[inline(always)]
+    fn nearest_anywhere(&self, descriptor: &Descriptor) -> [(u32, u32, u32); NEIGHBOURS + 1] {
+        let mut nearest = [(2 * MAX_DISTANCE + 1, u32::MAX, u32::MAX); NEIGHBOURS + 1];
+        let half = descriptor.half();
+        for word in words::<PROBES>(descriptor).map(usize::from) {
+            for i in self.starts[word]..self.starts[word + 1] {
+                let entry = &self.entries[i as usize];
+                let d = 2 * half.iter().zip(&entry.half).map(|(a, b)| (a ^ b).count_ones()).sum::<u32>();
+                if d >= nearest[NEIGHBOURS].0 {
+                    continue;
+                }
+                let at = nearest.iter().position(|(_, m, _)| *m == entry.model).unwrap_or(NEIGHBOURS);
+                if nearest[at].0 <= d {
+                    continue;
+                }
+                nearest[at] = (d, entry.model, i);
+                nearest[..=at].sort_unstable_by_key(|(d, ..)| *d);
+            }
+        }
+        nearest
     }
 
     #[expect(

@@ -1,7 +1,10 @@
 //! A patch in, its keypoints out: extrema of the difference of Gaussians over place and scale (Lowe 2004). No
 //! orientation: the patch is rectified already.
 
-use crate::{points::patch::Patch, recognise::features::harris::blurred};
+use crate::{
+    points::patch::Patch,
+    recognise::features::harris::{blurred, blurred_to},
+};
 use fearless_simd::{Level, dispatch};
 
 /// Smoothing of the first level of an octave, in its pixels.
@@ -16,10 +19,12 @@ const LEVELS: usize = SCALES + 3;
 const MIN_OCTAVE_PX: usize = 16;
 /// Most octaves.
 const MAX_OCTAVES: usize = 4;
-/// Smallest response, in grey levels.
+/// Smallest response in a patch, in grey levels.
 const MIN_RESPONSE: f32 = 0.25;
 /// Largest ratio of the principal curvatures: beyond it the point is an edge.
 const MAX_EDGE_RATIO: f32 = 10.0;
+/// Where the Gaussians of a frame end, in their sigmas: patches take four, which costs a third more.
+const FRAME_REACH: f64 = 2.5;
 /// Pixels along the border of an octave without extrema.
 const BORDER_PX: usize = 3;
 
@@ -50,8 +55,10 @@ pub struct ScaleSpace {
 /// The smoothed pictures of one size.
 #[derive(Debug, Clone)]
 pub struct Octave {
-    /// Side in pixels.
-    pub side: usize,
+    /// Pixels of a row, and of a column.
+    pub width: usize,
+    /// See `width`.
+    pub height: usize,
     /// Patch pixels along one of its pixels.
     pub step: f32,
     /// Pictures of rising smoothing.
@@ -61,22 +68,39 @@ pub struct Octave {
 impl ScaleSpace {
     /// Smooths `patch`.
     pub fn new(patch: &Patch) -> Self {
+        Self::of(&patch.pixels, patch.side, MAX_OCTAVES, blurred)
+    }
+
+    /// The same of a whole frame: `pixels`, row-major in rows of `width`, over at most `most` octaves.
+    pub fn of_frame(pixels: &[f32], width: usize, most: usize) -> Self {
+        let smooth = |pixels: &[f32], width: usize, sigma: f64| {
+            blurred_to(pixels, width, sigma, (FRAME_REACH * sigma).ceil() as usize)
+        };
+        Self::of(pixels, width, most, smooth)
+    }
+
+    fn of(
+        pixels: &[f32],
+        width: usize,
+        most: usize,
+        smooth: impl Fn(&[f32], usize, f64) -> Vec<f32>,
+    ) -> Self {
         let mut octaves: Vec<Octave> = Vec::new();
         let start = (BASE_SIGMA.powi(2) - SAMPLING_SIGMA.powi(2)).sqrt();
-        let mut first = blurred(&patch.pixels, patch.side, start);
-        let (mut side, mut step) = (patch.side, 1.0);
-        while side >= MIN_OCTAVE_PX && octaves.len() < MAX_OCTAVES {
+        let (mut width, mut height, mut step) = (width, pixels.len() / width.max(1), 1.0);
+        let mut first = smooth(pixels, width, start);
+        while width.min(height) >= MIN_OCTAVE_PX && octaves.len() < most {
             let mut levels = vec![first];
             for i in 1..LEVELS {
                 let sigma = |i: usize| BASE_SIGMA * 2.0_f64.powf(i as f64 / SCALES as f64);
                 let more = (sigma(i).powi(2) - sigma(i - 1).powi(2)).sqrt();
-                levels.push(blurred(&levels[i - 1], side, more));
+                levels.push(smooth(&levels[i - 1], width, more));
             }
-            let half = side / 2;
-            first =
-                (0..half * half).map(|i| levels[SCALES][2 * (i / half) * side + 2 * (i % half)]).collect();
-            octaves.push(Octave { side, step, levels });
-            (side, step) = (half, step * 2.0);
+            let (across, down) = (width / 2, height / 2);
+            let every_second = |i: usize| levels[SCALES][2 * (i / across) * width + 2 * (i % across)];
+            first = (0..across * down).map(every_second).collect();
+            octaves.push(Octave { width, height, step, levels });
+            (width, height, step) = (across, down, step * 2.0);
         }
         Self { octaves }
     }
@@ -84,15 +108,21 @@ impl ScaleSpace {
 
 /// The keypoints of `patch` that the image shows, strongest first, at most `most`.
 pub fn keypoints(patch: &Patch, space: &ScaleSpace, most: usize) -> Vec<Keypoint> {
+    let mut found = all_keypoints(space, MIN_RESPONSE);
+    found.retain(|k| patch.is_seen(k.x, k.y, SUPPORT * k.sigma));
+    found.truncate(most);
+    found
+}
+
+/// All keypoints with a response of `least` grey levels or more, strongest first.
+pub fn all_keypoints(space: &ScaleSpace, least: f32) -> Vec<Keypoint> {
     let mut found = Vec::new();
     for (index, octave) in space.octaves.iter().enumerate() {
-        extrema(octave, index, &mut found);
+        extrema(octave, index, least, &mut found);
     }
-    found.retain(|k| patch.is_seen(k.x, k.y, SUPPORT * k.sigma));
     found.sort_by(|a, b| {
         b.response.total_cmp(&a.response).then(a.y.total_cmp(&b.y)).then(a.x.total_cmp(&b.x))
     });
-    found.truncate(most);
     found
 }
 
@@ -102,15 +132,15 @@ const SUPPORT: f32 = 1.0;
 /// Pictures whose differences are the responses at one scale and at the two next to it, from the finest on.
 type Levels<'a> = [&'a [f32]; 4];
 
-fn extrema(octave: &Octave, index: usize, found: &mut Vec<Keypoint>) {
-    let n = octave.side;
+fn extrema(octave: &Octave, index: usize, least: f32, found: &mut Vec<Keypoint>) {
+    let (n, height) = (octave.width, octave.height);
     let mut peaks = vec![0_u8; n];
     for level in 1..=SCALES {
         let levels: Levels<'_> = std::array::from_fn(|i| octave.levels[level - 1 + i].as_slice());
         let [below, own, above] =
             [0, 1, 2].map(|scale| move |at: usize| levels[scale + 1][at] - levels[scale][at]);
-        for y in BORDER_PX..n - BORDER_PX {
-            dispatch!(Level::new(), _s => row_peaks(levels, y * n, &mut peaks));
+        for y in BORDER_PX..height - BORDER_PX {
+            dispatch!(Level::new(), _s => row_peaks(levels, y * n, least, &mut peaks));
             for x in marked(&peaks).filter(|x| (BORDER_PX..n - BORDER_PX).contains(x)) {
                 let at = y * n + x;
                 let d = own(at);
@@ -160,7 +190,7 @@ fn marked(peaks: &[u8]) -> impl Iterator<Item = usize> {
     reason = "an instruction set holds only in what is inlined where it was chosen"
 )]
 #[inline(always)]
-fn row_peaks(levels: Levels<'_>, start: usize, peaks: &mut [u8]) {
+fn row_peaks(levels: Levels<'_>, start: usize, least: f32, peaks: &mut [u8]) {
     let n = peaks.len();
     let [first, second, third, fourth] = levels.map(|level| &level[start..][..n]);
     let beside = |by: usize| [1, 2].map(|level| &levels[level][start + by - 1..][..n]);
@@ -171,8 +201,8 @@ fn row_peaks(levels: Levels<'_>, start: usize, peaks: &mut [u8]) {
         let (left, right) = (left3[x] - left2[x], right3[x] - right2[x]);
         let high = left.max(right).max(below).max(above);
         let low = left.min(right).min(below).min(above);
-        let top = u8::from(d >= MIN_RESPONSE) & u8::from(d >= high);
-        let bottom = u8::from(d <= -MIN_RESPONSE) & u8::from(d <= low);
+        let top = u8::from(d >= least) & u8::from(d >= high);
+        let bottom = u8::from(d <= -least) & u8::from(d <= low);
         peaks[x] = top | bottom;
     }
 }

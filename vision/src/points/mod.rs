@@ -16,5 +16,7 @@ pub mod index;
 pub mod verify;
 pub mod search;
 pub mod shown_matches;
+pub mod frame_points;
+pub mod frame_places;
 #[cfg(test)]
 pub(crate) mod tests;

@@ -57,7 +57,7 @@ fn bank() -> Vec<Descriptor> {
     for picture in drawn {
         let inverse: Vec<f32> = picture.iter().map(|g| 255.0 - g).collect();
         for levels in [picture, inverse] {
-            let octave = Octave { side: SIDE, step: 1.0, levels: vec![levels] };
+            let octave = Octave { width: SIDE, height: SIDE, step: 1.0, levels: vec![levels] };
             let centre = (SIDE as f32 - 1.0) * 0.5;
             let (d, _) = describe(&octave, &Window { x: centre, y: centre, sigma: SIGMA, level: 0 });
             all.extend((0..4).map(|shift| d.rotated(shift)));

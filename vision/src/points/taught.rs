@@ -24,7 +24,7 @@ const COARSEST_PX: f32 = 5.0;
 /// Most points of a patch.
 const MAX_VIEW_POINTS: usize = 400;
 /// Points nearer than this to a plain structure are dropped.
-const MIN_PLAIN_DISTANCE: u32 = 46;
+pub(crate) const MIN_PLAIN_DISTANCE: u32 = 46;
 /// Points of one position and scale whose descriptors are nearer than this are duplicates.
 const SAME_DISTANCE: u32 = 40;
 /// Positions nearer than this, in landmark units, are the same.
@@ -55,6 +55,11 @@ pub struct TaughtPoint {
 /// The stored step of a scale in landmark units.
 pub(crate) fn scale_step(sigma: f32) -> u8 {
     (-sigma.log2() * SCALE_STEPS).round().clamp(0.0, 255.0) as u8
+}
+
+/// The scale in landmark units of a stored step.
+pub(crate) fn scale_of_step(step: u8) -> f32 {
+    SCALES[usize::from(step)]
 }
 
 impl TaughtPoint {

@@ -18,5 +18,5 @@ pub use decision::{
 };
 pub use distance_kind::DistanceKind;
 pub use features::icon_features::{IconFeatures, features};
-pub use params::{RecogniseParams, VerdictParams};
+pub use params::{RecogniseParams, TextureParams, VerdictParams};
 pub use step_listener::{NoListener, RecogniseStep, StepListener};

@@ -23,6 +23,25 @@ pub struct RecogniseParams {
     pub hausdorff: HausdorffParams,
     /// The decision.
     pub verdict: VerdictParams,
+    /// Landmarks without a border.
+    pub texture: TextureParams,
+}
+
+/// The search for landmarks that a frame shows without a border (`docs/method/25-recognition-by-points.md`).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct TextureParams {
+    /// Whether the points of the whole frame vote for landmarks, where the map's distance is `both` and points decide.
+    pub search: bool,
+    /// Only while fewer quads than this have a name, or where up is not known: two names support a robot's pose, which
+    /// needs the mounting of its camera.
+    pub enough: usize,
+}
+
+impl Default for TextureParams {
+    fn default() -> Self {
+        Self { search: true, enough: 2 }
+    }
 }
 
 /// Parameters of the decision.

@@ -17,7 +17,7 @@ from typing import Literal
 from waymark.errors import Refused
 
 Status = Literal["unspecified", "matched", "ambiguous", "no_match", "rejected", "expired", "overloaded", "not_ready"]
-QuadKind = Literal["unspecified", "full", "three_sided", "expected"]
+QuadKind = Literal["unspecified", "full", "three_sided", "expected", "texture"]
 Verdict = Literal["unspecified", "unknown", "unique", "ambiguous"]
 PartAgreement = Literal["unspecified", "silent", "agrees", "disagrees"]
 Sighting = Literal["unspecified", "global", "guided"]

@@ -1,7 +1,7 @@
 //! A quad and its verdict in, the border of the landmark that was matched out.
 
 use crate::{
-    detect::quad::Quad,
+    detect::quad::{Quad, QuadKind},
     params::Params,
     recognise::decision::result::RecognitionResult,
     seen_border::{ALIGNED_SIGMA_ICON_PX, FoundBy, SeenBorder, aligned_covariance_px2, is_same_border},
@@ -22,6 +22,9 @@ pub fn texture_border(quad: &Quad, verdict: &RecognitionResult, p: &Params) -> O
 /// detected, as aligned. An alternate border has no covariances of its own: those of the quad are used, both follow
 /// from similar edges.
 pub fn matched_border(quad: &Quad, verdict: &RecognitionResult, p: &Params) -> Option<SeenBorder> {
+    if quad.kind == QuadKind::Texture {
+        return verdict.points.as_ref().map(|evidence| evidence.border());
+    }
     let detected_px = match verdict.border {
         0 => &quad.corners_px,
         border => quad.alternates.get(border - 1)?,

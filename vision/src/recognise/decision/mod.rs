@@ -7,4 +7,5 @@ pub(crate) mod confidence_weights;
 pub mod matched_border;
 pub(crate) mod by_points;
 pub mod verdict;
+pub(crate) mod by_texture;
 pub mod expected;

@@ -97,11 +97,12 @@ pub fn harris(icon: &Icon, p: &HarrisParams) -> Vec<HarrisPoint> {
 /// The Harris response of every icon pixel, row-major.
 fn response(icon: &Icon, p: &HarrisParams) -> Vec<f32> {
     let size = icon.size;
-    let (smooth, slope) = (gaussian(p.sigma_derivative), derivative(p.sigma_derivative));
+    let (smooth, slope) =
+        (gaussian(p.sigma_derivative, radius(p.sigma_derivative)), derivative(p.sigma_derivative));
     let both = |pixels: &[f32], across: &[f32], down: &[f32]| filtered(pixels, size, across, down);
     let gx = both(&icon.pixels, &slope, &smooth);
     let gy = both(&icon.pixels, &smooth, &slope);
-    let window = gaussian(p.sigma_integration);
+    let window = gaussian(p.sigma_integration, radius(p.sigma_integration));
     let integrate = |f: &dyn Fn(f32, f32) -> f32| {
         let product: Vec<f32> = gx.iter().zip(&gy).map(|(x, y)| f(*x, *y)).collect();
         both(&product, &window, &window)
@@ -139,10 +140,15 @@ fn sub_pixel(response: &[f32], size: usize, column: usize, row: usize) -> (f32, 
     (dx.clamp(-0.5, 0.5) as f32, dy.clamp(-0.5, 0.5) as f32)
 }
 
-/// A square picture of side `size`, smoothed by a Gaussian, border replicated.
-pub(crate) fn blurred(pixels: &[f32], size: usize, sigma: f64) -> Vec<f32> {
-    let kernel = gaussian(sigma);
-    filtered(pixels, size, &kernel, &kernel)
+/// A picture in rows of `width`, smoothed by a Gaussian, border replicated.
+pub(crate) fn blurred(pixels: &[f32], width: usize, sigma: f64) -> Vec<f32> {
+    blurred_to(pixels, width, sigma, radius(sigma))
+}
+
+/// The same with a Gaussian that ends `reach` pixels from its centre.
+pub(crate) fn blurred_to(pixels: &[f32], width: usize, sigma: f64, reach: usize) -> Vec<f32> {
+    let kernel = gaussian(sigma, reach);
+    filtered(pixels, width, &kernel, &kernel)
 }
 
 /// Half length of a kernel: four sigma.
@@ -152,8 +158,8 @@ fn radius(sigma: f64) -> usize {
 }
 
 /// Sampled Gaussian of sum 1.
-fn gaussian(sigma: f64) -> Vec<f32> {
-    let r = radius(sigma) as i32;
+fn gaussian(sigma: f64, reach: usize) -> Vec<f32> {
+    let r = reach as i32;
     let weights: Vec<f64> = (-r..=r).map(|i| bell(f64::from(i), sigma)).collect();
     let sum: f64 = weights.iter().sum();
     weights.iter().map(|w| (w / sum) as f32).collect()

@@ -33,6 +33,7 @@ class QuadKind(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     QUAD_KIND_FULL: _ClassVar[QuadKind]
     QUAD_KIND_THREE_SIDED: _ClassVar[QuadKind]
     QUAD_KIND_EXPECTED: _ClassVar[QuadKind]
+    QUAD_KIND_TEXTURE: _ClassVar[QuadKind]
 
 class Verdict(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     __slots__ = ()
@@ -107,6 +108,7 @@ QUAD_KIND_UNSPECIFIED: QuadKind
 QUAD_KIND_FULL: QuadKind
 QUAD_KIND_THREE_SIDED: QuadKind
 QUAD_KIND_EXPECTED: QuadKind
+QUAD_KIND_TEXTURE: QuadKind
 VERDICT_UNSPECIFIED: Verdict
 VERDICT_UNKNOWN: Verdict
 VERDICT_UNIQUE: Verdict
