@@ -231,10 +231,10 @@ pub(crate) fn lock(data: &Path) -> Result<File, OpenError> {
     held(private_file::open(&data.join(LOCK)).map_err(at)?, data)
 }
 
-/// One line of the log for everything that others could read.
+/// One line of the log for everything that others could read: of a folder alone, nothing.
 fn tell_open(data: &Path, OpenToOthers { files, folders, left }: OpenToOthers) {
     let path = data.display();
-    if files + folders > 0 {
+    if files > 0 {
         let follows = "only the server's user can read them now; whoever could before may have copied them";
         tracing::warn!(files, folders, %path, follows, "data_directory_closed_to_others");
     }

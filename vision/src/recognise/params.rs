@@ -31,7 +31,8 @@ pub struct RecogniseParams {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct TextureParams {
-    /// Whether the points of the whole frame vote for landmarks, where the map's distance is `both` and points decide.
+    /// Whether the points of the whole frame vote for landmarks, where the map's distance is `both` and points decide. It
+    /// also names the same picture in another frame.
     pub search: bool,
     /// Only while fewer quads than this have a name, or where up is not known: two names support a robot's pose, which
     /// needs the mounting of its camera.
@@ -40,7 +41,7 @@ pub struct TextureParams {
 
 impl Default for TextureParams {
     fn default() -> Self {
-        Self { search: true, enough: 2 }
+        Self { search: false, enough: 2 }
     }
 }
 

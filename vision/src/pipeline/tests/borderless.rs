@@ -68,8 +68,8 @@ fn searching(search: bool, enough: usize) -> Params {
 #[test]
 fn a_landmark_without_a_border_is_named_and_located_by_its_texture() {
     let (image, corners_px) = wall();
-    assert_eq!(named(&image, Some(Up::level()), &searching(false, 2)), [], "no quad shows it");
-    let found = named(&image, Some(Up::level()), &Params::default());
+    assert_eq!(named(&image, Some(Up::level()), &Params::default()), [], "no quad shows it, and it is off");
+    let found = named(&image, Some(Up::level()), &searching(true, 2));
     let [quad] = found.as_slice() else { panic!("{} found", found.len()) };
     assert_eq!(quad.quad.kind, QuadKind::Texture);
     assert_eq!(quad.recognition.as_ref().unwrap().verdict, Verdict::Unique(LandmarkId(1)));
@@ -87,7 +87,7 @@ fn a_landmark_without_a_border_is_named_and_located_by_its_texture() {
 #[test]
 fn its_border_is_that_of_the_points_and_no_detected_one() {
     let (image, _) = wall();
-    let found = named(&image, Some(Up::level()), &Params::default());
+    let found = named(&image, Some(Up::level()), &searching(true, 2));
     let verdict = found[0].recognition.as_ref().unwrap();
     let seen = matched_border(&found[0].quad, verdict, &Params::default()).unwrap();
     assert_eq!(seen, verdict.points.as_ref().unwrap().border());
@@ -100,7 +100,7 @@ fn texture_is_searched_only_while_no_pose_is_supported() {
     assert_eq!(count(Some(Up::level()), &searching(true, 0)), 0, "enough have a name");
     assert_eq!(count(Some(Up::level()), &searching(true, 1)), 1);
     assert_eq!(count(None, &searching(true, 0)), 1, "no mounting, no pose of a robot");
-    let mut without_points = Params::default();
+    let mut without_points = searching(true, 2);
     without_points.recognise.verdict.points = false;
     assert_eq!(count(None, &without_points), 0, "points do not decide");
 }
