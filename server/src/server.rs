@@ -144,7 +144,7 @@ impl Robots {
         to: Receivers,
         certificates: Option<Arc<Certificates>>,
     ) -> Result<Self, StartError> {
-        let bus = Bus::open(config, to.clone(), certificates).await?;
+        let bus = Box::pin(Bus::open(config, to.clone(), certificates)).await?;
         let outbox = bus.outbox().clone();
         let ros2 = match bus.session() {
             Some(session) => Ros2::open(session, &config.ros2, (&to, &outbox)).await?,
