@@ -1,7 +1,7 @@
 //! A whole frame in, its described keypoints out, as the patches of landmarks of several shapes would show them.
 //!
 //! A patch is a square, whatever the shape of its landmark. A frame is not rectified: each keypoint is described once
-//! for every shape in [`SHAPES`].
+//! for every one of a few shapes.
 
 use crate::{
     detect::pyramid::{reduce, working_factor},

@@ -111,7 +111,7 @@ impl PointIndex {
         best
     }
 
-    /// The nearest taught points of at most [`NEIGHBOURS`] landmarks, one of each, wherever they are on it: for points
+    /// The nearest taught points of at most eight landmarks, one of each, wherever they are on it: for points
     /// of which nobody knows where on a landmark they would be.
     pub fn nearest(&self, descriptor: &Descriptor) -> Vec<Neighbour> {
         if self.is_empty() {
