@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 import socket
+import ssl
 import threading
 from typing import Literal
 
 import zenoh
 
-from waymark.errors import TlsRefused, Unreachable
+from waymark.errors import NotAdmitted, TlsRefused, Unreachable
 from waymark.robot_file import RobotFile
 
 Delivery = Literal["latest", "every"]
@@ -45,19 +46,44 @@ def open_session(endpoint: str, delivery: Delivery, timeout_s: float, file: Robo
         return opened
     is_late.set()
     detail = f": {opened}" if opened is not None else f" within {timeout_s} s"
+    if file is not None and _is_turned_away(endpoint, file):
+        raise NotAdmitted(f"the server at {endpoint} takes no messages of robot {file.robot} with this certificate")
     kind = TlsRefused if _listens(endpoint) else Unreachable
     raise kind(f"no session with a server at {endpoint}{detail}", field="endpoint") from opened
 
 
-def _listens(endpoint: str) -> bool:
-    """Whether something takes connections at an encrypted endpoint."""
+def _address(endpoint: str) -> tuple[str, int] | None:
+    """Host and port of an encrypted endpoint."""
     protocol, _, address = endpoint.partition("/")
     host, _, port = address.rpartition(":")
-    if protocol != "tls" or not port.isdecimal():
+    return (host.strip("[]"), int(port)) if protocol == "tls" and port.isdecimal() else None
+
+
+def _listens(endpoint: str) -> bool:
+    """Whether something takes connections at an encrypted endpoint."""
+    address = _address(endpoint)
+    if address is None:
         return False
     try:
-        with socket.create_connection((host.strip("[]"), int(port)), timeout=_PROBE_S):
+        with socket.create_connection(address, timeout=_PROBE_S):
             return True
+    except OSError:
+        return False
+
+
+def _is_turned_away(endpoint: str, file: RobotFile) -> bool:
+    """Whether the server believes the certificate and closes in order: its holder is not admitted any more."""
+    address = _address(endpoint)
+    if address is None:
+        return False
+    try:
+        context = ssl.create_default_context(cafile=None if file.authority is None else str(file.authority))
+        context.load_cert_chain(file.certificate, file.key)
+        with (
+            socket.create_connection(address, timeout=_PROBE_S) as plain,
+            context.wrap_socket(plain, server_hostname=address[0], suppress_ragged_eofs=False) as encrypted,
+        ):
+            return encrypted.recv(1) == b""
     except OSError:
         return False
 

@@ -114,7 +114,7 @@ class CertificateExpired(WaymarkError):
 
 
 class NotAdmitted(WaymarkError):
-    """The session is open, and the server takes nothing of this robot with this certificate."""
+    """The server takes nothing of this robot with this certificate: it is another robot's, or was revoked."""
 
     default_code = "not_admitted"
 
