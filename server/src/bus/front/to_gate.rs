@@ -20,7 +20,7 @@ use tokio::sync::watch;
 
 /// zenoh's protocol with one stream.
 const PROTOCOL: &[u8] = b"zenoh";
-/// Largest wait for a gate that opens again, and for its handshake.
+/// Longest wait for a gate that opens again, and for its handshake.
 const LONGEST: Duration = Duration::from_secs(10);
 /// What the gate may have sent and the robot not taken, in bytes: more would only be older.
 const WINDOW: u32 = 256 << 10;
