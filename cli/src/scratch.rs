@@ -3,7 +3,8 @@
 use server::config::{Config, ConfigError, RawConfig};
 use std::path::{Path, PathBuf};
 
-/// Settings of a server that only this program knows of: free ports, and frames as large as the wire allows.
+/// Settings of a server that only this program knows of: free ports, and frames as large as the wire allows. What it stores is
+/// removed again, so only a full disk stops it, not one that is nearly full.
 pub fn private_server(data: &Path) -> Result<Config, ConfigError> {
     let mut raw = RawConfig {
         data: data.to_owned(),
@@ -12,6 +13,7 @@ pub fn private_server(data: &Path) -> Result<Config, ConfigError> {
         ..RawConfig::default()
     };
     raw.limits.frame_bytes = protos::convert::frame::MAX_FRAME_IMAGE_BYTES;
+    raw.limits.disk_percent = 100;
     Config::try_from(raw)
 }
 
