@@ -1,12 +1,14 @@
 //! What a connection sends, read by zenoh's own codec before a router gets it. In: batches of the transport. Out: what each of
 //! them costs, or why the connection ends.
 //!
-//! A router panics where it forwards a key of more than 65 535 bytes, which a declared prefix and a suffix may make, and its
-//! access control looks at a message after that. So the length of each declared key is kept here, and a key at most
-//! [`MAX_KEY_BYTES`] long passes. Of a message in fragments, the first one names its key. What follows it is a fragment of the
-//! same message for the router only if it goes on without a gap, so each gap ends the connection.
+//! A router panics where it forwards a key of more than 65 535 bytes, which a declared prefix and a suffix may make, and where
+//! it compares a key that is no key expression with others; its access control looks at a message after that. So each declared
+//! key is kept here, and of what a message names, the whole must be a key expression of at most [`MAX_KEY_BYTES`]. Of a message
+//! in fragments, the first one names its key. What follows it is a fragment of the same message for the router only if it goes
+//! on without a gap, so each gap ends the connection.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, btree_map::Entry};
+use zenoh::key_expr::keyexpr;
 use zenoh_buffers::reader::DidntRead;
 use zenoh_codec::{RCodec, Zenoh080, Zenoh080Bounded, Zenoh080Condition, transport::frame::FrameReader};
 use zenoh_protocol::{
@@ -23,6 +25,8 @@ pub(crate) const MAX_KEY_BYTES: usize = 4096;
 /// Most declared keys, subscriptions, queryables, tokens and lasting interests of one connection together. A router of ROS 2
 /// on a robot has some hundreds.
 pub(crate) const MAX_DECLARED: usize = 4096;
+/// Most bytes of the keys of all these.
+pub(crate) const MAX_DECLARED_BYTES: usize = 1 << 20;
 /// Largest sequence number that a router agrees to.
 const MAX_SN: u64 = u32::MAX as u64;
 
@@ -31,7 +35,12 @@ const MAX_SN: u64 = u32::MAX as u64;
 pub(crate) enum Violation {
     #[error("a key is longer than {MAX_KEY_BYTES} bytes")]
     LongKey,
-    #[error("more than {MAX_DECLARED} keys, subscriptions, queryables, tokens and interests are declared")]
+    #[error("a key is no key expression of zenoh")]
+    BadKey,
+    #[error(
+        "more than {MAX_DECLARED} keys, subscriptions, queryables, tokens and interests are declared, or {MAX_DECLARED_BYTES} \
+         bytes of them"
+    )]
     ManyDeclared,
     #[error("what it sends is not zenoh's protocol, or in an order that no client of zenoh sends")]
     Protocol,
@@ -77,11 +86,14 @@ struct Agreed {
 #[derive(Debug, Default)]
 pub(super) struct Inspection {
     agreed: Option<Agreed>,
-    /// Length of each key that the robot has declared, in bytes. One that is declared again counts with the longer.
-    keys: BTreeMap<u16, usize>,
-    /// The same of the router. One that ends is kept: the robot may have used it before it knew.
-    router_keys: BTreeMap<u16, usize>,
-    declared: BTreeSet<(Kind, u32)>,
+    /// The keys that the robot has declared.
+    keys: BTreeMap<u16, Box<str>>,
+    /// Those of the router. One that ends is kept: the robot may have used it before it knew.
+    router_keys: BTreeMap<u16, Box<str>>,
+    /// What the robot has declared, and the length of its key in bytes.
+    declared: BTreeMap<(Kind, u32), usize>,
+    /// Bytes of the keys of both.
+    declared_bytes: usize,
     /// Sequence number of the next fragment, by reliability and priority.
     fragmented: BTreeMap<(bool, u8), u64>,
 }
@@ -97,9 +109,8 @@ impl Inspection {
                 if let NetworkBody::Declare(declare) = &message.body
                     && let DeclareBody::DeclareKeyExpr(it) = &declare.body
                 {
-                    let prefix = self.keys.get(&it.wire_expr.scope).copied().unwrap_or_default();
-                    let longest = self.router_keys.entry(it.id).or_default();
-                    *longest = (prefix + it.wire_expr.suffix.len()).max(*longest);
+                    let prefix = self.keys.get(&it.wire_expr.scope).map_or("", |key| key);
+                    self.router_keys.insert(it.id, [prefix, &it.wire_expr.suffix].concat().into());
                 }
             }
         }
@@ -183,84 +194,131 @@ impl Inspection {
             }
             Ok(key)
         })();
-        self.key(&key?).map(|_| ())
+        self.named(&key?).map(|_| ())
     }
 
     fn message(&mut self, message: &NetworkMessage, cost: &mut Cost) -> Result<(), Violation> {
-        let (key, declared) = match &message.body {
-            NetworkBody::Push(push) => (Some(&push.wire_expr), None),
-            NetworkBody::Request(request) => (Some(&request.wire_expr), None),
-            NetworkBody::Response(response) => (Some(&response.wire_expr), None),
-            NetworkBody::ResponseFinal(_) | NetworkBody::OAM(_) => (None, None),
+        match &message.body {
+            NetworkBody::Push(push) => self.data(&push.wire_expr, cost),
+            NetworkBody::Request(request) => self.data(&request.wire_expr, cost),
+            NetworkBody::Response(response) => self.data(&response.wire_expr, cost),
+            NetworkBody::ResponseFinal(_) | NetworkBody::OAM(_) => Ok(()),
             NetworkBody::Interest(interest) => {
                 cost.declarations += 1;
-                let lasts = matches!(interest.mode, InterestMode::Future | InterestMode::CurrentFuture);
-                let change = (lasts || interest.mode == InterestMode::Final).then_some(lasts);
-                (interest.wire_expr.as_ref(), change.map(|begins| (Kind::Interest, interest.id, begins)))
+                let bytes = interest.wire_expr.as_ref().map_or(Ok(0), |key| self.named(key))?;
+                match interest.mode {
+                    InterestMode::Future | InterestMode::CurrentFuture => {
+                        self.begins(Kind::Interest, interest.id, bytes)
+                    }
+                    InterestMode::Final => {
+                        self.ends(Kind::Interest, interest.id);
+                        Ok(())
+                    }
+                    InterestMode::Current => Ok(()),
+                }
             }
             NetworkBody::Declare(declare) => {
                 cost.declarations += 1;
-                match &declare.body {
-                    DeclareBody::DeclareKeyExpr(it) => {
-                        let bytes = self.key(&it.wire_expr)?;
-                        let longest = self.keys.entry(it.id).or_default();
-                        *longest = bytes.max(*longest);
-                        (None, None)
-                    }
-                    DeclareBody::UndeclareKeyExpr(it) => {
-                        self.keys.remove(&it.id);
-                        (None, None)
-                    }
-                    DeclareBody::DeclareFinal(_) => (None, None),
-                    DeclareBody::DeclareSubscriber(it) => {
-                        (Some(&it.wire_expr), Some((Kind::Subscriber, it.id, true)))
-                    }
-                    DeclareBody::UndeclareSubscriber(it) => {
-                        (Some(&it.ext_wire_expr.wire_expr), Some((Kind::Subscriber, it.id, false)))
-                    }
-                    DeclareBody::DeclareQueryable(it) => {
-                        (Some(&it.wire_expr), Some((Kind::Queryable, it.id, true)))
-                    }
-                    DeclareBody::UndeclareQueryable(it) => {
-                        (Some(&it.ext_wire_expr.wire_expr), Some((Kind::Queryable, it.id, false)))
-                    }
-                    DeclareBody::DeclareToken(it) => (Some(&it.wire_expr), Some((Kind::Token, it.id, true))),
-                    DeclareBody::UndeclareToken(it) => {
-                        (Some(&it.ext_wire_expr.wire_expr), Some((Kind::Token, it.id, false)))
-                    }
-                }
+                self.declaration(&declare.body)
             }
-        };
-        if matches!(message.body, NetworkBody::Push(_) | NetworkBody::Request(_) | NetworkBody::Response(_)) {
-            cost.messages += 1;
         }
-        if let Some(key) = key {
-            self.key(key)?;
-        }
-        match declared {
-            Some((kind, id, true)) => {
-                self.declared.insert((kind, id));
+    }
+
+    fn data(&self, key: &WireExpr<'_>, cost: &mut Cost) -> Result<(), Violation> {
+        cost.messages += 1;
+        self.named(key).map(|_| ())
+    }
+
+    fn declaration(&mut self, body: &DeclareBody) -> Result<(), Violation> {
+        match body {
+            DeclareBody::DeclareKeyExpr(it) => self.key_begins(it.id, &it.wire_expr),
+            DeclareBody::UndeclareKeyExpr(it) => {
+                self.declared_bytes -= self.keys.remove(&it.id).map_or(0, |key| key.len());
+                Ok(())
             }
-            Some((kind, id, false)) => {
-                self.declared.remove(&(kind, id));
+            DeclareBody::DeclareFinal(_) => Ok(()),
+            DeclareBody::DeclareSubscriber(it) => {
+                self.begins(Kind::Subscriber, it.id, self.named(&it.wire_expr)?)
             }
-            None => {}
+            DeclareBody::DeclareQueryable(it) => {
+                self.begins(Kind::Queryable, it.id, self.named(&it.wire_expr)?)
+            }
+            DeclareBody::DeclareToken(it) => self.begins(Kind::Token, it.id, self.named(&it.wire_expr)?),
+            DeclareBody::UndeclareSubscriber(it) => {
+                self.ends_named(Kind::Subscriber, it.id, &it.ext_wire_expr.wire_expr)
+            }
+            DeclareBody::UndeclareQueryable(it) => {
+                self.ends_named(Kind::Queryable, it.id, &it.ext_wire_expr.wire_expr)
+            }
+            DeclareBody::UndeclareToken(it) => {
+                self.ends_named(Kind::Token, it.id, &it.ext_wire_expr.wire_expr)
+            }
         }
-        if self.declared.len() + self.keys.len() > MAX_DECLARED {
+    }
+
+    /// A key that is declared twice stays what it was for a router, and no client of zenoh does that.
+    fn key_begins(&mut self, id: u16, key: &WireExpr<'_>) -> Result<(), Violation> {
+        let Some(whole) = self.whole(key)? else { return Ok(()) };
+        match self.keys.entry(id) {
+            Entry::Occupied(before) if **before.get() != *whole => return Err(Violation::Protocol),
+            Entry::Occupied(_) => {}
+            Entry::Vacant(place) => {
+                self.declared_bytes += whole.len();
+                place.insert(whole.into());
+            }
+        }
+        self.is_within_bounds()
+    }
+
+    fn begins(&mut self, kind: Kind, id: u32, bytes: usize) -> Result<(), Violation> {
+        self.declared_bytes += bytes;
+        self.declared_bytes -= self.declared.insert((kind, id), bytes).unwrap_or_default();
+        self.is_within_bounds()
+    }
+
+    fn ends(&mut self, kind: Kind, id: u32) {
+        self.declared_bytes -= self.declared.remove(&(kind, id)).unwrap_or_default();
+    }
+
+    /// The end of a declaration may name its key, and need not.
+    fn ends_named(&mut self, kind: Kind, id: u32, key: &WireExpr<'_>) -> Result<(), Violation> {
+        if key.scope != 0 || !key.suffix.is_empty() {
+            self.named(key)?;
+        }
+        self.ends(kind, id);
+        Ok(())
+    }
+
+    fn is_within_bounds(&self) -> Result<(), Violation> {
+        let count = self.declared.len() + self.keys.len();
+        if count > MAX_DECLARED || self.declared_bytes > MAX_DECLARED_BYTES {
             return Err(Violation::ManyDeclared);
         }
         Ok(())
     }
 
-    /// Length of a key. The prefix of one that is declared is always of the other end: zenoh writes no mapping there.
-    fn key(&self, key: &WireExpr<'_>) -> Result<usize, Violation> {
+    /// Length of a key that is named, in bytes; 0 of one that rests on what has ended.
+    fn named(&self, key: &WireExpr<'_>) -> Result<usize, Violation> {
+        self.whole(key).map(|whole| whole.map_or(0, |whole| whole.len()))
+    }
+
+    /// The whole of a key, with its prefix; `None` if that has ended, which the end may have overtaken. The prefix of one that
+    /// is declared is always of the other end: zenoh writes no mapping there.
+    fn whole(&self, key: &WireExpr<'_>) -> Result<Option<String>, Violation> {
         let prefix = match key.mapping {
-            _ if key.scope == 0 => 0,
-            Mapping::Sender => self.keys.get(&key.scope).copied().unwrap_or_default(),
-            Mapping::Receiver => *self.router_keys.get(&key.scope).ok_or(Violation::Protocol)?,
+            _ if key.scope == 0 => "",
+            Mapping::Sender => match self.keys.get(&key.scope) {
+                Some(prefix) => prefix,
+                None => return Ok(None),
+            },
+            Mapping::Receiver => self.router_keys.get(&key.scope).ok_or(Violation::Protocol)?,
         };
-        let bytes = prefix + key.suffix.len();
-        if bytes > MAX_KEY_BYTES { Err(Violation::LongKey) } else { Ok(bytes) }
+        if prefix.len() + key.suffix.len() > MAX_KEY_BYTES {
+            return Err(Violation::LongKey);
+        }
+        let whole = [prefix, &key.suffix].concat();
+        keyexpr::new(&whole).map_err(|_| Violation::BadKey)?;
+        Ok(Some(whole))
     }
 }
 
