@@ -23,7 +23,7 @@ pub use live_event::LiveEvent;
 use super::{
     cameras::CameraRegistry,
     decode::{ImageLimits, mosaic::mosaic},
-    robot_activity::{RobotActivities, RobotActivity},
+    robot_activity::{Input, Refused, RobotActivities, RobotActivity},
     slots::SlotKey,
     unknown_robots::{UnknownRobot, UnknownRobots},
 };
@@ -178,9 +178,21 @@ impl LiveHub {
         self.robots().0.get(robot, now)
     }
 
-    /// A message of a registered robot came.
-    pub fn heard(&self, robot: &Name, now: Instant) {
-        self.robots().0.heard(robot, now);
+    /// An input of a registered robot was used. Frames are counted with their answers.
+    pub fn used(&self, robot: &Name, input: Input, now: Instant) {
+        self.robots().0.used(robot, input, now);
+    }
+
+    /// An input of a registered robot was refused. The log is told at once, and then once a minute.
+    pub fn refused(&self, robot: &Name, input: Input, refused: Refused<'_>, now: Instant) {
+        let Some(count) = self.robots().0.refused(robot, input, refused, now) else { return };
+        let (input, Refused { code, field, detail }) = (input.word(), refused);
+        tracing::warn!(%robot, input, code, field, detail, count, "robot_input_refused");
+    }
+
+    /// The same of a topic of ROS, of which the log is told by topic.
+    pub fn refused_by_topic(&self, robot: &Name, input: Input, refused: Refused<'_>, now: Instant) {
+        self.robots().0.refused(robot, input, refused, now);
     }
 
     /// Forgets what a robot has done.
@@ -223,7 +235,7 @@ impl LiveHub {
             Some(rejection) if rejection.code == Code::UnknownRobot.as_str() => {
                 self.refused_unknown(&key.robot, Some(&key.camera), now);
             }
-            Some(rejection) => self.robots().0.refused(&key.robot, rejection, now),
+            Some(rejection) => self.refused(&key.robot, Input::Frame, Refused::from(rejection), now),
             None => {}
         }
         self.send(LiveEvent::Answer { robot: key.robot.clone(), camera: key.camera.clone(), answer });

@@ -35,6 +35,7 @@ use super::{
     live::LiveHub,
     mapping::MappingSessions,
     quotas::{Kind, Quotas},
+    robot_activity::Input,
     snapshot::Snapshots,
 };
 use map::{
@@ -132,8 +133,8 @@ impl MotionTracker {
     /// counted.
     pub fn odometry(&self, robot: &Name, message: Bytes, received: Instant) -> Option<v1::RobotPose> {
         let taken = self.checked_odometry(robot, message, received);
-        self.note_message(robot, &taken, received);
-        let (map, odometry, state) = self.lock().odometry.count("odometry", robot, taken)?;
+        self.note_message(robot, Input::Odometry, &taken, received);
+        let (map, odometry, state) = self.lock().odometry.count(taken)?;
         let mut state = lock_robot(&state);
         state.apply_odometry(odometry.captured_ns, odometry.odom_from_robot, received);
         let on_map = state.odometry_on_map(&odometry.odom_from_robot);
@@ -168,8 +169,8 @@ impl MotionTracker {
     /// or for the mapping if the robot makes a map.
     pub fn scan(&self, robot: &Name, message: Bytes, received: Instant) {
         let taken = self.checked_scan(robot, message, received);
-        self.note_message(robot, &taken, received);
-        let Some(Some(job)) = self.lock().scans.count("scan", robot, taken) else { return };
+        self.note_message(robot, Input::Scan, &taken, received);
+        let Some(Some(job)) = self.lock().scans.count(taken) else { return };
         if self.scans.offer(robot, job)
             && let Ok(state) = self.lock().robot(robot)
         {
@@ -177,14 +178,14 @@ impl MotionTracker {
         }
     }
 
-    /// Tells pages that a message came, or that an unknown robot sent it.
-    fn note_message<T>(&self, robot: &Name, taken: &Result<T, Rejection>, received: Instant) {
+    /// Counts a message for its robot, or for those that are not registered.
+    fn note_message<T>(&self, robot: &Name, input: Input, taken: &Result<T, Rejection>, received: Instant) {
         match taken {
-            Ok(_) => self.live.heard(robot, received),
+            Ok(_) => self.live.used(robot, input, received),
             Err(rejection) if rejection.code == Code::UnknownRobot => {
                 self.live.refused_unknown(robot, None, received);
             }
-            Err(_) => {}
+            Err(rejection) => self.live.refused(robot, input, rejection.into(), received),
         }
     }
 

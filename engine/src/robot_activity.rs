@@ -1,7 +1,13 @@
-//! What each robot does. In: answers and refusals of its frames, and its other messages, each with its time. Out: counts since
-//! the start of the server, the last refusal, and how long ago the last of each was. Knows no clock and no transport.
+//! What each robot does. In: answers of its frames, its other messages, and what was refused of all, each with its time. Out:
+//! counts since the start of the server, the reasons of refusals, and how long ago the last of each was. Knows no clock and
+//! no transport.
+
+mod inputs;
+
+pub use inputs::{Input, InputActivity, MAX_REASONS, Reason, Refused};
 
 use crate::limits::MAX_ROBOTS;
+use inputs::Inputs;
 use protos::{Name, v1};
 use std::{
     collections::BTreeMap,
@@ -13,30 +19,15 @@ pub const RATE_SECONDS: u64 = 10;
 /// The seconds of the rate, and the one that is not over.
 const RING: usize = RATE_SECONDS as usize + 1;
 
-/// A refused frame.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct RefusedFrame {
-    /// Word of the code.
-    pub code: String,
-    /// The field at fault.
-    pub field: String,
-    /// A sentence for a person.
-    pub detail: String,
-    /// Time since it was refused.
-    pub ago: Duration,
-}
-
 /// What a robot has done since the start of the server.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RobotActivity {
     /// Frames that were searched for landmarks and answered.
     pub answered: u64,
-    /// Refused frames, by the word of the code. Codes are the server's own: their number bounds it.
-    pub refused: BTreeMap<String, u64>,
-    /// The last refused frame.
-    pub last_refusal: Option<RefusedFrame>,
-    /// Time since the last message: a frame, odometry or a scan.
-    pub last_message: Duration,
+    /// What was used and refused, by kind; kinds of which nothing came are absent.
+    pub inputs: Vec<InputActivity>,
+    /// Time since the last message, used or refused; absent where only connections were refused.
+    pub last_message: Option<Duration>,
     /// Time since the last frame in which a landmark was named.
     pub last_recognised: Option<Duration>,
     /// Time since the last frame that gave a fix.
@@ -87,10 +78,11 @@ impl FrameRate {
 #[derive(Debug)]
 struct Record {
     first: Instant,
+    /// Of anything, for the order in which robots are forgotten.
     last: Instant,
+    message: Option<Instant>,
     answered: u64,
-    refused: BTreeMap<String, u64>,
-    refusal: Option<(v1::Rejection, Instant)>,
+    inputs: Inputs,
     recognised: Option<Instant>,
     fixed: Option<Instant>,
     rate: FrameRate,
@@ -101,9 +93,9 @@ impl Record {
         Self {
             first: now,
             last: now,
+            message: None,
             answered: 0,
-            refused: BTreeMap::new(),
-            refusal: None,
+            inputs: Inputs::default(),
             recognised: None,
             fixed: None,
             rate: FrameRate::default(),
@@ -120,15 +112,16 @@ impl Record {
 pub struct RobotActivities(BTreeMap<Name, Record>);
 
 impl RobotActivities {
-    /// A message of a registered robot came.
-    pub fn heard(&mut self, robot: &Name, now: Instant) {
-        self.record(robot, now);
+    /// An input of a registered robot was used. Frames are counted by [`Self::answered`].
+    pub fn used(&mut self, robot: &Name, input: Input, now: Instant) {
+        self.record(robot, input, now).inputs.used(input);
     }
 
     /// A frame was answered.
     pub fn answered(&mut self, robot: &Name, answer: &v1::Answer, now: Instant) {
-        let record = self.record(robot, now);
+        let record = self.record(robot, Input::Frame, now);
         record.answered += 1;
+        record.inputs.used(Input::Frame);
         let second = record.second(now);
         record.rate.add(second);
         let is_named =
@@ -141,11 +134,9 @@ impl RobotActivities {
         }
     }
 
-    /// A frame was refused.
-    pub fn refused(&mut self, robot: &Name, rejection: &v1::Rejection, now: Instant) {
-        let record = self.record(robot, now);
-        *record.refused.entry(rejection.code.clone()).or_default() += 1;
-        record.refusal = Some((rejection.clone(), now));
+    /// An input was refused. How many were for this reason since the log was told of it, where it is to be told again.
+    pub fn refused(&mut self, robot: &Name, input: Input, refused: Refused<'_>, now: Instant) -> Option<u64> {
+        self.record(robot, input, now).inputs.refused(input, refused, now)
     }
 
     /// Forgets a robot that is deleted.
@@ -157,30 +148,26 @@ impl RobotActivities {
     pub fn get(&self, robot: &Name, now: Instant) -> Option<RobotActivity> {
         let record = self.0.get(robot)?;
         let ago = |at: Instant| now.saturating_duration_since(at);
-        let refusal = |(rejection, at): &(v1::Rejection, Instant)| RefusedFrame {
-            code: rejection.code.clone(),
-            field: rejection.field.clone(),
-            detail: rejection.detail.clone(),
-            ago: ago(*at),
-        };
         Some(RobotActivity {
             answered: record.answered,
-            refused: record.refused.clone(),
-            last_refusal: record.refusal.as_ref().map(refusal),
-            last_message: ago(record.last),
+            inputs: record.inputs.shown(now),
+            last_message: record.message.map(ago),
             last_recognised: record.recognised.map(ago),
             last_fix: record.fixed.map(ago),
             frames_per_s: record.rate.per_second(record.second(now)),
         })
     }
 
-    fn record(&mut self, robot: &Name, now: Instant) -> &mut Record {
+    fn record(&mut self, robot: &Name, input: Input, now: Instant) -> &mut Record {
         if self.0.len() >= MAX_ROBOTS && !self.0.contains_key(robot) {
             let oldest = self.0.iter().min_by_key(|(_, record)| record.last).map(|(name, _)| name.clone());
             oldest.map(|name| self.0.remove(&name));
         }
         let record = self.0.entry(robot.clone()).or_insert_with(|| Record::new(now));
         record.last = record.last.max(now);
+        if input != Input::Connection {
+            record.message = record.message.max(Some(now));
+        }
         record
     }
 }
@@ -193,8 +180,8 @@ mod tests {
         Name::new(text).unwrap()
     }
 
-    fn rejection(code: &str) -> v1::Rejection {
-        v1::Rejection { code: code.into(), field: "image".into(), detail: "it is none".into() }
+    fn refused(code: &str) -> Refused<'_> {
+        Refused { code, field: "image", detail: "it is none" }
     }
 
     fn at(start: Instant, ms: u64) -> Instant {
@@ -228,21 +215,17 @@ mod tests {
     }
 
     #[test]
-    fn refusals_are_counted_by_code_and_the_last_is_told() {
+    fn messages_and_refusals_have_a_time_and_a_robot_is_forgotten_whole() {
         let (mut all, start, r1) = (RobotActivities::default(), Instant::now(), name("r1"));
         assert_eq!(all.get(&r1, start), None);
-        all.refused(&r1, &rejection("bad_image"), start);
-        all.refused(&r1, &rejection("bad_image"), at(start, 10));
-        all.refused(&r1, &rejection("not_newer"), at(start, 20));
-        all.heard(&r1, at(start, 50));
+        all.refused(&r1, Input::Connection, refused("bad_certificate"), start);
+        assert_eq!(all.get(&r1, start).unwrap().last_message, None, "it has said nothing");
+        all.refused(&r1, Input::Frame, refused("not_newer"), at(start, 20));
+        all.used(&r1, Input::Scan, at(start, 50));
         let found = all.get(&r1, at(start, 60)).unwrap();
-        assert_eq!(found.refused, [("bad_image".into(), 2), ("not_newer".into(), 1)].into());
-        let last = found.last_refusal.unwrap();
-        assert_eq!(
-            (last.code.as_str(), last.field.as_str(), last.ago.as_millis()),
-            ("not_newer", "image", 40)
-        );
-        assert_eq!((found.answered, found.last_message.as_millis()), (0, 10));
+        let inputs: Vec<_> = found.inputs.iter().map(|i| (i.input, i.used, i.refused)).collect();
+        assert_eq!(inputs, [(Input::Frame, 0, 1), (Input::Scan, 1, 0), (Input::Connection, 0, 1)]);
+        assert_eq!((found.answered, found.last_message), (0, Some(Duration::from_millis(10))));
         all.forget(&r1);
         assert_eq!(all.get(&r1, start), None);
     }
@@ -267,10 +250,10 @@ mod tests {
     fn robots_are_bounded_and_the_longest_silent_one_goes() {
         let (mut all, start) = (RobotActivities::default(), Instant::now());
         for i in 0..MAX_ROBOTS as u64 {
-            all.heard(&name(&format!("r{i}")), at(start, i));
+            all.used(&name(&format!("r{i}")), Input::Scan, at(start, i));
         }
-        all.heard(&name("r0"), at(start, 20_000));
-        all.heard(&name("new"), at(start, 20_001));
+        all.used(&name("r0"), Input::Scan, at(start, 20_000));
+        all.used(&name("new"), Input::Scan, at(start, 20_001));
         assert_eq!(all.0.len(), MAX_ROBOTS);
         let is_there = |robot: &str| all.get(&name(robot), start).is_some();
         assert!(is_there("new") && is_there("r0") && !is_there("r1"));

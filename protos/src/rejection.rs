@@ -112,6 +112,43 @@ impl Code {
     }
 }
 
+impl Code {
+    /// The code of a word.
+    pub fn of(word: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|code| code.as_str() == word)
+    }
+
+    /// What whoever runs the robot or the server can do, in a sentence.
+    pub fn advice(self) -> &'static str {
+        match self {
+            Code::BadMessage => {
+                "Send the message that belongs to this key, by the SDK or by `protos/waymark/v1`."
+            }
+            Code::BadName => "Use lower-case letters, digits, `-` and `_`, at most 64.",
+            Code::Missing => "Set the field.",
+            Code::NotFinite | Code::OutOfRange => "Correct the field; the sentence says what it may be.",
+            Code::TooLarge => "Send a JPEG or a smaller picture, or raise the limit that the sentence names.",
+            Code::SizeMismatch => "Send width, height and step of the picture that is sent.",
+            Code::WrongEncoding => "Name the encoding that the bytes have.",
+            Code::BadImage => "Open a picture of this camera in a viewer; send JPEG, PNG or raw pixels.",
+            Code::UnknownRobot => "Register it: `waymark robot add NAME MAP`.",
+            Code::UnknownMap => "Name the map that the robot is registered on, or none.",
+            Code::RobotContested | Code::MapContested => {
+                "See `waymark server list`: take the map or the robot from all servers but one."
+            }
+            Code::ServerGone => "Start that server, or look at its connection to the router.",
+            Code::NotNewer => "Let `seq` rise with each message of a start and a camera.",
+            Code::EpochConflict => "Two programs use this robot's name: stop one of them.",
+            Code::ClockAhead | Code::ClockBehind => "Stamp all messages of a robot by one clock, at capture.",
+            Code::Expired => "Send fewer frames, give a longer deadline, or give the server more cores.",
+            Code::TooMany => "Use fewer, or raise the limit that the sentence names.",
+            Code::RateLimited => "Send less often, or raise the limit that the sentence names.",
+            Code::Overloaded => "Send smaller frames, less often.",
+            Code::Internal => "This is a fault of the server: its log says where. Please report it.",
+        }
+    }
+}
+
 impl std::fmt::Display for Code {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(self.as_str())
@@ -162,6 +199,8 @@ mod tests {
     #[test]
     fn codes_are_distinct_words() {
         let mut words: Vec<_> = Code::ALL.iter().map(|c| c.as_str()).collect();
+        assert!(Code::ALL.iter().all(|code| Code::of(code.as_str()) == Some(*code)));
+        assert_eq!(Code::of("bad_scan"), None);
         words.sort_unstable();
         words.dedup();
         assert_eq!(words.len(), Code::ALL.len());

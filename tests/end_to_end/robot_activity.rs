@@ -13,7 +13,7 @@ use std::{
     f64::consts::FRAC_PI_2,
     time::{Duration, Instant},
 };
-use tests::{Inside, SOON, eventually, pictures, robots::connect};
+use tests::{Inside, SOON, command::waymark, eventually, pictures, robots::connect};
 
 #[tokio::test(flavor = "multi_thread")]
 async fn what_a_robot_does_is_told() {
@@ -34,10 +34,15 @@ async fn what_a_robot_does_is_told() {
     assert_eq!(refused.rejection.expect("a refusal").code, "unknown_map");
 
     let activity = maps.robots().await.expect("robots")[0].activity.clone().expect("activity");
-    assert_eq!((activity.answered, activity.refused.clone()), (3, [("unknown_map".to_owned(), 1)].into()));
-    let last = activity.last_refusal.expect("the last refusal");
-    assert_eq!((last.code.as_str(), last.field.as_str()), ("unknown_map", "map"));
+    let [frames] = activity.inputs.as_slice() else { panic!("{activity:?}") };
+    assert_eq!(
+        (frames.input.as_str(), frames.used, frames.refused, frames.refused_in_a_row),
+        ("frame", 3, 1, 1)
+    );
+    let [last] = frames.reasons.as_slice() else { panic!("{frames:?}") };
+    assert_eq!((last.code.as_str(), last.field.as_str(), last.count), ("unknown_map", "map", 1));
     assert!(last.detail.contains("cellar") && Duration::from_millis(last.ago_ms) <= answered.elapsed());
+    assert_eq!(last.advice, "Name the map that the robot is registered on, or none.");
     assert_eq!(activity.last_recognised_ms, None, "the map has no landmark");
     assert!(activity.frames_per_s <= 3.0);
 
@@ -45,6 +50,59 @@ async fn what_a_robot_does_is_told() {
     maps.delete_robot("r1").await.expect("deleted");
     let again = maps.put_robot("r1", "hall").await.expect("robot");
     assert_eq!(again.activity, None, "a robot of the same name begins anew");
+    inside.server.stop().await;
+}
+
+/// Neither scans nor odometry are answered: the robot's own page, and `robot show`, are where their refusal is seen.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_robot_whose_every_scan_and_odometry_is_refused_says_so() {
+    let inside = Inside::start(Limits::default()).await;
+    let maps = inside.maps();
+    maps.create_map(&NewMap::new("hall")).await.expect("map");
+    maps.put_robot("r1", "hall").await.expect("robot");
+    let robot = connect(&inside.server.zenoh_endpoint, "r1").await;
+    for at in 0..40 {
+        let odom_from_robot = Some(v1::Pose2 { x_m: 1.0, ..v1::Pose2::default() });
+        let two_turns = v1::Scan {
+            captured_ns: 1_000_000_000 + at * 25_000_000,
+            odom_from_robot,
+            robot_from_laser: Some(v1::Pose2::default()),
+            max_range_m: 10.0,
+            bearing_step_rad: 0.1,
+            ranges_m: vec![2.0; 126],
+            ..v1::Scan::default()
+        };
+        robot.publish_scan(two_turns).await.expect("sent");
+    }
+    // An hour before the odometry that came first.
+    for captured_s in [10_000, 6_400, 6_401] {
+        robot.publish_odometry_at(captured_s * 1_000_000_000, &Pose2::default()).await.expect("sent");
+    }
+    let input = async |name: &str| {
+        let activity = maps.robot("r1").await.expect("the robot").activity;
+        let inputs = activity.map(|activity| activity.inputs).unwrap_or_default();
+        inputs.into_iter().find(|input| input.input == name).unwrap_or_default()
+    };
+    let (scans, odometry) = eventually("all are counted", async || {
+        let (scans, odometry) = (input("scan").await, input("odometry").await);
+        (scans.refused == 40 && odometry.used + odometry.refused == 3).then_some((scans, odometry))
+    })
+    .await;
+    assert_eq!((scans.used, scans.refused_in_a_row, scans.reasons.len()), (0, 40, 1));
+    let why = &scans.reasons[0];
+    assert_eq!((why.code.as_str(), why.count), ("out_of_range", 40));
+    assert!(
+        why.field.contains("bearing_step_rad") && !why.detail.is_empty() && !why.advice.is_empty(),
+        "{why:?}"
+    );
+    assert_eq!((odometry.used, odometry.refused_in_a_row), (1, 2));
+    assert_eq!(odometry.reasons[0].code, "clock_behind");
+    assert_eq!(odometry.reasons[0].advice, "Stamp all messages of a robot by one clock, at capture.");
+    let shown = waymark(["robot", "show", "r1", "--server", &inside.url()], SOON);
+    assert_eq!(shown.status, 0, "{shown:?}");
+    assert!(shown.stdout.contains("scan         0 used, 40 refused, the last 40 in a row"), "{shown:?}");
+    assert!(shown.stdout.contains(&why.detail) && shown.stdout.contains(&why.advice), "{shown:?}");
+    robot.close().await.expect("closed");
     inside.server.stop().await;
 }
 

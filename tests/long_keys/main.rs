@@ -96,6 +96,14 @@ async fn long_keys_of_a_robot_disturb_no_other() {
             is_served(&other, &inside).await;
             assert_eq!(PANICS.load(Ordering::Relaxed), 0, "panics after {kind:?}");
         }
+        if enabled {
+            // Whoever runs the server sees it, too.
+            let activity = inside.maps().robot("r1").await.expect("the robot").activity.expect("activity");
+            let [connections] = activity.inputs.as_slice() else { panic!("{activity:?}") };
+            let [why] = connections.reasons.as_slice() else { panic!("{connections:?}") };
+            assert_eq!((connections.input.as_str(), why.code.as_str()), ("connection", "long_key"));
+            assert!(why.count >= 12 && !why.advice.is_empty(), "{why:?}");
+        }
         inside.server.stop().await;
     }
 }

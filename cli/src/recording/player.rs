@@ -119,7 +119,7 @@ impl Player {
         progress.finish_and_clear();
         if let Some(bag) = drive.bag() {
             let problems = bag.problems().map(|(word, count, first)| (word, (count, first.to_owned())));
-            self.played.counts.problems = problems.collect();
+            self.played.counts.problems.extend(problems);
         }
         if let Some(answers) = self.answers {
             answers.finish()?;
@@ -156,10 +156,14 @@ impl Player {
             }
             (_, Body::Odometry(message)) => {
                 let at_ns = self.clock.stamp(message.captured_ns, now_ns());
-                // What the server would refuse is left out: the SDK sends poses that are in range.
-                if let Some(Ok(pose)) = message.odom_from_robot.as_ref().map(pose2) {
-                    self.client.publish_odometry_at(at_ns, &pose).await?;
-                    self.played.counts.odometry += 1;
+                match message.odom_from_robot.as_ref().map(pose2) {
+                    Some(Ok(pose)) => {
+                        self.client.publish_odometry_at(at_ns, &pose).await?;
+                        self.played.counts.odometry += 1;
+                    }
+                    // The SDK sends poses that are in range.
+                    Some(Err(why)) => self.not_sent("bad_odometry", &format!("odometry is not sent: {why}")),
+                    None => self.not_sent("bad_odometry", "odometry without a pose is not sent"),
                 }
             }
             (_, Body::Scan(mut scan)) => {
@@ -195,6 +199,10 @@ impl Player {
             answers.write(Recorded { log_time_ns, key, body: Body::Answer(answer) })?;
         }
         Ok(())
+    }
+
+    fn not_sent(&mut self, word: &'static str, why: &str) {
+        self.played.counts.problems.entry(word).or_insert_with(|| (0, why.to_owned())).0 += 1;
     }
 
     fn count(&mut self, answer: &Answer) {

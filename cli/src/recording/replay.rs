@@ -7,10 +7,14 @@ use super::{
 };
 use crate::{
     failure::{Class, Failure},
+    robot::inputs,
     session::Session,
 };
 use anyhow::Context as _;
-use client::protos::Name;
+use client::{
+    api::{RobotActivity, RobotInput},
+    protos::Name,
+};
 use recordings::{
     BagRobot, Body, DriveReader, DriveWriter, bag,
     compare::Play,
@@ -24,7 +28,11 @@ use std::{
     path::{Path, PathBuf},
     process::ExitCode,
     sync::Arc,
+    time::{Duration, Instant},
 };
+
+/// Longest wait until the server has seen what was sent.
+const SETTLED: Duration = Duration::from_secs(2);
 
 /// `waymark replay`.
 #[derive(Debug, clap::Args)]
@@ -113,8 +121,11 @@ async fn replay(session: &Session, args: &Args) -> anyhow::Result<ExitCode> {
         is_map_given: args.map.is_some(),
     };
     let drive = DriveReader::open_bag(opened(&args.file)?, bag).with_context(|| unreadable(&args.file))?;
+    let earlier = activity(session, &robot).await;
     let player = Player::connect(options, answers.transpose()?).await?;
     let played = player.play(drive).await.with_context(|| unreadable(&args.file))?;
+    let inputs =
+        inputs_used(session, &robot, earlier.as_ref(), played.counts.odometry + played.counts.scans).await;
     let before = before.or_else(|| args.compare.is_some().then_some(played.before));
     let comparison = before.map(|before| before.compare(&played.now));
     if comparison.as_ref().is_some_and(|c| c.frames == 0) {
@@ -123,9 +134,33 @@ async fn replay(session: &Session, args: &Args) -> anyhow::Result<ExitCode> {
         return Err(Failure::new(Class::NotFound, "no_answers", sentence).into());
     }
     let is_different = comparison.as_ref().is_some_and(recordings::compare::Comparison::is_different);
-    let report = ReplayReport { robot, counts: played.counts, comparison };
+    let report = ReplayReport { robot, counts: played.counts, inputs, comparison };
     session.show(&report, &table(&report))?;
     Ok(if is_different { ExitCode::FAILURE } else { ExitCode::SUCCESS })
+}
+
+/// What the robot has done; none before its first message, or where it is not registered.
+async fn activity(session: &Session, robot: &Name) -> Option<RobotActivity> {
+    session.maps().robot(robot.as_str()).await.ok()?.activity
+}
+
+/// What the server used and refused of the messages since `earlier`, as soon as it has seen the `sent` ones without an answer.
+async fn inputs_used(
+    session: &Session,
+    robot: &Name,
+    earlier: Option<&RobotActivity>,
+    sent: u64,
+) -> Vec<RobotInput> {
+    let until = Instant::now() + SETTLED;
+    loop {
+        let new = activity(session, robot).await.map(|now| inputs::since(earlier, &now)).unwrap_or_default();
+        let is_answered = |input: &&RobotInput| input.input == "frame";
+        let seen: u64 = new.iter().filter(|i| !is_answered(i)).map(|i| i.used + i.refused).sum();
+        if seen >= sent || Instant::now() > until {
+            return new;
+        }
+        tokio::time::sleep(Duration::from_millis(50)).await;
+    }
 }
 
 fn opened(path: &Path) -> anyhow::Result<BufReader<File>> {

@@ -1,7 +1,8 @@
 //! The result of a replay, for a person and as JSON.
 
 use super::player::Counts;
-use client::protos::Name;
+use crate::robot::inputs;
+use client::{api::RobotInput, protos::Name};
 use recordings::compare::{Change, Comparison};
 use serde::Serialize;
 
@@ -15,6 +16,8 @@ pub(super) struct ReplayReport {
     pub(super) robot: Name,
     #[serde(flatten)]
     pub(super) counts: Counts,
+    /// What the server used and refused of it.
+    pub(super) inputs: Vec<RobotInput>,
     /// Absent unless it was asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) comparison: Option<Comparison>,
@@ -35,6 +38,8 @@ pub(super) fn table(report: &ReplayReport) -> String {
         counts.cut_off_at.map(|at| format!("cut off      the file ends inside a record at byte {at}")),
     );
     lines.extend(counts.problems.values().map(|(n, first)| format!("{n:6} times  {first}")));
+    let refused: Vec<_> = report.inputs.iter().filter(|input| input.refused > 0).cloned().collect();
+    lines.extend(inputs::lines(&refused));
     lines.extend(report.comparison.iter().flat_map(comparison_lines));
     lines.join("\n")
 }
@@ -84,12 +89,19 @@ mod tests {
         }
         let comparison = Some(before.compare(&now));
         let counts = Counts { frames: 22, cut_off_at: Some(7), ..Counts::default() };
-        let text = table(&ReplayReport { robot, counts, comparison });
+        let input =
+            |input: &str, refused| RobotInput { input: input.into(), refused, ..RobotInput::default() };
+        let inputs = vec![input("odometry", 0), input("scan", 12)];
+        let text = table(&ReplayReport { robot, counts, inputs, comparison });
         assert!(text.contains("frame 0 of front: not answered now: nothing -> nothing"), "{text}");
         assert!(
             text.contains("not answered now     22\n") && text.ends_with("and 2 more: --json lists all"),
             "{text}"
         );
         assert!(text.contains("ends inside a record at byte 7"), "{text}");
+        assert!(
+            text.contains("\nscan         0 used, 12 refused\n") && !text.contains("odometry     0"),
+            "{text}"
+        );
     }
 }

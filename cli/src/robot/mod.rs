@@ -3,6 +3,7 @@
 mod access_control;
 mod certificates;
 mod enrol;
+pub(crate) mod inputs;
 
 use super::{
     answers::{pose_line, trust},
@@ -34,7 +35,7 @@ enum Verb {
     },
     /// List the robots: the map of each, whether it is connected, where it is and how far that is trusted.
     List,
-    /// Show a robot: connection, pose, and what that rests on.
+    /// Show a robot: connection, pose, what that rests on, and which of its messages are used or refused.
     Show {
         /// The robot.
         robot: String,
@@ -144,13 +145,16 @@ fn text(robot: &Robot, corrections: &CorrectionsBody) -> String {
     if !corrections.modalities.is_empty() {
         lines.push(format!("  rests on {}", corrections.modalities.join(", ")));
     }
+    if let Some(activity) = &robot.activity {
+        lines.extend(inputs::lines(&activity.inputs).iter().map(|line| format!("  {line}")));
+    }
     lines.join("\n")
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use client::api::{EpochConflictBody, RobotPose};
+    use client::api::{EpochConflictBody, RobotActivity, RobotInput, RobotPose};
 
     #[test]
     fn a_robot_is_shown_with_its_pose_and_a_second_program_of_its_name() {
@@ -164,5 +168,10 @@ mod tests {
         let lines = text(&robot, &rests);
         assert!(lines.starts_with("r1 on hall: connected\n  pose   1.50, 0.00 m, 0 deg"), "{lines}");
         assert!(lines.contains("3 messages refused") && lines.ends_with("rests on laser"), "{lines}");
+        let scans =
+            RobotInput { input: "scan".into(), refused: 9, refused_in_a_row: 9, ..RobotInput::default() };
+        let activity = Some(RobotActivity { inputs: vec![scans], ..RobotActivity::default() });
+        let lines = text(&Robot { activity, ..robot }, &rests);
+        assert!(lines.ends_with("\n  scan         0 used, 9 refused, the last 9 in a row"), "{lines}");
     }
 }

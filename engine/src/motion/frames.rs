@@ -6,6 +6,7 @@
 //! which role a fix goes to the fusion: landmarks that the prior pose named correct it and do nothing else.
 
 use super::{MAX_POSE_AGE, MotionTracker, lock_robot, robot::RobotState, timebase::Stream};
+use crate::robot_activity::Input;
 use map::{
     fuse::{FixRole, FusedPose},
     guided::{Decision, FramePlan, FrameReport},
@@ -101,7 +102,10 @@ impl MotionTracker {
         let checked = state.check_stamp(&stream, frame.captured_ns, frame.odometry, received);
         let instead_ns = state.clock_ns(received).unwrap_or(frame.captured_ns);
         drop(state);
-        self.lock().stamps.count("frame", robot, checked).ok_or(instead_ns)
+        if let Err(rejection) = &checked {
+            self.live.refused(robot, Input::Frame, rejection.into(), received);
+        }
+        self.lock().stamps.count(checked).ok_or(instead_ns)
     }
 
     /// The robot's pose at a frame without the frame. It chooses between two solutions, names look-alikes, and checks

@@ -23,14 +23,13 @@ pub struct MessageCounts {
 
 impl MessageCounts {
     /// Counts a message as accepted or refused.
-    pub(super) fn count<T>(&mut self, kind: &str, robot: &Name, taken: Result<T, Rejection>) -> Option<T> {
+    pub(super) fn count<T>(&mut self, taken: Result<T, Rejection>) -> Option<T> {
         match taken {
             Ok(message) => {
                 self.accepted += 1;
                 Some(message)
             }
             Err(rejection) => {
-                tracing::debug!(%robot, kind, %rejection, "message_refused");
                 *self.rejected.entry(rejection.code).or_default() += 1;
                 None
             }

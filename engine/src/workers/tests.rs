@@ -66,7 +66,7 @@ struct ToldAt(Engine, Mutex<Vec<(u64, u64)>>);
 impl Publish for ToldAt {
     fn answer(&self, key: &SlotKey, _: &v1::Answer) {
         let told = self.0.live.activity(&key.robot, Instant::now());
-        let counts = told.map_or((0, 0), |told| (told.answered, told.refused.values().sum()));
+        let counts = told.map_or((0, 0), |told| (told.answered, told.inputs.iter().map(|i| i.refused).sum()));
         self.1.lock().unwrap().push(counts);
     }
 

@@ -1,7 +1,6 @@
 //! What robots do, and those that are not registered.
 
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 
 /// What a robot has done since the server started.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -9,30 +8,47 @@ use std::collections::BTreeMap;
 pub struct RobotActivity {
     /// Frames that were searched for landmarks and answered.
     pub answered: u64,
-    /// Refused frames, by code.
-    #[cfg_attr(feature = "openapi", schema(value_type = Object))]
-    pub refused: BTreeMap<String, u64>,
-    /// The last refused frame.
-    pub last_refusal: Option<RefusedFrame>,
-    /// Since the last message: a frame, odometry or a scan.
-    pub last_message_ms: u64,
+    /// What was used and what was refused, by kind; a kind of which nothing came is absent.
+    pub inputs: Vec<RobotInput>,
+    /// Since the last message, used or refused; absent where only connections were refused.
+    pub last_message_ms: Option<u64>,
     /// Since the last frame in which a landmark was named; absent if there was none.
     pub last_recognised_ms: Option<u64>,
     /// Answered frames in a second, over the last ten whole seconds, or all since its first message.
     pub frames_per_s: f64,
 }
 
-/// A refused frame of a robot.
+/// What became of one kind of a robot's messages.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
-pub struct RefusedFrame {
-    /// The stable code.
+pub struct RobotInput {
+    /// `frame`, `odometry`, `scan`; of ROS 2 also `camera_info` and `transform`; `connection`: its links to the server.
+    pub input: String,
+    /// How many were used.
+    pub used: u64,
+    /// How many were refused, or lack what others need.
+    pub refused: u64,
+    /// How many of them since the last that was used: where it rises, none is used any more.
+    pub refused_in_a_row: u64,
+    /// Why, the last reason first.
+    pub reasons: Vec<RefusalReason>,
+}
+
+/// Why messages of a robot were refused.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct RefusalReason {
+    /// A stable word.
     pub code: String,
-    /// The field at fault.
+    /// The field at fault of the last one, or the topic of ROS.
     pub field: String,
-    /// A sentence for a person.
+    /// A sentence for a person about the last one.
     pub detail: String,
-    /// Since it was refused.
+    /// What to do; empty where the sentence says it.
+    pub advice: String,
+    /// How many.
+    pub count: u64,
+    /// Since the last one.
     pub ago_ms: u64,
 }
 

@@ -13,7 +13,7 @@ mod adapter;
 
 pub use adapter::{RobotAdapter, RobotMessage, Taken};
 pub use odometry::{MAX_ODOMETRY, MAX_STEP_BACK_NS, MAX_WAIT_NS};
-pub use problem::{Input, Lack, LackReason, Problem};
+pub use problem::{Input, Lack, LackReason, Problem, advice};
 pub use settings::{
     CameraSettings, ImageForm, MAX_CAMERAS, RobotSettings, SettingsError, TopicUse, absolute_topic,
 };

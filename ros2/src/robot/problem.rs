@@ -158,6 +158,31 @@ pub enum Problem {
     Superseded(String),
 }
 
+/// What whoever runs the robot can do about a word of [`Problem::word`] or [`Lack::word`], or one of the wire; empty where the
+/// sentence of the problem says it.
+pub fn advice(word: &str) -> &'static str {
+    match word {
+        "not_used" | "other_type" => "Compare `ros2 topic list -t` with the robot's settings in the server.",
+        "no_stamp" => "Let the driver stamp its messages at capture.",
+        "bad_image" => "Send mono8, rgb8, bgr8 or a JPEG; compare the header with the bytes.",
+        "bad_odometry" => "Look at `ros2 topic echo --once` of the odometry.",
+        "odometry_frame" => "Set `odom_frame` of the robot to the frame that the odometry names.",
+        "bad_transform" => "Look at `ros2 run tf2_ros tf2_monitor`.",
+        "no_camera_info" => {
+            "Publish the calibration of the camera: `ros2 topic echo --once` of its camera_info."
+        }
+        "no_transform" => {
+            "Publish the transform from `base_frame` to the sensor, or set `base_frame` or `frame`."
+        }
+        "no_odometry" => "Publish odometry, stamped by the clock of the other messages.",
+        "superseded" => "Lower the rate of the pictures.",
+        "bad_key" | "unknown_type" => "Compare the robot's topics with its settings in the server.",
+        "other_definition" => "Use the message packages of ROS 2 Humble or newer.",
+        "bad_attachment" | "bad_payload" => "Compare the versions of rmw_zenoh and of the robot's packages.",
+        _ => "",
+    }
+}
+
 impl Problem {
     /// A word for counters.
     pub fn word(&self) -> &'static str {

@@ -1,5 +1,5 @@
-//! The zenoh side: frames, odometry, scans and presence in; answers, poses and map changes out. An embedded router on the configured endpoint, so robots need no other daemon; no
-//! discovery, no shared memory, no administration space, bounded messages.
+//! The zenoh side: frames, odometry, scans and presence in; answers, poses and map changes out. An embedded router, so
+//! robots need no other daemon; no discovery, no shared memory, no administration space, bounded messages.
 //!
 //! Callbacks run on zenoh's threads and never wait: they check and hand over. What goes out passes a bounded queue
 //! and its own thread, so a slow link holds up no worker.
@@ -22,6 +22,7 @@ mod versions;
 mod tests;
 
 pub use access::access_control_for_router;
+pub(crate) use front::advice as connection_advice;
 pub(crate) use inbox::{announce_presence, take_frame};
 pub use outbox::Outbox;
 pub(crate) use ping::Pinger;

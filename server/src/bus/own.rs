@@ -88,7 +88,7 @@ impl OwnRouter {
     /// Robots may connect from now on.
     pub(super) async fn admit(self, config: &Config, keys: Keys, to: &Receivers) -> Result<Doors, BusError> {
         let (robots, path) = (config.limits.robots, self.socket.path());
-        let plain = |listener| Front::open(listener, Way::Plain(path.clone()), robots);
+        let plain = |listener| Front::open(listener, Way::Plain(path.clone()), robots, to.live.clone());
         let Some(certificates) = self.certificates else {
             return Ok(Doors { fronts: vec![plain(self.listener)], gate: None, _socket: self.socket });
         };
@@ -116,7 +116,7 @@ impl OwnRouter {
         };
         let gate = Gate::open(settings, to.vitals.begin("the task that admits robots")).await?;
         let mut fronts: Vec<Front> = self.local.into_iter().map(plain).collect();
-        fronts.push(Front::open(self.listener, Way::Certified(admission, to_gate), robots));
+        fronts.push(Front::open(self.listener, Way::Certified(admission, to_gate), robots, to.live.clone()));
         Ok(Doors { fronts, gate: Some(gate), _socket: self.socket })
     }
 }

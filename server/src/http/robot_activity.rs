@@ -1,13 +1,14 @@
 //! What robots do, and `/unknown-robots`: those that send messages without being registered.
 
 use super::{AppState, error::ApiError};
+use crate::bus::connection_advice;
 use axum::{Json, extract::State};
 use engine::{
     live::LiveHub,
-    robot_activity::{RefusedFrame, RobotActivity},
+    robot_activity::{Input, InputActivity, Reason, RobotActivity},
     unknown_robots::UnknownRobot,
 };
-use protos::{Name, api};
+use protos::{Code, Name, api};
 use std::time::{Duration, Instant};
 use utoipa_axum::{router::OpenApiRouter, routes};
 
@@ -22,23 +23,28 @@ fn ms(ago: Duration) -> u64 {
 /// What a robot has done.
 pub(super) fn activity_shown(live: &LiveHub, robot: &Name, now: Instant) -> Option<api::RobotActivity> {
     let activity = live.activity(robot, now)?;
-    let RobotActivity {
-        answered, refused, last_refusal, last_message, last_recognised, frames_per_s, ..
-    } = activity;
-    let refusal = |RefusedFrame { code, field, detail, ago }| api::RefusedFrame {
-        code,
-        field,
-        detail,
-        ago_ms: ms(ago),
-    };
+    let RobotActivity { answered, inputs, last_message, last_recognised, frames_per_s, .. } = activity;
     Some(api::RobotActivity {
         answered,
-        refused,
-        last_refusal: last_refusal.map(refusal),
-        last_message_ms: ms(last_message),
+        inputs: inputs.into_iter().map(input_shown).collect(),
+        last_message_ms: last_message.map(ms),
         last_recognised_ms: last_recognised.map(ms),
         frames_per_s,
     })
+}
+
+fn input_shown(activity: InputActivity) -> api::RobotInput {
+    let InputActivity { input, used, refused, refused_in_a_row, reasons } = activity;
+    let reason = |Reason { code, field, detail, count, ago }| {
+        let advice = match (input, Code::of(&code)) {
+            (Input::Connection, _) => connection_advice(&code),
+            (_, Some(code)) => code.advice(),
+            (_, None) => ros2::robot::advice(&code),
+        };
+        api::RefusalReason { advice: advice.to_owned(), code, field, detail, count, ago_ms: ms(ago) }
+    };
+    let reasons = reasons.into_iter().map(reason).collect();
+    api::RobotInput { input: input.word().to_owned(), used, refused, refused_in_a_row, reasons }
 }
 
 fn unknown_shown(robot: UnknownRobot) -> api::UnknownRobot {

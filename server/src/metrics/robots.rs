@@ -96,7 +96,7 @@ pub(super) fn write_robots(all: &mut Exposition, app: &App, now: Instant) {
         "Time since the robot's last message; absent before the first.",
     );
     for (robot, _, activity) in &robots {
-        message.known(&[("robot", robot.as_str())], seconds(activity.as_ref().map(|a| a.last_message)));
+        message.known(&[("robot", robot.as_str())], seconds(activity.as_ref().and_then(|a| a.last_message)));
     }
     let mut fix = all.gauge(
         "waymark_robot_last_fix_age_seconds",

@@ -9,9 +9,19 @@ use super::{
     wire::{Wire, refusal_word},
 };
 use crate::bus::{Outbox, Receivers, announce_presence, take_frame};
-use engine::{intake::FrameKind, panics::Edge, slots::SlotKey, vitals::Pulse, workers::Publish};
+use engine::{
+    intake::FrameKind,
+    panics::Edge,
+    robot_activity::{Input, Refused},
+    slots::SlotKey,
+    vitals::Pulse,
+    workers::Publish,
+};
 use protos::{Name, keys::alive_slot, prost::Message, v1};
-use ros2::robot::{Lack, Problem, RobotAdapter, RobotMessage, Taken, TopicUse};
+use ros2::{
+    messages::MessageKind,
+    robot::{Lack, Problem, RobotAdapter, RobotMessage, Taken, TopicUse},
+};
 use std::{
     collections::BTreeMap,
     fmt::Display,
@@ -199,11 +209,30 @@ impl RobotThread {
         }
     }
 
+    /// Counts what was not used, or only in part, by topic and for the robot.
     fn note(&self, topic: &str, word: &str, detail: &impl Display) {
+        let used = self.topics.iter().find(|used| used.topic == topic);
+        if let Some(input) = used.and_then(|used| input_of(used.kind)) {
+            let detail = detail.to_string();
+            let refused = Refused { code: word, field: topic, detail: &detail };
+            self.to.live.refused_by_topic(&self.robot, input, refused, Instant::now());
+        }
         if let Some(count) = self.counts.reason(topic, word) {
             tracing::warn!(robot = %self.robot, topic, word, count, %detail, "ros2_message_incomplete");
         }
     }
+}
+
+/// What a topic brings.
+fn input_of(kind: MessageKind) -> Option<Input> {
+    Some(match kind {
+        MessageKind::Image | MessageKind::CompressedImage => Input::Frame,
+        MessageKind::CameraInfo => Input::CameraInfo,
+        MessageKind::LaserScan => Input::Scan,
+        MessageKind::Odometry => Input::Odometry,
+        MessageKind::TFMessage => Input::Transform,
+        _ => return None,
+    })
 }
 
 fn now_ns() -> i64 {

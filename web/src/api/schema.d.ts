@@ -4554,25 +4554,32 @@ export interface components {
              */
             sigma_rad?: number | null;
         };
+        /** @description Why messages of a robot were refused. */
+        RefusalReason: {
+            /** @description What to do; empty where the sentence says it. */
+            advice: string;
+            /**
+             * Format: int64
+             * @description Since the last one.
+             */
+            ago_ms: number;
+            /** @description A stable word. */
+            code: string;
+            /**
+             * Format: int64
+             * @description How many.
+             */
+            count: number;
+            /** @description A sentence for a person about the last one. */
+            detail: string;
+            /** @description The field at fault of the last one, or the topic of ROS. */
+            field: string;
+        };
         /**
          * @description Who did not take a photograph.
          * @enum {string}
          */
         RefusedBy: "upload" | "lesson";
-        /** @description A refused frame of a robot. */
-        RefusedFrame: {
-            /**
-             * Format: int64
-             * @description Since it was refused.
-             */
-            ago_ms: number;
-            /** @description The stable code. */
-            code: string;
-            /** @description A sentence for a person. */
-            detail: string;
-            /** @description The field at fault. */
-            field: string;
-        };
         /** @description A photograph that was not taken for a landmark, or not in its last lesson. */
         RefusedView: {
             /** @description What to do: one sentence for a person. */
@@ -4710,19 +4717,18 @@ export interface components {
              * @description Answered frames in a second, over the last ten whole seconds, or all since its first message.
              */
             frames_per_s: number;
+            /** @description What was used and what was refused, by kind; a kind of which nothing came is absent. */
+            inputs: components["schemas"]["RobotInput"][];
             /**
              * Format: int64
-             * @description Since the last message: a frame, odometry or a scan.
+             * @description Since the last message, used or refused; absent where only connections were refused.
              */
-            last_message_ms: number;
+            last_message_ms?: number | null;
             /**
              * Format: int64
              * @description Since the last frame in which a landmark was named; absent if there was none.
              */
             last_recognised_ms?: number | null;
-            last_refusal?: components["schemas"]["RefusedFrame"] | null;
-            /** @description Refused frames, by code. */
-            refused: Record<string, never>;
         };
         /** @description Where a robot stands. */
         RobotAssignment: {
@@ -4752,6 +4758,28 @@ export interface components {
             serial: string;
             /** @description SHA-256 of the certificate (DER), hexadecimal. */
             sha256: string;
+        };
+        /** @description What became of one kind of a robot's messages. */
+        RobotInput: {
+            /** @description `frame`, `odometry`, `scan`; of ROS 2 also `camera_info` and `transform`; `connection`: its links to the server. */
+            input: string;
+            /** @description Why, the last reason first. */
+            reasons: components["schemas"]["RefusalReason"][];
+            /**
+             * Format: int64
+             * @description How many were refused, or lack what others need.
+             */
+            refused: number;
+            /**
+             * Format: int64
+             * @description How many of them since the last that was used: where it rises, none is used any more.
+             */
+            refused_in_a_row: number;
+            /**
+             * Format: int64
+             * @description How many were used.
+             */
+            used: number;
         };
         /** @description A fused pose on the robot's map. */
         RobotPose: {

@@ -105,7 +105,7 @@ export class LiveMap {
     for (const { name, alive, pose, activity } of here) {
       const robot = this.#of(name);
       robot.is_connected = alive;
-      if (activity) this.#hear(robot, activity.last_message_ms);
+      if (activity?.last_message_ms != null) this.#hear(robot, activity.last_message_ms);
       if (pose && !robot.pose) this.#pose({ robot: name, pose, covariance: pose.covariance, age_ms: pose.age_ms, trust: pose.trust });
     }
     this.#tell();

@@ -42,6 +42,16 @@ export const TRUST: Record<string, string> = {
   contradicted: "contradicted by the last landmark",
 };
 
+/** What a robot sends. */
+export const INPUT: Record<string, string> = {
+  frame: "Frames",
+  odometry: "Odometry",
+  scan: "Laser scans",
+  camera_info: "Calibrations of cameras",
+  transform: "Transforms",
+  connection: "Connections",
+};
+
 /** How a frame was answered. */
 export const ANSWERS: Record<string, string> = {
   matched: "recognised",

@@ -82,6 +82,27 @@ test("where a lost robot may be is listed, and its uncertainty is plotted", asyn
   await check(page, "lost-robot");
 });
 
+test("what is refused of a robot is said, with what to do", async () => {
+  const [robot] = (await api("GET", "/robots")).items;
+  const page = await go("about:blank");
+  // Robots of the demo are used: one whose scans are refused is given here.
+  const reason = { code: "out_of_range", field: "bearing_step_rad", detail: "the fan is more than a turn", advice: "Correct the field.", count: 1200, ago_ms: 300 };
+  const inputs = [
+    { input: "frame", used: 1500, refused: 0, refused_in_a_row: 0, reasons: [] },
+    { input: "scan", used: 0, refused: 1200, refused_in_a_row: 1200, reasons: [reason] },
+  ];
+  const refused = { ...robot, activity: { ...robot.activity, inputs } };
+  await page.route(`**/api/v1/robots/${robot.name}`, (route) => route.fulfill({ json: refused }));
+  await page.route(/\/api\/v1\/robots(\?.*)?$/, (route) => route.fulfill({ json: { items: [refused] } }));
+  await page.goto(`${server.origin}/robots/${robot.name}`);
+  await page.getByRole("alert").getByText("Laser scans: the last 1,200 were refused. Correct the field.").waitFor();
+  await page.getByRole("row", { name: /Laser scans 0 1,200 out_of_range 1,200 times.*bearing_step_rad: the fan is more than a turn Correct the field\./ }).waitFor();
+  await page.getByRole("row", { name: "Frames 1,500 0" }).waitFor();
+  await check(page, "robot-refused");
+  await page.goto(`${server.origin}/robots`);
+  await page.getByRole("cell", { name: /the fan is more than a turn/ }).waitFor();
+});
+
 test("a robot that knocks is admitted, and its certificates are listed", async () => {
   const robots = (await api("GET", "/robots")).items;
   const name = robots.at(-1).name;

@@ -8,21 +8,28 @@
 mod admission;
 mod inspection;
 mod pace;
+mod refusal;
 mod relay;
 #[cfg(test)]
 mod tests;
 mod to_gate;
 
 pub(super) use admission::Admission;
+pub(crate) use refusal::advice;
 pub(super) use to_gate::ToGate;
 
 use super::{BusError, router::SPARE_SESSIONS};
 use crate::accepting::{Bounds, Place, Shares, accept_each};
+use engine::{
+    live::LiveHub,
+    robot_activity::{Input, Refused},
+};
 use protos::Name;
+use refusal::Refusal;
 use relay::{End, ToRouter, relay};
 use std::{
     collections::BTreeMap,
-    net::SocketAddr,
+    net::{IpAddr, SocketAddr},
     path::PathBuf,
     sync::{Arc, Mutex, PoisonError},
     time::{Duration, Instant},
@@ -41,7 +48,7 @@ const HANDSHAKES: Bounds = Bounds { all: 4096, of_address: 2048 };
 const HANDSHAKE: Duration = Duration::from_secs(10);
 /// Connections of one robot: its programs, and one that ends while the next begins.
 pub(crate) const LINKS_OF_ROBOT: usize = 16;
-/// How often the same refusal of the same robot is in the log.
+/// How often the same refusal of the same address is in the log.
 const TELL_EVERY: Duration = Duration::from_mins(1);
 /// Refusals that are remembered for that. Further ones are told each time.
 const TOLD: usize = 1024;
@@ -67,7 +74,10 @@ struct Connections {
     way: Way,
     places: Arc<Semaphore>,
     of_robot: Arc<Shares<Name>>,
-    told: Mutex<BTreeMap<(String, String), Instant>>,
+    /// Where refusals of robots are counted.
+    live: Arc<LiveHub>,
+    /// Those of addresses that the log was told of.
+    told: Mutex<BTreeMap<(IpAddr, &'static str), Instant>>,
 }
 
 /// A socket of the address of an endpoint, and the endpoint with its real port.
@@ -86,11 +96,12 @@ pub(super) async fn bind(endpoint: &str) -> Result<(TcpListener, String), BusErr
 
 impl Front {
     /// Takes connections from now on; at most `robots`, and some to spare.
-    pub(super) fn open(listener: TcpListener, way: Way, robots: usize) -> Self {
+    pub(super) fn open(listener: TcpListener, way: Way, robots: usize, live: Arc<LiveHub>) -> Self {
         let connections = Arc::new(Connections {
             way,
             places: Arc::new(Semaphore::new(robots + SPARE_SESSIONS)),
             of_robot: Arc::default(),
+            live,
             told: Mutex::default(),
         });
         let (stop, stopping) = watch::channel(false);
@@ -135,6 +146,12 @@ impl Connections {
     async fn connection(self: Arc<Self>, stream: TcpStream, peer: SocketAddr, place: Place) {
         match &self.way {
             Way::Plain(router) => {
+                // One that sends nothing takes no place of a robot.
+                match timeout(HANDSHAKE, stream.peek(&mut [0])).await {
+                    Ok(Ok(1)) => {}
+                    Ok(_) => return,
+                    Err(_) => return self.refused(None, peer, &Refusal::Silent),
+                }
                 let router = match timeout(HANDSHAKE, UnixStream::connect(router)).await {
                     Ok(Ok(router)) => router,
                     failed => return tracing::error!(?failed, "router_not_reached"),
@@ -147,22 +164,26 @@ impl Connections {
                 let handshake = admission.acceptor().accept(stream);
                 let stream = match timeout(HANDSHAKE, handshake).await {
                     Ok(Ok(stream)) => stream,
-                    Ok(Err(error)) => return self.refused(&peer.ip().to_string(), &error.to_string()),
-                    Err(_) => return self.refused(&peer.ip().to_string(), "the handshake is not complete"),
+                    Ok(Err(error)) => {
+                        return self.refused(None, peer, &Refusal::NoHandshake(error.to_string()));
+                    }
+                    Err(_) => {
+                        let why = format!("it is not complete after {} s", HANDSHAKE.as_secs());
+                        return self.refused(None, peer, &Refusal::NoHandshake(why));
+                    }
                 };
                 drop(place);
                 let certificate = stream.get_ref().1.peer_certificates().and_then(<[_]>::first);
                 let admitted = match admission.admit(certificate.map_or(&[], |certificate| certificate)) {
                     Ok(admitted) => admitted,
                     Err(error) => {
-                        self.refused(&peer.ip().to_string(), &error.to_string());
+                        self.refused(None, peer, &error.into());
                         return end_in_order(stream).await;
                     }
                 };
                 let robot = &admitted.robot;
                 let Some(_share) = self.of_robot.take(robot.clone(), LINKS_OF_ROBOT) else {
-                    let why = format!("it has {LINKS_OF_ROBOT} connections: end some of its programs");
-                    self.refused(robot.as_str(), &why);
+                    self.refused(Some(robot), peer, &Refusal::ManyOfRobot);
                     return end_in_order(stream).await;
                 };
                 let mut at_gate = match gate.connect(robot).await {
@@ -172,7 +193,9 @@ impl Connections {
                 let ToRouter { read, write } = &mut at_gate.ends;
                 tokio::select! {
                     () = self.relayed(Some(robot), peer, stream, ToRouter { read, write }) => {}
-                    why = admission.lapse(&admitted) => self.refused(robot.as_str(), why),
+                    why = admission.lapse(&admitted) => {
+                        self.refused(Some(robot), peer, &Refusal::CertificateEnded(why));
+                    }
                 }
             }
         }
@@ -186,28 +209,34 @@ impl Connections {
         stream: impl AsyncRead + AsyncWrite + Unpin,
         router: ToRouter<R, W>,
     ) {
-        let who = robot.map_or_else(|| peer.ip().to_string(), ToString::to_string);
         let Ok(_place) = self.places.clone().try_acquire_owned() else {
-            return self.refused(&who, "there are as many connections as `limits.robots` allows");
+            return self.refused(robot, peer, &Refusal::NoPlace);
         };
         match relay(stream, router).await {
-            End::Closed(error) => tracing::debug!(%error, who, %peer, "robot_connection_closed"),
-            End::Violation(violation) => self.refused(&who, &violation.to_string()),
+            End::Closed(error) => {
+                let robot = robot.map(Name::as_str);
+                tracing::debug!(%error, robot, %peer, "robot_connection_closed");
+            }
+            End::Violation(violation) => self.refused(robot, peer, &violation.into()),
         }
     }
 
-    /// Tells whoever runs the server, once in a while for each reason.
-    fn refused(&self, who: &str, why: &str) {
-        let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
-        let now = Instant::now();
-        told.retain(|_, at| now.duration_since(*at) < TELL_EVERY);
-        let key = (who.to_owned(), why.to_owned());
-        if told.contains_key(&key) {
-            return tracing::debug!(who, why, "robot_connection_refused");
+    /// Counts it for the robot, or tells the log of an address, once in a while for each reason.
+    fn refused(&self, robot: Option<&Name>, peer: SocketAddr, refusal: &Refusal) {
+        let (code, detail, now) = (refusal.word(), refusal.to_string(), Instant::now());
+        if let Some(robot) = robot {
+            let refused = Refused { code, field: "connection", detail: &detail };
+            return self.live.refused(robot, Input::Connection, refused, now);
         }
-        tracing::warn!(who, why, follows = "its connection is closed", "robot_connection_refused");
+        let ip = peer.ip();
+        let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
+        told.retain(|_, at| now.duration_since(*at) < TELL_EVERY);
+        if told.contains_key(&(ip, code)) {
+            return tracing::debug!(%ip, code, detail, "robot_connection_refused");
+        }
+        tracing::warn!(%ip, code, detail, follows = advice(code), "robot_connection_refused");
         if told.len() < TOLD {
-            told.insert(key, now);
+            told.insert((ip, code), now);
         }
     }
 }

@@ -43,13 +43,27 @@ class EpochConflictBody:
 
 
 @dataclass(frozen=True, slots=True)
-class RefusedFrame:
-    """A refused frame of a robot."""
+class RefusalReason:
+    """Why messages of a robot were refused: a stable word, the field at fault and a sentence of the last one, what to do."""
 
     code: str
     field: str
     detail: str
+    advice: str
+    count: int
     ago_ms: int
+
+
+@dataclass(frozen=True, slots=True)
+class RobotInput:
+    """What became of one kind of a robot's messages: `frame`, `odometry`, `scan`, `camera_info`, `transform`, `connection`.
+    Where `refused_in_a_row` rises, none is used any more."""
+
+    input: str
+    used: int
+    refused: int
+    refused_in_a_row: int
+    reasons: tuple[RefusalReason, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,10 +71,9 @@ class RobotActivity:
     """What a robot has done since the server started; `frames_per_s` is over the last ten whole seconds."""
 
     answered: int
-    refused: dict[str, int]
-    last_message_ms: int
+    inputs: tuple[RobotInput, ...]
     frames_per_s: float
-    last_refusal: RefusedFrame | None = None
+    last_message_ms: int | None = None
     last_recognised_ms: int | None = None
 
 
