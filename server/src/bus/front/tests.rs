@@ -1,6 +1,7 @@
 //! What passes the front, in zenoh's own encoding, and what zenoh does on the other side of it.
 
 mod any_frames;
+mod keys;
 
 use super::{
     inspection::{Cost, Inspection, MAX_DECLARED, MAX_DECLARED_BYTES, MAX_KEY_BYTES, Violation},
@@ -164,131 +165,6 @@ fn opened() -> Inspection {
     let mut inspection = Inspection::default();
     assert_eq!(inspection.batch(&init(1)), Ok(Cost::default()));
     inspection
-}
-
-#[test]
-fn a_key_is_as_long_as_its_declared_prefix_and_its_suffix() {
-    for at in 0..named(&key(0, 0)).len() {
-        for (prefix, suffix, passes) in [
-            (0, MAX_KEY_BYTES, true),
-            (0, MAX_KEY_BYTES + 1, false),
-            (4000, MAX_KEY_BYTES - 4000, true),
-            (4000, MAX_KEY_BYTES - 3999, false),
-        ] {
-            let mut inspection = opened();
-            if prefix > 0 {
-                let declared = frame([declared_key(3, key(0, prefix))]);
-                assert!(inspection.batch(&declared).is_ok());
-                // Of the two ends, what is declared rests on the other's keys.
-                inspection.of_router(&declared);
-            }
-            let asked = named(&key(if prefix == 0 { 0 } else { 3 }, suffix)).swap_remove(at);
-            let said = inspection.batch(&frame([asked.clone()]));
-            assert_eq!(said.is_ok(), passes, "{prefix} {suffix} {asked:?}");
-            assert!(passes || said == Err(Violation::LongKey));
-        }
-    }
-}
-
-/// Each end rests its keys on those that the other has declared.
-#[test]
-fn keys_that_rest_on_one_another_do_not_grow_beyond_the_bound() {
-    let mut inspection = opened();
-    assert!(inspection.batch(&frame([declared_key(1, key(0, 2000))])).is_ok());
-    inspection.of_router(&frame([declared_key(7, key(1, 1000))]));
-    assert!(inspection.batch(&frame([declared_key(2, key(7, 1096))])).is_ok());
-    assert_eq!(inspection.batch(&frame([declared_key(3, key(7, 1097))])), Err(Violation::LongKey));
-    let of_router = |length| WireExpr { mapping: Mapping::Receiver, ..key(7, length) };
-    assert!(inspection.batch(&frame([put(of_router(1096), 1)])).is_ok());
-    assert_eq!(inspection.batch(&frame([put(of_router(1097), 1)])), Err(Violation::LongKey));
-    // It has declared no such key.
-    assert_eq!(inspection.batch(&frame([declared_key(4, key(8, 1))])), Err(Violation::Protocol));
-}
-
-/// A router takes the parts of a key for key expressions, wherever they come from.
-#[test]
-fn the_whole_of_a_key_is_a_key_expression() {
-    let said = |parts: &[&str]| {
-        let mut inspection = opened();
-        let (last, prefixes) = parts.split_last().unwrap();
-        let wire = |scope, part: &str| WireExpr { scope, ..WireExpr::from(part.to_owned()) };
-        for (at, prefix) in prefixes.iter().enumerate() {
-            // What is declared rests on a key of the other end.
-            inspection.of_router(&frame([declared_key(at as u16 + 1, wire(at as u16, prefix))]));
-            inspection.batch(&frame([declared_key(at as u16 + 1, wire(at as u16, prefix))]))?;
-        }
-        let scope = prefixes.len() as u16;
-        for named in named(&wire(scope, last)).into_iter().take(4) {
-            inspection.batch(&frame([named]))?;
-        }
-        Ok(())
-    };
-    for good in [&["a/b"][..], &["a", "/b"], &["a", "b"], &["a", "/b", "c/**"], &["a/*/b$*c/@d"]] {
-        assert_eq!(said(good), Ok(()), "{good:?}");
-    }
-    let bad: [&[&str]; 10] = [
-        &[""],
-        &["/a"],
-        &["a/"],
-        &["a//b"],
-        &["a#"],
-        &["a?b"],
-        &["a*"],
-        &["**/**"],
-        &["a", "//b"],
-        &["a", "/b", "/#"],
-    ];
-    for bad in bad {
-        assert_eq!(said(bad), Err(Violation::BadKey), "{bad:?}");
-    }
-    let mut inspection = opened();
-    assert!(inspection.batch(&frame([declared_key(1, key(0, 5)), declared_key(1, key(0, 5))])).is_ok());
-    assert_eq!(inspection.batch(&frame([declared_key(1, key(0, 6))])), Err(Violation::Protocol));
-    // Its declaration has ended: a router leaves it out.
-    assert!(inspection.batch(&frame([put(key(2, 5), 1)])).is_ok());
-}
-
-#[test]
-fn the_bytes_of_declared_keys_are_bounded() {
-    let of = |id, bytes| declare(DeclareBody::DeclareToken(DeclareToken { id, wire_expr: key(0, bytes) }));
-    let mut inspection = opened();
-    let most = (MAX_DECLARED_BYTES / MAX_KEY_BYTES) as u32;
-    for id in 0..most {
-        // Each twice: the same one again is no further one.
-        for _ in 0..2 {
-            assert!(inspection.batch(&frame([of(id, MAX_KEY_BYTES)])).is_ok());
-        }
-    }
-    assert_eq!(inspection.batch(&frame([declared_key(1, key(0, 1))])), Err(Violation::ManyDeclared));
-    let ended = UndeclareSubscriber { id: 5, ext_wire_expr: declare::common::ext::WireExprType::null() };
-    let mut inspection = opened();
-    for _ in 0..most {
-        let begins = DeclareSubscriber { id: 5, wire_expr: key(0, MAX_KEY_BYTES) };
-        let ends = DeclareBody::UndeclareSubscriber(ended.clone());
-        let both = [declare(DeclareBody::DeclareSubscriber(begins)), declare(ends)];
-        assert!(both.into_iter().all(|one| inspection.batch(&frame([one])).is_ok()));
-    }
-    assert!(inspection.batch(&frame([of(1, MAX_KEY_BYTES)])).is_ok(), "what has ended counts no more");
-}
-
-#[test]
-fn what_is_declared_is_counted_at_its_bound_and_what_ends_is_not() {
-    let mut inspection = opened();
-    let all = |from: u32, to: u32| frame((from..to).map(subscriber));
-    let most = MAX_DECLARED as u32;
-    let half = most / 2;
-    let declarations = |n: u32| Ok(Cost { declarations: n as usize, messages: 0 });
-    assert_eq!(inspection.batch(&all(0, half)), declarations(half));
-    assert_eq!(inspection.batch(&all(half, most)), declarations(most - half));
-    // The same again is no further one.
-    assert_eq!(inspection.batch(&all(0, 10)), declarations(10));
-    let ended = UndeclareSubscriber { id: 5, ext_wire_expr: declare::common::ext::WireExprType::null() };
-    assert!(inspection.batch(&frame([declare(DeclareBody::UndeclareSubscriber(ended))])).is_ok());
-    assert!(inspection.batch(&frame([declared_key(1, key(0, 2))])).is_ok());
-    let key_ended = DeclareBody::UndeclareKeyExpr(UndeclareKeyExpr { id: 1 });
-    assert!(inspection.batch(&frame([declare(key_ended)])).is_ok());
-    assert!(inspection.batch(&all(most, most + 1)).is_ok());
-    assert_eq!(inspection.batch(&all(most + 1, most + 2)), Err(Violation::ManyDeclared));
 }
 
 #[test]
