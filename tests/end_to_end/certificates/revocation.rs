@@ -2,12 +2,13 @@
 
 use super::Fleet;
 use client::{Capture, ClientError, RobotClient, RobotOptions, v1};
+use map::pose2::Pose2;
 use std::{
     sync::{
         Arc,
         atomic::{AtomicBool, Ordering},
     },
-    time::Duration,
+    time::{Duration, Instant},
 };
 use tests::eventually;
 use vision::frame::GrayImage;
@@ -114,6 +115,48 @@ async fn a_revoked_certificate_gives_nothing_at_once() {
     answered(&r1).await;
     let all = maps.robot_certificates("r1").await.expect("certificates");
     assert_eq!(all.iter().map(|c| c.revoked_ms.is_some()).collect::<Vec<_>>(), [true, false]);
+    fleet.inside.server.stop().await;
+}
+
+/// Messages of the other robot while one is revoked, one each 2 ms.
+const MEANWHILE: u64 = 400;
+
+/// Prints how long it took.
+#[tokio::test(flavor = "multi_thread")]
+async fn the_connection_of_a_revoked_robot_ends_and_another_loses_no_message() {
+    let fleet = Fleet::start().await;
+    let (r1, r2) = (fleet.options("r1"), fleet.options("r2"));
+    let (_r1, r2) =
+        (RobotClient::connect(&r1).await.expect("r1"), RobotClient::connect(&r2).await.expect("r2"));
+    answered(&r2).await;
+    let maps = fleet.inside.maps();
+    let serial = maps.robot_certificates("r1").await.expect("certificates")[0].serial.clone();
+    let other = tokio::spawn(async move {
+        for _ in 0..MEANWHILE {
+            r2.publish_odometry(&Pose2::default()).await.expect("sent");
+            tokio::time::sleep(Duration::from_millis(2)).await;
+        }
+        r2
+    });
+    tokio::time::sleep(Duration::from_millis(100)).await;
+    let asked = Instant::now();
+    maps.revoke_robot_certificate("r1", &serial).await.expect("revoked");
+    let ended = eventually("the connection ends", async || {
+        let inputs = maps.robot("r1").await.expect("r1").activity?.inputs;
+        let why = inputs.into_iter().find(|i| i.input == "connection")?.reasons.pop()?;
+        assert_eq!(why.code, "certificate_ended", "{why:?}");
+        Some(asked.elapsed().saturating_sub(Duration::from_millis(why.ago_ms)))
+    })
+    .await;
+    println!("cut off {} ms after the request", ended.as_millis());
+    let _r2 = other.await.expect("no panic");
+    eventually("all of the other's odometry is used", async || {
+        let inputs = maps.robot("r2").await.expect("r2").activity?.inputs;
+        let odometry = inputs.into_iter().find(|i| i.input == "odometry")?;
+        assert_eq!(odometry.refused, 0, "{odometry:?}");
+        (odometry.used == MEANWHILE).then_some(())
+    })
+    .await;
     fleet.inside.server.stop().await;
 }
 
