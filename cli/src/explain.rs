@@ -49,11 +49,11 @@ pub(crate) async fn explained(failure: Failure, maps: Option<&MapClient>, map: O
         "unknown_track" => failure.advised("waymark gathering show GATHERING lists the tracks."),
         "unknown_view" => failure.advised("waymark view list LANDMARK shows the numbers."),
         "unknown_reference_run" => failure.advised("waymark run list shows the numbers."),
-        "unknown_commit" => failure.advised("waymark version list shows the commits that are kept."),
-        "unknown_draft" => failure.advised("waymark version drafts shows the drafts of the map."),
-        "conflict" => failure.advised("waymark version drafts DRAFT shows it, before anything is published."),
+        "unknown_commit" => failure.advised("waymark history list shows the commits that are kept."),
+        "unknown_draft" => failure.advised("waymark history drafts shows the drafts of the map."),
+        "conflict" => failure.advised("waymark history drafts DRAFT shows it, before anything is published."),
         "changed_since" => failure
-            .advised("waymark version list shows what came later; rollback goes back behind all of it."),
+            .advised("waymark history list shows what came later; rollback goes back behind all of it."),
         "unknown_token" => failure.advised("waymark token list shows the numbers."),
         "unauthenticated" => {
             failure.advised("Sign in with a token: waymark login, or give it with WAYMARK_TOKEN.")

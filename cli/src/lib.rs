@@ -2,6 +2,7 @@
 //! output, everything else on standard error, and an exit status.
 
 mod answers;
+mod anywhere;
 pub mod arg_parsers;
 mod audit;
 mod backup;
@@ -14,6 +15,7 @@ pub mod drawing;
 mod explain;
 mod failure;
 mod gathering;
+mod history;
 mod identity;
 mod job;
 mod landmark;
@@ -38,7 +40,6 @@ pub mod simulated_errors;
 pub mod stopwatch;
 pub mod survey;
 mod traces;
-mod version;
 mod validity;
 mod view;
 
@@ -115,7 +116,7 @@ enum Command {
     ///
     /// The backup is verified first: digests, integrity, schema. What was there stays in a folder beside it. For example:
     ///   waymark restore office.waymark --dry-run
-    ///   waymark restore office.waymark --data waymark-data
+    ///   waymark restore office.waymark --data /var/lib/waymark
     #[command(verbatim_doc_comment)]
     Restore(restore::Args),
     /// Maps: create, list, show, locate, delete; walls from laser logs, grids and plans.
@@ -125,11 +126,11 @@ enum Command {
     /// Changes of a map, by whom and why: list, diff; the way back: rollback, undo; drafts: draft, publish
     ///
     /// Every change of a map is a commit. For example:
-    ///   waymark version list
-    ///   waymark version diff 12
-    ///   waymark version rollback 12 --why "wrong poster"
+    ///   waymark history list
+    ///   waymark history diff 12
+    ///   waymark history rollback 12 --why "wrong poster"
     #[command(verbatim_doc_comment)]
-    Version(version::Args),
+    History(history::Args),
     /// Training views of a landmark: list, show, image, delete.
     View(view::Args),
     /// Robots that may send frames: add, list, show, remove.
@@ -196,6 +197,8 @@ enum Command {
     ///   waymark completions bash > waymark.bash
     #[command(verbatim_doc_comment)]
     Completions(shell::CompletionArgs),
+    /// The version of this program, and what it was built for.
+    Version,
     /// Manual pages, into a folder
     ///
     /// For example:
@@ -209,7 +212,7 @@ const RUNTIME_ENDS: Duration = Duration::from_secs(1);
 
 /// Runs the program.
 pub fn main() -> ExitCode {
-    let cli = match Cli::try_parse() {
+    let cli = match Cli::try_parse_from(anywhere::behind_the_command(std::env::args_os())) {
         Ok(cli) => cli,
         Err(error) if error.use_stderr() && wants_json() => return report(&wrong_use(&error)),
         Err(error) => error.exit(),
@@ -239,7 +242,7 @@ pub fn main() -> ExitCode {
         Command::Restore(args) => run(restore::run(args)).map(done),
         Command::Map(args) => run(map::run(args)).map(done),
         Command::Landmark(args) => run(landmark::run(args)).map(done),
-        Command::Version(args) => run(version::run(args)).map(done),
+        Command::History(args) => run(history::run(args)).map(done),
         Command::View(args) => run(view::run(args)).map(done),
         Command::Robot(args) => run(robot::run(args)).map(done),
         Command::Camera(args) => run(camera::run(args)).map(done),
@@ -252,6 +255,15 @@ pub fn main() -> ExitCode {
         Command::Detect(args) => detect::run(args),
         Command::Completions(args) => {
             shell::completions(args, Cli::command());
+            Ok(ExitCode::SUCCESS)
+        }
+        Command::Version => {
+            println!(
+                "waymark {} ({} {})",
+                env!("CARGO_PKG_VERSION"),
+                std::env::consts::OS,
+                std::env::consts::ARCH
+            );
             Ok(ExitCode::SUCCESS)
         }
         Command::Man(args) => shell::man(args, Cli::command()).map(done),
@@ -279,8 +291,18 @@ fn wrong_use(error: &clap::Error) -> Failure {
     let text = error.to_string();
     let mut lines = text.lines().filter(|line| !line.trim().is_empty());
     let first = lines.next().unwrap_or_default();
-    let sentence = first.strip_prefix("error: ").unwrap_or(first).to_owned();
-    Failure::usage(sentence).advise(lines.map(str::trim).collect::<Vec<_>>().join("\n"))
+    let mut sentence = first.strip_prefix("error: ").unwrap_or(first).to_owned();
+    let mut lines = lines.map(str::trim).peekable();
+    // What is missing is listed below the sentence.
+    while sentence.ends_with([':', ','])
+        && let Some(named) = lines.next_if(|line| !line.starts_with("Usage"))
+    {
+        sentence = format!("{sentence} {named}");
+        if lines.peek().is_some_and(|next| next.starts_with(['<', '-'])) {
+            sentence.push(',');
+        }
+    }
+    Failure::usage(sentence).advise(lines.collect::<Vec<_>>().join("\n"))
 }
 
 fn run<T>(work: impl Future<Output = anyhow::Result<T>>) -> anyhow::Result<T> {
@@ -329,5 +351,10 @@ mod tests {
         let failure = wrong_use(&error);
         assert!(failure.sentence.contains("'sho'") && failure.advice.contains("show"), "{failure:?}");
         assert_eq!(failure.to_json()["error"]["exit_status"], 2);
+        let missing = wrong_use(&Cli::try_parse_from(["waymark", "robot", "add"]).unwrap_err());
+        assert!(
+            missing.sentence.ends_with(": --map <MAP>, <ROBOT>") && missing.advice.starts_with("Usage"),
+            "{missing:?}"
+        );
     }
 }

@@ -7,7 +7,10 @@ use super::{
 };
 use client::api::BackupManifest;
 use serde_json::json;
-use server::backup::{RestoreError, StoppedServer, Verified, verify};
+use server::{
+    backup::{RestoreError, StoppedServer, Verified, verify},
+    config::default_data,
+};
 use std::{
     io,
     path::{Path, PathBuf},
@@ -20,7 +23,7 @@ pub(crate) struct Args {
     #[arg(value_name = "FILE")]
     file: PathBuf,
     /// The data directory of the server; made if missing.
-    #[arg(long, env = "WAYMARK_DATA", value_name = "DIR", default_value = "waymark-data")]
+    #[arg(long, env = "WAYMARK_DATA", value_name = "DIR", default_value_os_t = default_data())]
     data: PathBuf,
     /// Only verify the backup.
     #[arg(long)]

@@ -1,16 +1,20 @@
 //! `waymark serve`: the server, until Ctrl-C or SIGTERM.
 
-use super::{notify::Supervisor, serve_panic::end_after_a_panic_of_zenoh};
+use super::{
+    failure::{Class, Failure},
+    notify::Supervisor,
+    serve_panic::end_after_a_panic_of_zenoh,
+};
 use anyhow::{Context, anyhow};
 use clap::Args;
-use engine::vitals::Failure;
+use engine::vitals;
 use server::{
-    RunningServer, Server,
+    RunningServer, Server, StartError,
     config::{Config, RawConfig},
 };
 use std::{
     io::{IsTerminal as _, Write as _},
-    path::PathBuf,
+    path::{Path, PathBuf},
     time::Duration,
 };
 #[cfg(unix)]
@@ -57,7 +61,7 @@ pub(super) struct Serve {
     /// Settings file, TOML.
     #[arg(long, env = "WAYMARK_CONFIG", value_name = "FILE")]
     config: Option<PathBuf>,
-    /// Directory of the database; made if missing [default: waymark-data].
+    /// Directory of the database; made if missing [default: the user's folder for data, ~/.local/share/waymark on Linux].
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
     /// Where HTTP listens; port 0 takes a free one [default: 127.0.0.1:8080].
@@ -96,6 +100,11 @@ pub(super) struct Serve {
 impl Serve {
     /// File and environment, then the options given.
     fn settings(self) -> anyhow::Result<Config> {
+        if let Some(file) = self.config.as_deref().filter(|file| !file.exists()) {
+            let sentence = format!("There is no settings file {}.", file.display());
+            let advice = "A server starts without one; server/config.example.toml lists all settings.";
+            return Err(Failure::new(Class::NotFound, "no_settings_file", sentence).advise(advice).into());
+        }
         let mut raw = RawConfig::read(self.config.as_deref())?;
         if let Some(data) = self.data {
             raw.data = data;
@@ -133,11 +142,15 @@ impl Serve {
         rustix::process::umask(rustix::fs::Mode::from_raw_mode(0o077));
         let config = self.settings()?;
         warn_of_plain_text(&config);
+        for variable in RawConfig::unknown_variables() {
+            let follows = "it is left out; server/config.example.toml lists all settings";
+            tracing::warn!(variable, follows, "unknown_variable");
+        }
         end_after_a_panic_of_zenoh();
         let data = config.data.clone();
-        let server = Server::start(config).await?;
+        let server = Server::start(config).await.map_err(not_started)?;
         let signals = StopSignals::heard()?;
-        ready(&server);
+        ready(&server, &data);
         let metrics = server.metrics_addr.map(|address| address.to_string()).unwrap_or_default();
         tracing::info!(data = %data.display(), http = %server.http_addr, zenoh = server.zenoh_endpoint, metrics, "ready");
         let supervisor = Supervisor::of_environment();
@@ -167,8 +180,15 @@ fn warn_of_plain_text(config: &Config) {
     }
 }
 
+/// An address that another program has is told with the option that names another.
+fn not_started(error: StartError) -> anyhow::Error {
+    let Some(option) = error.taken_address() else { return error.into() };
+    let advice = format!("Another program listens there: end it, or choose another address with {option}.");
+    Failure::new(Class::Conflict, "address_taken", error.to_string()).advise(advice).into()
+}
+
 /// Stops what is left of a server and says what to do.
-async fn after(failure: &Failure, server: RunningServer) -> anyhow::Error {
+async fn after(failure: &vitals::Failure, server: RunningServer) -> anyhow::Error {
     // What is left of it may not come to an end.
     if tokio::time::timeout(STOP_AFTER_FAILURE, server.stop()).await.is_err() {
         tracing::error!("the rest of the server did not stop in time");
@@ -178,15 +198,16 @@ async fn after(failure: &Failure, server: RunningServer) -> anyhow::Error {
 
 /// The first lines on stdout, for people and for programs that started this one on port 0. The link is a secret: where
 /// standard output is no terminal it may be a log.
-fn ready(server: &RunningServer) {
+fn ready(server: &RunningServer, data: &Path) {
     let link = server.page_link().filter(|_| std::io::stdout().is_terminal());
     let open = link.unwrap_or_else(|| "waymark open prints a link that opens the page".to_owned());
     let text = format!(
-        "pages   {}/\nrobots  {}\ntoken   {}\nopen    {open}\nserver  {}\n",
+        "pages   {}/\nrobots  {}\ntoken   {}\nopen    {open}\nserver  {}\ndata    {}\n",
         server.url(),
         server.zenoh_endpoint,
         server.local_token_file().display(),
-        server.server
+        server.server,
+        data.display()
     );
     // At once: who reads only the first lines may close the pipe after them.
     std::io::stdout().write_all(text.as_bytes()).ok();

@@ -6,6 +6,7 @@
 
 mod addresses;
 mod backup;
+mod environment;
 mod error;
 mod frame_search;
 mod limits;
@@ -16,6 +17,7 @@ mod tls;
 
 pub use backup::BackupSettings;
 pub(crate) use backup::MAX_KEPT;
+pub use environment::default_data;
 pub use error::ConfigError;
 pub use frame_search::{BUSY_FRAMES_PER_WORKER, FrameSearch};
 pub use limits::Limits;
@@ -28,6 +30,7 @@ pub use router::{JoinedRouter, MAX_ROUTER_ENDPOINTS, RawRouter, RouterCredential
 pub use tls::{MAX_TLS_NAMES, OwnCertificate, RawTls, Tls};
 
 use addresses::{is_loopback, socket_address, zenoh_address, zenoh_endpoint};
+use environment::{PREFIX, is_known};
 use figment::{
     Figment,
     providers::{Env, Format, Toml},
@@ -43,7 +46,8 @@ use std::{
 use vision::params::Params;
 
 /// Variables that begin with `WAYMARK_` but are read by the command line, not by the settings.
-const NOT_SETTINGS: [&str; 7] = ["config", "server", "map", "log", "log_format", "token", "robot_file"];
+const NOT_SETTINGS: [&str; 8] =
+    ["config", "server", "map", "log", "log_format", "token", "authority", "robot_file"];
 /// Most vision threads that can be asked for.
 pub const MAX_WORKERS: usize = 256;
 
@@ -51,7 +55,7 @@ pub const MAX_WORKERS: usize = 256;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RawConfig {
-    /// Directory of the database.
+    /// Directory of the database; empty: [`default_data`].
     pub data: PathBuf,
     /// Address and port of the HTTP interface; port 0 takes a free one.
     pub http: String,
@@ -88,7 +92,7 @@ pub struct RawConfig {
 impl Default for RawConfig {
     fn default() -> Self {
         Self {
-            data: PathBuf::from("waymark-data"),
+            data: PathBuf::new(),
             http: "127.0.0.1:8080".into(),
             zenoh: String::new(),
             metrics: String::new(),
@@ -108,15 +112,18 @@ impl Default for RawConfig {
 }
 
 impl RawConfig {
-    /// Defaults, then the file (which must exist if named), then the environment.
+    /// Defaults, then the file (which must exist if named), then the environment; of that what is no setting is left out
+    /// ([`Self::unknown_variables`]).
     pub fn read(file: Option<&Path>) -> Result<Self, ConfigError> {
         // Defaults are left to serde: as values they would stand beside a key of an earlier build.
         let mut figment = Figment::new();
         if let Some(path) = file {
             figment = figment.merge(Toml::file_exact(path));
         }
+        let settings = environment::names();
+        let variables = Env::prefixed(PREFIX).filter(move |name| is_known(name.as_str(), &settings));
         figment
-            .merge(Env::prefixed("WAYMARK_").ignore(&NOT_SETTINGS).split("__"))
+            .merge(variables.ignore(&NOT_SETTINGS).split("__"))
             .extract()
             .map_err(|e| ConfigError::Read(Box::new(e)))
     }
@@ -238,7 +245,7 @@ impl TryFrom<RawConfig> for Config {
         raw.limits.check()?;
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         Ok(Self {
-            data: raw.data,
+            data: if raw.data.as_os_str().is_empty() { default_data() } else { raw.data },
             http_addr,
             zenoh_endpoint,
             metrics_addr,

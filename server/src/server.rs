@@ -2,7 +2,7 @@
 
 use crate::{
     backup::Backups,
-    bus::{Bus, Receivers},
+    bus::{Bus, Receivers, Sockets},
     config::{Config, JoinedRouter, Tls},
     events::{EventLog, watch_changes::watch_changes},
     fleet::{Fleet, server_name},
@@ -58,10 +58,11 @@ impl Server {
     pub async fn start(config: Config) -> Result<RunningServer, StartError> {
         let config = Arc::new(config);
         config.log_memory_ceiling();
+        let (listeners, sockets) = (Listeners::open(&config).await?, Sockets::take(&config).await?);
         let (store, writer) = Catalogue::open(&config).await?;
         let (stop, stopping) = watch::channel(false);
         let certificates = open_certificates(&config, &stopping)?;
-        let listeners = Listeners::open(&config, certificates.as_ref()).await?;
+        let listeners = listeners.encrypted(certificates.as_ref())?;
         let (http_addr, metrics_addr) = (listeners.http_addr, listeners.metrics_addr);
         let local_token = write_local_token(&config, &store, http_addr.port())?;
         let sessions = Arc::<Sessions>::default();
@@ -79,7 +80,7 @@ impl Server {
         let to = receivers(&config, &engine, of_robots.map(|_| store.certificates().clone()))?;
         let (server, fleet) = (to.server.clone(), to.fleet.clone());
         let Robots { mut bus, ros2, publisher, workers } =
-            Robots::connect(&config, &engine, to, certificates.clone()).await?;
+            Robots::connect(&config, &engine, to, (sockets, certificates.clone())).await?;
         let (backups, backups_task) = Backups::start(&config, told(&store), stopping.clone());
         let services = Services {
             jobs: teaching.jobs,
@@ -142,9 +143,9 @@ impl Robots {
         config: &Config,
         engine: &Engine,
         to: Receivers,
-        certificates: Option<Arc<Certificates>>,
+        (sockets, certificates): (Sockets, Option<Arc<Certificates>>),
     ) -> Result<Self, StartError> {
-        let bus = Box::pin(Bus::open(config, to.clone(), certificates)).await?;
+        let bus = Box::pin(Bus::open(config, to.clone(), sockets, certificates)).await?;
         let outbox = bus.outbox().clone();
         let ros2 = match bus.session() {
             Some(session) => Ros2::open(session, &config.ros2, (&to, &outbox)).await?,

@@ -32,26 +32,27 @@ pub(crate) struct Listeners {
 }
 
 impl Listeners {
-    /// Takes the ports of the settings.
-    pub(crate) async fn open(
-        config: &Config,
-        certificates: Option<&Arc<Certificates>>,
-    ) -> Result<Self, StartError> {
+    /// Takes the ports of the settings. They are taken before all else: one that another program has is told at once.
+    pub(crate) async fn open(config: &Config) -> Result<Self, StartError> {
         crate::metrics::process::started();
-        let tls = certificates.map(|all| acceptor(all.current(), None, &[b"http/1.1"])).transpose();
-        let tls = tls.map_err(|e| StartError::Certificates(e.to_string()))?;
-        let (http, http_addr) = bind(config.http_addr).await?;
+        let (http, http_addr) = bind("--http", config.http_addr).await?;
         let metrics = match config.metrics_addr {
-            Some(addr) => Some(bind(addr).await?),
+            Some(addr) => Some(bind("--metrics", addr).await?),
             None => None,
         };
         let (metrics, metrics_addr) = metrics.unzip();
-        Ok(Self { http, tls, metrics, http_addr, metrics_addr })
+        Ok(Self { http, tls: None, metrics, http_addr, metrics_addr })
+    }
+
+    /// Encrypted with these certificates, or plain.
+    pub(crate) fn encrypted(self, certificates: Option<&Arc<Certificates>>) -> Result<Self, StartError> {
+        let tls = certificates.map(|all| acceptor(all.current(), None, &[b"http/1.1"])).transpose();
+        Ok(Self { tls: tls.map_err(|e| StartError::Certificates(e.to_string()))?, ..self })
     }
 }
 
-async fn bind(addr: SocketAddr) -> Result<(TcpListener, SocketAddr), StartError> {
-    let at = |source| StartError::Http { addr, source };
+async fn bind(option: &'static str, addr: SocketAddr) -> Result<(TcpListener, SocketAddr), StartError> {
+    let at = |source| StartError::Http { option, addr, source };
     let listener = TcpListener::bind(addr).await.map_err(at)?;
     let real = listener.local_addr().map_err(at)?;
     Ok((listener, real))

@@ -27,11 +27,25 @@ pub enum StartError {
     /// The address cannot be listened on.
     #[error("cannot listen on {addr}: {source}")]
     Http {
+        /// The option of `waymark serve` that names it.
+        option: &'static str,
         /// The address asked for.
         addr: SocketAddr,
         /// What the system says.
         source: std::io::Error,
     },
+}
+
+impl StartError {
+    /// The option of `waymark serve` that names an address that another program has.
+    pub fn taken_address(&self) -> Option<&'static str> {
+        let (option, source) = match self {
+            Self::Http { option, source, .. } => (*option, source),
+            Self::Bus(BusError::Address { source, .. }) => ("--zenoh", source),
+            _ => return None,
+        };
+        (source.kind() == std::io::ErrorKind::AddrInUse).then_some(option)
+    }
 }
 
 impl From<OpenError> for StartError {

@@ -184,7 +184,7 @@ async fn the_command_line_lists_compares_and_goes_back() {
     let deleted = newest(&maps).await;
     let url = inside.url();
     let run = |line: &str| {
-        let line = format!("version {line} --map {MAP} --server {url}");
+        let line = format!("history {line} --map {MAP} --server {url}");
         waymark(line.split_whitespace(), LONGEST)
     };
     let listed = run("list");

@@ -12,6 +12,7 @@ mod certificates;
 mod clock_jumps;
 mod clocks;
 mod command_line;
+mod command_line_use;
 mod damaged_index;
 mod demo;
 mod detect_command;

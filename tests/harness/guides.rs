@@ -175,7 +175,7 @@ impl Guide {
         for name in ["LOG", "SERVER", "CONFIG", "DATA", "MAP", "TOKEN"] {
             shell.env_remove(format!("WAYMARK_{name}"));
         }
-        shell.env_remove("XDG_CONFIG_HOME");
+        shell.env_remove("XDG_CONFIG_HOME").env_remove("XDG_DATA_HOME");
         shell.env("PATH", &self.path).env("NO_COLOR", "1").env("HOME", &self.folder);
         // Not `WAYMARK_...`: the server takes those for settings.
         shell.env("TESTED_PROGRAMS", program().parent().expect("its folder"));

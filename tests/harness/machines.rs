@@ -78,7 +78,11 @@ impl Machine {
         for (name, _) in std::env::vars().filter(|(name, _)| name.starts_with("WAYMARK_")) {
             shell.env_remove(name);
         }
-        shell.env_remove("XDG_CONFIG_HOME").env("HOME", &self.folder).env("PATH", &self.path);
+        shell
+            .env_remove("XDG_CONFIG_HOME")
+            .env_remove("XDG_DATA_HOME")
+            .env("HOME", &self.folder)
+            .env("PATH", &self.path);
         shell.env("TESTED_MACHINES", &self.machines).env("TESTED_ENDPOINT", "tcp/127.0.0.1:1");
         shell.env("TESTED_PROGRAMS", crate::command::program().parent().expect("its folder"));
         shell.current_dir(&self.folder).stdin(Stdio::null());

@@ -56,11 +56,12 @@ pub(super) async fn delete(
         revisions.push(landmark.revision);
     }
     let list = names.join(", ");
-    consent
-        .ask(&format!("Delete {list} with {}? This cannot be undone.", counted(views, "training view")))?;
+    consent.ask(&format!("Delete {list} with {}?", counted(views, "training view")))?;
     // What was counted above is deleted, and nothing that came while the question was open.
     for (name, revision) in names.iter().zip(&revisions) {
         session.maps().if_match(revision).delete_landmark(map, name).await?;
     }
-    session.show(&json!({ "deleted": names }), &format!("{list}: deleted"))
+    let told =
+        format!("{list}: deleted. waymark history list has the change, waymark history undo takes it back.");
+    session.show(&json!({ "deleted": names }), &told)
 }

@@ -86,7 +86,7 @@ enum Verb {
         #[arg(value_enum)]
         health: HealthWord,
     },
-    /// Delete a landmark with its views and model. This cannot be undone.
+    /// Delete a landmark with its views and model; `waymark history undo` brings all of it back.
     Delete {
         /// The landmarks.
         #[arg(required = true)]

@@ -43,6 +43,7 @@ use engine::{
     vitals::{Pulse, Vitals},
 };
 use join::{Join, JoinSettings};
+pub(crate) use own::Sockets;
 use own::{Doors, OwnRouter};
 use protos::{Key, Keys, Name, v1};
 use receiving::Receiving;
@@ -64,6 +65,14 @@ pub enum BusError {
         endpoint: String,
         /// What was said.
         detail: String,
+    },
+    /// The address for robots cannot be listened on.
+    #[error("cannot listen for robots on {endpoint}: {source}")]
+    Address {
+        /// Endpoint asked for.
+        endpoint: String,
+        /// What the system says.
+        source: std::io::Error,
     },
     /// A router that is to be joined does not answer.
     #[error("cannot join the router at {endpoints}: {detail}")]
@@ -170,6 +179,7 @@ impl Bus {
     pub(crate) async fn open(
         config: &Config,
         to: Receivers,
+        sockets: Sockets,
         certificates: Option<Arc<Certificates>>,
     ) -> Result<Self, BusError> {
         let pixels = ImageLimits { bytes: config.limits.frame_bytes, pixels: config.limits.frame_pixels };
@@ -185,7 +195,7 @@ impl Bus {
             let way = Way::Joined(Join::start(settings, (to, outbox.clone()), fleet, cell, pulse));
             return Ok(Self { endpoint, outbox, changes, way, pinger: None, _pings: None });
         }
-        let own = OwnRouter::open(config, certificates).await?;
+        let own = OwnRouter::open(config, sockets, certificates).await?;
         let (session, endpoint) = (own.session.clone(), own.endpoint.clone());
         let outbox = Outbox::start(Arc::new(OnceLock::from(session.clone())), keys.clone(), &to)?;
         let changes = begin_changes(&to, &outbox);

@@ -17,6 +17,32 @@ use std::{path::PathBuf, sync::Arc};
 use tempfile::TempDir;
 use tokio::{net::TcpListener, sync::watch};
 
+/// The sockets at which robots will connect. They are taken before all else: an address that another program has is told at
+/// once.
+#[derive(Debug, Default)]
+pub(crate) struct Sockets {
+    /// With the endpoint and its real port; none where the server joins a router.
+    robots: Option<(TcpListener, String)>,
+    /// Plain, for programs of this machine, where robots connect encrypted.
+    local: Option<TcpListener>,
+}
+
+impl Sockets {
+    /// Takes the addresses of the settings.
+    pub(crate) async fn take(config: &Config) -> Result<Self, BusError> {
+        if config.router.is_some() {
+            return Ok(Self::default());
+        }
+        let (listener, endpoint) = front::bind(&config.zenoh_endpoint).await?;
+        let asked = config.tls.as_ref().and_then(|tls| tls.local_zenoh.as_deref());
+        let local = match asked.filter(|_| endpoint.starts_with("tls/")) {
+            Some(asked) => Some(front::bind(asked).await?.0),
+            None => None,
+        };
+        Ok(Self { robots: Some((listener, endpoint)), local })
+    }
+}
+
 /// The server's own router, and the sockets at which robots will connect.
 pub(super) struct OwnRouter {
     pub(super) session: zenoh::Session,
@@ -60,18 +86,17 @@ impl Socket {
 }
 
 impl OwnRouter {
-    /// Takes the addresses first: one that is taken is told at once.
     pub(super) async fn open(
         config: &Config,
+        sockets: Sockets,
         certificates: Option<Arc<Certificates>>,
     ) -> Result<Self, BusError> {
-        let (listener, endpoint) = front::bind(&config.zenoh_endpoint).await?;
-        let certificates = certificates.filter(|_| endpoint.starts_with("tls/"));
-        let asked = config.tls.as_ref().and_then(|tls| tls.local_zenoh.as_deref());
-        let local = match asked.filter(|_| certificates.is_some()) {
-            Some(asked) => Some(front::bind(asked).await?.0),
-            None => None,
+        let Sockets { robots, local } = sockets;
+        let (listener, endpoint) = match robots {
+            Some(taken) => taken,
+            None => front::bind(&config.zenoh_endpoint).await?,
         };
+        let certificates = certificates.filter(|_| endpoint.starts_with("tls/"));
         let socket = Socket::new()?;
         let (robots, frame_bytes) = (config.limits.robots, config.limits.frame_bytes);
         let listen = vec![socket.endpoint()];

@@ -53,7 +53,7 @@ async fn running_with(
         server: Name::new("test").unwrap(),
         fleet: None,
     };
-    let bus = Bus::open(&config, to, None).await.unwrap();
+    let bus = Bus::open(&config, to, Sockets::take(&config).await.unwrap(), None).await.unwrap();
     let workers = Workers::start(&engine, workers, &Arc::new(bus.outbox().clone())).unwrap();
     Running { bus, engine, workers }
 }

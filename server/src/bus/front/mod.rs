@@ -82,11 +82,11 @@ struct Connections {
 
 /// A socket of the address of an endpoint, and the endpoint with its real port.
 pub(super) async fn bind(endpoint: &str) -> Result<(TcpListener, String), BusError> {
-    let fault = |detail: String| BusError::Listen { endpoint: endpoint.to_owned(), detail };
-    let (protocol, address) =
-        endpoint.split_once('/').ok_or_else(|| fault("it is no endpoint".to_owned()))?;
-    let listener = TcpListener::bind(address).await.map_err(|e| fault(e.to_string()))?;
-    let port = listener.local_addr().map_err(|e| fault(e.to_string()))?.port();
+    let fault = |source| BusError::Address { endpoint: endpoint.to_owned(), source };
+    let none = || fault(std::io::Error::other("it is no endpoint"));
+    let (protocol, address) = endpoint.split_once('/').ok_or_else(none)?;
+    let listener = TcpListener::bind(address).await.map_err(fault)?;
+    let port = listener.local_addr().map_err(fault)?.port();
     let real = match address.strip_suffix(":0") {
         Some(host) => format!("{protocol}/{host}:{port}"),
         None => endpoint.to_owned(),

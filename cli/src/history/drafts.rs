@@ -19,7 +19,7 @@ pub(super) async fn begin(session: &Session, map: &str, name: &str) -> anyhow::R
         &format!("{name} is a draft of {map} at commit {}, with {landmarks}", made.from_commit),
     )?;
     session.note(&format!(
-        "  Edit it with --map {name}; see what it changes: waymark version drafts {name} --map {map}"
+        "  Edit it with --map {name}; see what it changes: waymark history drafts {name} --map {map}"
     ));
     Ok(())
 }
@@ -35,7 +35,7 @@ pub(super) async fn list(session: &Session, map: &str) -> anyhow::Result<()> {
     session.list(
         &all,
         table,
-        &format!("{map} has no draft. Begin one: waymark version draft NAME --map {map}"),
+        &format!("{map} has no draft. Begin one: waymark history draft NAME --map {map}"),
     )
 }
 
@@ -140,7 +140,7 @@ pub(super) async fn publish(
     };
     session.show(&done, &text)?;
     if done.changed {
-        session.note(&format!("  Take that back: waymark version undo {} --map {map}", done.commit.id));
+        session.note(&format!("  Take that back: waymark history undo {} --map {map}", done.commit.id));
     }
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! `waymark version`: what was changed of a map, and the way back.
+//! `waymark history`: what was changed of a map, and the way back.
 
 mod drafts;
 
@@ -21,7 +21,7 @@ const SHOWN: usize = 20;
 /// Landmarks asked for at a time.
 const PAGE: usize = 100;
 
-/// `waymark version`.
+/// `waymark history`.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     #[command(subcommand)]
@@ -41,8 +41,8 @@ enum Verb {
     /// Show what differs between two commits, or between one and now
     ///
     /// For example:
-    ///   waymark version diff 12
-    ///   waymark version diff 12 15
+    ///   waymark history diff 12
+    ///   waymark history diff 12 15
     #[command(verbatim_doc_comment)]
     Diff {
         /// Number of the earlier commit.
@@ -53,7 +53,7 @@ enum Verb {
     /// Make the map what it was at a commit
     ///
     /// Landmarks come back with their views, pictures and models, byte for byte; walls and settings, too. It is a commit of
-    /// its own, so it can be undone. Robots get the map at once. Look first what it changes: waymark version diff COMMIT
+    /// its own, so it can be undone. Robots get the map at once. Look first what it changes: waymark history diff COMMIT
     #[command(verbatim_doc_comment)]
     Rollback {
         /// Number of the commit.
@@ -66,9 +66,9 @@ enum Verb {
     /// Begin a draft: a map of its own, with all that the map has, that no robot sees
     ///
     /// Teach and edit it as any map, with --map NAME; then publish it. For example:
-    ///   waymark version draft office-draft
+    ///   waymark history draft office-draft
     ///   waymark landmark teach poster poster3.jpg --map office-draft
-    ///   waymark version publish office-draft
+    ///   waymark history publish office-draft
     #[command(verbatim_doc_comment)]
     Draft {
         /// Its name: lower-case letters, digits, `-` and `_`.
@@ -183,7 +183,7 @@ async fn on_map(session: &Session, verb: &Verb) -> anyhow::Result<()> {
             session.show(&done, &text)?;
             if done.changed {
                 session
-                    .note(&format!("  Take that back: waymark version undo {} --map {map}", done.commit.id));
+                    .note(&format!("  Take that back: waymark history undo {} --map {map}", done.commit.id));
             }
             Ok(())
         }
