@@ -13,5 +13,6 @@ mod received;
 mod robot;
 mod rosbags;
 mod round_trips;
+mod scan_variants;
 mod tokens;
 mod trees;
