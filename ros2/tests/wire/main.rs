@@ -4,9 +4,11 @@
 mod attachments;
 mod bounds;
 mod bridge;
+mod camera_variants;
 mod fields;
 mod golden;
 mod hex;
+mod image_variants;
 mod keys;
 mod padding;
 mod received;
