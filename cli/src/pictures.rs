@@ -1,14 +1,24 @@
 //! Picture files in, pictures out, and the other way round for the demo's robots.
 
 use anyhow::Context as _;
-use engine::decode::{ImageLimits, decode_upload};
-use image::ImageEncoder as _;
-use std::{fs::File, io::Read as _, path::Path};
+use engine::{decode::ImageLimits, picture};
+use image::{ImageDecoder as _, ImageEncoder as _};
+use std::{
+    fs::File,
+    io::{Cursor, Read as _},
+    path::Path,
+};
 use vision::{
     detect::DetectParams,
     frame::{GrayImage, Picture},
 };
 
+/// Quality of photographs that are made smaller before they are sent.
+const PHOTOGRAPH_QUALITY: u8 = 95;
+/// Largest file of a photograph: one of 200 megapixels has about 60 MB.
+const MAX_PHOTOGRAPH_BYTES: u64 = 256 << 20;
+/// Most pixels of a photograph that is made smaller: phones have up to 200 million.
+const MAX_PHOTOGRAPH_PX: u64 = 220_000_000;
 /// Quality of the demo's JPEG frames: a VGA frame stays below one zenoh batch.
 const JPEG_QUALITY: u8 = 85;
 
@@ -28,18 +38,60 @@ pub fn read(path: &Path) -> Result<GrayImage, PictureError> {
     Ok(read_picture(path)?.into_grey())
 }
 
-/// Reads and decodes a PNG or JPEG file, in colour if it has any. No more of it is read than the upload limit allows.
+/// Reads and decodes a photograph, in colour if it has any, and turns it upright as the server does, by the orientation
+/// that it states: corners are of the upright picture, and of the smaller one where [`photograph`] makes it smaller.
 pub fn read_picture(path: &Path) -> Result<Picture, PictureError> {
-    let limits = ImageLimits::UPLOAD;
+    let Sent { bytes, .. } = photograph(path)?;
+    picture::decode(&bytes, ImageLimits::UPLOAD).map_err(|refused| PictureError::Refused(refused.detail))
+}
+
+/// A photograph as it is sent.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Sent {
+    /// PNG or JPEG within the server's limits, where that could be made of the file.
+    pub bytes: Vec<u8>,
+    /// Width and height before and after it was made smaller.
+    pub shrunk: Option<[[u32; 2]; 2]>,
+}
+
+/// Reads a photograph. One of more bytes or pixels than a server takes is made smaller, and a BMP file is made a JPEG, upright.
+/// What cannot be decoded stays as it is: the server says what is wrong with it.
+pub fn photograph(path: &Path) -> Result<Sent, PictureError> {
     let mut bytes = Vec::new();
-    // One byte more than allowed is enough for the decoder to refuse it.
-    File::open(path)?.take(limits.bytes as u64 + 1).read_to_end(&mut bytes)?;
-    decode_upload(&bytes, limits).map_err(|refused| PictureError::Refused(refused.detail))
+    File::open(path)?.take(MAX_PHOTOGRAPH_BYTES).read_to_end(&mut bytes)?;
+    Ok(fitted(&bytes, ImageLimits::UPLOAD).unwrap_or(Sent { bytes, shrunk: None }))
+}
+
+/// The photograph within the limits; `None` if it is, or cannot be decoded.
+fn fitted(bytes: &[u8], limits: ImageLimits) -> Option<Sent> {
+    let format = image::guess_format(bytes).ok()?;
+    let mut decoder = image::ImageReader::with_format(Cursor::new(bytes), format).into_decoder().ok()?;
+    let pixels = |[width, height]: [u32; 2]| u64::from(width) * u64::from(height);
+    let (width, height) = decoder.dimensions();
+    let size = [width, height];
+    let is_large = bytes.len() > limits.bytes || pixels(size) > limits.pixels as u64;
+    if !(is_large || format == image::ImageFormat::Bmp) || pixels(size) > MAX_PHOTOGRAPH_PX {
+        return None;
+    }
+    let orientation = decoder.orientation().unwrap_or(image::metadata::Orientation::NoTransforms);
+    let mut picture = image::DynamicImage::from_decoder(decoder).ok()?;
+    picture.apply_orientation(orientation);
+    let before = [picture.width(), picture.height()];
+    let share = (limits.pixels as f64 / pixels(before) as f64).sqrt().min(1.0);
+    let after = before.map(|side| (f64::from(side) * share) as u32);
+    if after != before {
+        picture = picture.thumbnail_exact(after[0], after[1]);
+    }
+    let mut sent = Vec::new();
+    let encoder = image::codecs::jpeg::JpegEncoder::new_with_quality(&mut sent, PHOTOGRAPH_QUALITY);
+    picture.into_rgb8().write_with_encoder(encoder).ok()?;
+    Some(Sent { bytes: sent, shrunk: (after != before).then_some([before, after]) })
 }
 
 /// Whether a file's name ends like that of a picture that can be read.
 pub fn is_picture(path: &Path) -> bool {
-    path.extension().is_some_and(|e| ["png", "jpg", "jpeg"].iter().any(|known| e.eq_ignore_ascii_case(known)))
+    path.extension()
+        .is_some_and(|e| ["png", "jpg", "jpeg", "bmp"].iter().any(|known| e.eq_ignore_ascii_case(known)))
 }
 
 /// Detection parameters from a JSON file that names only what differs from the defaults; no file, the defaults.
@@ -59,4 +111,56 @@ pub fn jpeg(image: &GrayImage) -> Result<Vec<u8>, image::ImageError> {
         image::ExtendedColorType::L8,
     )?;
     Ok(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use image::{DynamicImage, ImageFormat, RgbImage};
+
+    fn file(format: ImageFormat) -> Vec<u8> {
+        let mut bytes = Cursor::new(Vec::new());
+        let picture = RgbImage::from_fn(80, 60, |x, _| image::Rgb([x as u8 * 3, 90, 90]));
+        DynamicImage::ImageRgb8(picture).write_to(&mut bytes, format).unwrap();
+        bytes.into_inner()
+    }
+
+    /// An Exif segment with orientation 6: turn by a quarter, clockwise.
+    fn portrait(jpeg: &[u8]) -> Vec<u8> {
+        let tiff = b"Exif\0\0MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0";
+        let head = [0xff, 0xd8, 0xff, 0xe1, 0, (tiff.len() + 2) as u8];
+        [&head[..], tiff, &jpeg[2..]].concat()
+    }
+
+    #[test]
+    fn photographs_are_turned_upright_for_every_command() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("p.jpg");
+        std::fs::write(&path, portrait(&file(ImageFormat::Jpeg))).unwrap();
+        let gray = read(&path).unwrap();
+        assert_eq!((gray.width(), gray.height()), (60, 80));
+        assert!(gray.at(30, 79) > gray.at(30, 0));
+        std::fs::write(&path, b"\0\0\0\x18ftypheic").unwrap();
+        assert!(read(&path).unwrap_err().to_string().contains("HEIC"));
+    }
+
+    #[test]
+    fn large_photographs_are_made_smaller_and_bmp_is_sent_as_jpeg() {
+        let limits = |pixels| ImageLimits { bytes: 1 << 20, pixels };
+        for format in [ImageFormat::Png, ImageFormat::Jpeg] {
+            assert_eq!(fitted(&file(format), limits(80 * 60)), None, "{format:?}");
+            let sent = fitted(&file(format), limits(1200)).unwrap();
+            assert_eq!(sent.shrunk, Some([[80, 60], [40, 30]]), "{format:?}");
+            assert_eq!(picture::upright_size(&sent.bytes), Some([40, 30]));
+        }
+        let turned = fitted(&portrait(&file(ImageFormat::Jpeg)), limits(1200)).unwrap();
+        assert_eq!(turned.shrunk, Some([[60, 80], [30, 40]]));
+        assert_eq!(picture::upright_size(&turned.bytes), Some([30, 40]));
+        let bmp = fitted(&file(ImageFormat::Bmp), limits(80 * 60)).unwrap();
+        assert_eq!((picture::kind(&bmp.bytes), bmp.shrunk), (Some("jpeg"), None));
+        // Too many bytes of few pixels.
+        let heavy = fitted(&file(ImageFormat::Png), ImageLimits { bytes: 10, pixels: 80 * 60 });
+        assert_eq!(heavy.unwrap().shrunk, None);
+        assert_eq!(fitted(b"RIFF\0\0\0\0WEBP", limits(9)), None);
+    }
 }

@@ -2,23 +2,24 @@
 
 use super::{
     answers::sentence,
-    camera_arg::camera,
+    camera_arg::{CameraArg, camera},
     failure::{Class, Failure},
+    pictures::{self, Sent},
     session::{MapArgs, Session},
 };
 use std::path::{Path, PathBuf};
-use vision::frame::Intrinsics;
 
 /// `waymark recognise`.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// Photographs, PNG or JPEG.
+    /// Photographs, PNG, JPEG or BMP; those over the server's limit of pixels are sent smaller.
     #[arg(required = true, value_name = "PHOTO")]
     photographs: Vec<PathBuf>,
-    /// Camera for poses: the file that `waymark camera calibrate --json` wrote, or fx,fy,cx,cy in pixels; and its
-    /// standard deviations, where known: of the focal length, of the principal point.
+    /// Camera for poses: the file that `waymark camera calibrate --json` wrote, ROS' ost.yaml, or fx,fy,cx,cy in pixels;
+    /// and its standard deviations, where known: of the focal length, of the principal point. A photograph of another
+    /// scale than that of the file has scaled intrinsics.
     #[arg(long, value_name = "FILE|FX,FY,CX,CY", value_parser = camera)]
-    camera: Option<Intrinsics>,
+    camera: Option<CameraArg>,
     #[command(flatten)]
     map: MapArgs,
 }
@@ -47,9 +48,15 @@ pub(crate) async fn run(args: &Args) -> anyhow::Result<()> {
 
 async fn photograph(session: &Session, map: &str, args: &Args, path: &Path) -> Result<(), Failure> {
     let name = path.display().to_string();
-    let image = std::fs::read(path)
+    let Sent { bytes: image, shrunk } = pictures::photograph(path)
         .map_err(|error| Failure::new(Class::Usage, "unreadable", format!("{name}: {error}")))?;
-    let answer = session.maps().recognise(map, image, args.camera.as_ref()).await;
+    if let Some([[w, h], [to_w, to_h]]) = shrunk {
+        session.note(&format!("{name}: {w}x{h} px made {to_w}x{to_h}; corners are of that size."));
+    }
+    let camera = args.camera.map(|camera| camera.of_photograph(&image)).transpose();
+    let camera =
+        camera.map_err(|failure| Failure { sentence: format!("{name}: {}", failure.sentence), ..failure })?;
+    let answer = session.maps().recognise(map, image, camera.as_ref()).await;
     let answer = session.explained(answer.map_err(Into::into)).await.map_err(|error| {
         let failure = Failure::of(&error);
         match failure.class {

@@ -1,13 +1,17 @@
 //! Decodes images. In: encoded bytes. Out: a checked picture, grey or in colour, within limits of bytes and pixels. Nothing
 //! else calls the decoders: the size is read from the header and checked before any pixel is unpacked, and metadata is
-//! ignored. The grey level of JPEG is its luma; the colours of PNG and of raw pixels are weighted as JPEG weights them, so
+//! ignored. What is transparent is white. The grey level of JPEG is its luma; the colours of PNG and of raw pixels are weighted as JPEG weights them, so
 //! that all give the same grey.
 
 mod colour;
+mod file_kind;
+mod huffman;
 pub mod mosaic;
+mod samples;
 
 use colour::{from_rgb, from_ycbcr, plane};
-use image::{ColorType, ImageDecoder, Limits, codecs::png::PngDecoder};
+use huffman::with_standard_tables;
+use image::{ImageDecoder, Limits, codecs::png::PngDecoder};
 use mosaic::mosaic;
 use protos::{
     CheckedFrame, Code, Rejection,
@@ -86,7 +90,7 @@ pub fn decode_upload(bytes: &[u8], limits: ImageLimits) -> Result<Picture, Rejec
     match sniff(bytes) {
         Some(Encoding::Jpeg) => jpeg(bytes, None, limits),
         Some(Encoding::Png) => png(bytes, None, limits),
-        _ => Err(Rejection::new(Code::WrongEncoding, "image", "neither a JPEG nor a PNG image")),
+        _ => Err(Rejection::new(Code::WrongEncoding, "image", file_kind::not_read(bytes))),
     }
 }
 
@@ -111,7 +115,8 @@ fn jpeg(bytes: &[u8], claimed: Option<(usize, usize)>, limits: ImageLimits) -> R
         .set_max_width(MAX_SIDE_PX)
         .set_max_height(MAX_SIDE_PX)
         .jpeg_set_max_scans(MAX_JPEG_SCANS);
-    let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes), options);
+    let complete = with_standard_tables(bytes);
+    let mut decoder = JpegDecoder::new_with_options(ZCursor::new(&*complete), options);
     decoder.decode_headers().map_err(|e| bad("JPEG", &e))?;
     let size = decoder.dimensions().ok_or_else(|| bad("JPEG", &"no size in its header"))?;
     check_claim(size, claimed)?;
@@ -153,7 +158,7 @@ fn png(bytes: &[u8], claimed: Option<(usize, usize)>, limits: ImageLimits) -> Re
     let colours = decoder.color_type();
     let mut raw = vec![0; size.0 * size.1 * usize::from(colours.bytes_per_pixel())];
     decoder.read_image(&mut raw).map_err(|e| bad("PNG", &e))?;
-    of_png(size, &raw, colours)
+    samples::picture(size, &raw, colours)
 }
 
 /// The decoder panics on a palette that is no whole number of colours (png 0.18.1).
@@ -174,27 +179,6 @@ fn check_palette(bytes: &[u8]) -> Result<(), Rejection> {
     Ok(())
 }
 
-/// Pixels of a PNG as a picture; transparency is ignored.
-fn of_png(size: (usize, usize), raw: &[u8], colours: ColorType) -> Result<Picture, Rejection> {
-    // 16-bit samples come in native byte order: the high byte is the 8-bit sample.
-    let high = usize::from(cfg!(target_endian = "little"));
-    let wide = [high, high + 2, high + 4];
-    let grey = |bytes: usize, place: usize| {
-        Ok(plane(size, raw.chunks_exact(bytes).map(|pixel| pixel[place]).collect())?.into())
-    };
-    match colours {
-        ColorType::L8 => grey(1, 0),
-        ColorType::La8 => grey(2, 0),
-        ColorType::L16 => grey(2, high),
-        ColorType::La16 => grey(4, high),
-        ColorType::Rgb8 => from_rgb::<3>(size, raw, [0, 1, 2]),
-        ColorType::Rgba8 => from_rgb::<4>(size, raw, [0, 1, 2]),
-        ColorType::Rgb16 => from_rgb::<6>(size, raw, wide),
-        ColorType::Rgba16 => from_rgb::<8>(size, raw, wide),
-        other => Err(bad("PNG", &format!("colours {other:?} are not supported"))),
-    }
-}
-
 fn check_bytes(bytes: &[u8], limits: ImageLimits) -> Result<(), Rejection> {
     if bytes.len() > limits.bytes {
         let detail = format!("{} bytes are more than {}", bytes.len(), limits.bytes);
@@ -209,7 +193,12 @@ fn check_size((width, height): (usize, usize), limits: ImageLimits) -> Result<()
         return Err(Rejection::new(Code::OutOfRange, "image", detail));
     }
     if width * height > limits.pixels {
-        let detail = format!("{width}x{height} px are more than {} in all", limits.pixels);
+        let share = (limits.pixels as f64 / (width * height) as f64).sqrt();
+        let [less_wide, less_high] = [width, height].map(|side| (side as f64 * share) as usize);
+        let detail = format!(
+            "{width}x{height} px are more than {} in all: shrink it to {less_wide}x{less_high} px or less",
+            limits.pixels
+        );
         return Err(Rejection::new(Code::TooLarge, "image", detail));
     }
     Ok(())

@@ -7,7 +7,10 @@ use image::{
     codecs::{jpeg::JpegDecoder, png::PngEncoder},
     metadata::Orientation,
 };
-use protos::{Rejection, convert::Encoding};
+use protos::{
+    Rejection,
+    convert::{Encoding, image_header},
+};
 use std::io::Cursor;
 use vision::frame::{GrayImage, Picture};
 
@@ -18,6 +21,20 @@ pub fn kind(bytes: &[u8]) -> Option<&'static str> {
         Encoding::Png => Some("png"),
         Encoding::Gray8 | Encoding::Rgb8 | Encoding::Bgr8 => None,
     }
+}
+
+/// Width and height of a picture file as [`decode`] turns it, px; `None` if its header says none.
+pub fn upright_size(bytes: &[u8]) -> Option<[usize; 2]> {
+    let (_, width, height) = image_header(bytes)?;
+    let (width, height) = (width as usize, height as usize);
+    let is_turned = matches!(
+        orientation(bytes),
+        Orientation::Rotate90
+            | Orientation::Rotate270
+            | Orientation::Rotate90FlipH
+            | Orientation::Rotate270FlipH
+    );
+    Some(if is_turned { [height, width] } else { [width, height] })
 }
 
 /// Decodes an uploaded picture and turns it upright. Errors: those of [`decode::decode_upload`].
@@ -83,6 +100,7 @@ mod tests {
         assert_eq!((plain.width(), plain.height()), (32, 16));
         let upright = decode(&noted(&grey), ImageLimits::UPLOAD).unwrap();
         assert_eq!((upright.width(), upright.height()), (16, 32));
+        assert_eq!([upright_size(&grey), upright_size(&noted(&grey))], [Some([32, 16]), Some([16, 32])]);
         assert!(upright.grey().at(8, 31) > upright.grey().at(8, 0));
         assert_eq!(kind(&noted(&grey)), Some("jpeg"));
         // Every plane is turned.

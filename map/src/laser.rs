@@ -11,6 +11,12 @@ use std::f64::consts::TAU;
 pub const MAX_BEAMS: usize = 16_384;
 /// Largest accepted maximum range, metres.
 pub const MAX_RANGE_M: f64 = 1000.0;
+/// Widest fan of the rays that are used, radians: a turn, and what a step in 32 bits adds to it.
+const FULL_TURN_RAD: f64 = TAU + 1e-6;
+/// Widest accepted fan, radians. Lasers that turn give the first ray again after a turn (LDS-01 in
+/// Gazebo: 5 µrad over a turn), or as many rays as fit at a nominal step, a few per cent over a turn. Bearings in degrees
+/// are far over it.
+pub const MAX_FAN_RAD: f64 = 1.05 * TAU;
 
 /// Why a scan cannot be used.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
@@ -35,23 +41,25 @@ pub struct Scan {
 
 impl Scan {
     /// Checks everything but single ranges: those that are NaN, infinite, not positive or at least `max_range_m` are
-    /// beams without a return. `bearing_step_rad` may be negative, not zero; the fan is at most one turn.
+    /// beams without a return. `bearing_step_rad` may be negative, not zero. The fan (`fan_rad`, step times beams less
+    /// one) is at most [`MAX_FAN_RAD`]; beams that are more than a turn after the first are left out.
     pub fn new(
         robot_from_laser: Pose2,
         first_bearing_rad: f64,
         bearing_step_rad: f64,
         max_range_m: f64,
-        ranges_m: Vec<f32>,
+        mut ranges_m: Vec<f32>,
     ) -> Result<Self, ScanError> {
         if ranges_m.is_empty() || ranges_m.len() > MAX_BEAMS {
             return Err(ScanError::Beams(ranges_m.len()));
         }
         robot_from_laser.check()?;
-        check::within("first_bearing_rad", first_bearing_rad, -TAU, TAU)?;
+        check::within("first_bearing_rad", first_bearing_rad.abs(), 0.0, MAX_FAN_RAD)?;
         check::within("bearing_step_rad", bearing_step_rad.abs(), 1e-5, TAU)?;
         let fan_rad = bearing_step_rad.abs() * (ranges_m.len() - 1) as f64;
-        check::within("bearing_step_rad", fan_rad, 0.0, TAU + 1e-6)?;
+        check::within("fan_rad", fan_rad, 0.0, MAX_FAN_RAD)?;
         check::within("max_range_m", max_range_m, 0.1, MAX_RANGE_M)?;
+        ranges_m.truncate((FULL_TURN_RAD / bearing_step_rad.abs()) as usize + 1);
         Ok(Self { robot_from_laser, first_bearing_rad, bearing_step_rad, max_range_m, ranges_m })
     }
 
@@ -105,6 +113,24 @@ mod tests {
         assert!((1..6).all(|i| scan.point(i).is_none()));
     }
 
+    /// Rays that a turn repeats: `(step, rays)` of lasers, and how many are used.
+    #[test]
+    fn rays_after_a_turn_are_left_out() {
+        let fans = [
+            ("LDS-01 in Gazebo", 0.017_501_922_324_299_812, 360, 359),
+            ("LDS-01", 1_f64.to_radians(), 360, 360),
+            ("first ray again at 32 bits", f64::from((TAU / 359.0) as f32), 360, 360),
+            ("clockwise", -0.017_501_922_324_299_812, 360, 359),
+            ("nominal step, 2.5 % more rays", TAU / 500.0, 513, 501),
+            ("8 rays a turn", 0.5 * FRAC_PI_2, 9, 9),
+        ];
+        for (name, step, rays, used) in fans {
+            let scan = Scan::new(Pose2::default(), 0.0, step, 3.5, vec![1.0; rays]).unwrap();
+            assert_eq!(scan.ranges_m().len(), used, "{name}");
+            assert!(scan.bearing_rad(used - 1).abs() <= FULL_TURN_RAD, "{name}");
+        }
+    }
+
     #[test]
     fn values_out_of_range_are_refused() {
         let scan = |step, max, n| Scan::new(Pose2::default(), 0.0, step, max, vec![1.0; n]);
@@ -113,7 +139,8 @@ mod tests {
         assert_eq!(scan(1e-3, 8.0, 0), Err(ScanError::Beams(0)));
         assert!(scan(1e-3, MAX_RANGE_M * 1.01, 10).is_err());
         assert!(scan(0.0, 8.0, 10).is_err());
-        assert!(scan(0.1, 8.0, 65).is_err(), "more than a turn");
+        let fan = OutOfRange { field: "fan_rad", value: 0.1 * 66.0 };
+        assert_eq!(scan(0.1, 8.0, 67), Err(fan.into()), "more than 1.05 turns");
         assert!(scan(f64::NAN, 8.0, 10).is_err());
         assert!(Scan::new(Pose2::new(f64::NAN, 0.0, 0.0), 0.0, 0.1, 8.0, vec![1.0]).is_err());
     }

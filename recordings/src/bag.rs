@@ -5,7 +5,7 @@ use crate::{
     message::{Body, Recorded},
     read::{ChannelInfo, RawMessage},
 };
-use protos::{Key, Name};
+use protos::{Key, Name, keys::MAX_NAME_BYTES};
 use ros2::{
     messages::MessageKind,
     robot::{
@@ -18,8 +18,16 @@ use std::collections::BTreeMap;
 /// The epoch of what a bag gives: the same bag gives the same messages.
 pub const BAG_EPOCH: u64 = 1;
 /// Ends of the topics of images, the longest first.
-const IMAGE_ENDS: [&str; 4] =
-    ["/image_raw/compressed", "/image_rect/compressed", "/image_raw", "/image_rect"];
+const IMAGE_ENDS: [&str; 8] = [
+    "/image_rect_color/compressed",
+    "/image_raw/compressed",
+    "/image_rect/compressed",
+    "/image_color/compressed",
+    "/image_rect_color",
+    "/image_raw",
+    "/image_rect",
+    "/image_color",
+];
 
 /// A robot of a bag: what came before, and counts.
 #[derive(Debug)]
@@ -93,33 +101,80 @@ pub fn is_bag<'a>(channels: impl IntoIterator<Item = &'a ChannelInfo>) -> bool {
     channels.into_iter().any(|channel| channel.encoding == "cdr")
 }
 
-/// The cameras of a bag by their topics of images, compressed ones before raw ones of the same camera; at most
-/// [`MAX_CAMERAS`]. A camera is called after its topic: `/camera/front/image_raw` is `camera-front`.
+/// Words of topics whose images are not of what a camera sees: distances, and what is computed of images.
+const NO_PICTURES: [&str; 8] =
+    ["depth", "disparity", "confidence", "segmentation", "mask", "label", "/theora", "/ffmpeg"];
+
+/// The cameras of a bag by their topics of images, compressed ones before raw ones of the same camera. Of more than
+/// [`MAX_CAMERAS`] those come first that have a calibration in the bag, then by their names; depth images are none. A
+/// camera is called after its topic: `/camera/front/image_raw` is `camera-front`.
 pub fn cameras<'a>(channels: impl IntoIterator<Item = &'a ChannelInfo>) -> Vec<CameraSettings> {
-    let mut found: BTreeMap<Name, CameraSettings> = BTreeMap::new();
-    for channel in channels {
+    let channels: Vec<&ChannelInfo> = channels.into_iter().collect();
+    let mut found: Vec<CameraSettings> = Vec::new();
+    for channel in &channels {
         let form = match channel.schema.as_str() {
             "sensor_msgs/msg/Image" => ImageForm::Raw,
             "sensor_msgs/msg/CompressedImage" => ImageForm::Compressed,
             _ => continue,
         };
-        let Some(camera) = camera(&channel.topic, form) else { continue };
-        let is_better = found.get(&camera.name).is_none_or(|other| other.form == ImageForm::Raw);
-        if is_better {
-            found.insert(camera.name.clone(), camera);
+        let lower = channel.topic.to_lowercase();
+        if NO_PICTURES.iter().any(|word| lower.contains(word)) {
+            continue;
+        }
+        let Some(mut camera) = camera(&channel.topic, form) else { continue };
+        match found.iter_mut().find(|other| other.name == camera.name) {
+            None => found.push(camera),
+            // The same camera in another form.
+            Some(other) if camera_topic(&other.image) == camera_topic(&camera.image) => {
+                if other.form == ImageForm::Raw {
+                    *other = camera;
+                }
+            }
+            // Another one beside it: `/stereo/left` and `/stereo/right`.
+            Some(_) => {
+                camera.name = name(camera.image.trim_start_matches('/')).unwrap_or(camera.name);
+                if found.iter().all(|other| other.name != camera.name) {
+                    found.push(camera);
+                }
+            }
         }
     }
-    found.into_values().take(MAX_CAMERAS).collect()
+    let is_calibrated = |camera: &CameraSettings| {
+        channels.iter().any(|c| c.topic == camera.camera_info && c.schema == "sensor_msgs/msg/CameraInfo")
+    };
+    found.sort_by_cached_key(|camera| (!is_calibrated(camera), camera.name.clone()));
+    found.truncate(MAX_CAMERAS);
+    found.sort_by(|a, b| a.name.cmp(&b.name));
+    found
+}
+
+/// A topic of images without the form of the image; `None` if it does not end as those do.
+fn base(topic: &str) -> Option<&str> {
+    IMAGE_ENDS.iter().find_map(|end| topic.strip_suffix(end))
+}
+
+/// A topic of images without the form of the image.
+fn camera_topic(topic: &str) -> &str {
+    base(topic).unwrap_or_else(|| topic.strip_suffix("/compressed").unwrap_or(topic))
+}
+
+/// A name of the last words of a topic that fit into one.
+fn name(words: &str) -> Option<Name> {
+    let words = words.trim_matches('/').to_lowercase();
+    if words.is_empty() {
+        return Name::new("camera").ok();
+    }
+    let all: Vec<&str> = words.split('/').collect();
+    (0..all.len())
+        .map(|first| all[first..].join("-"))
+        .find(|name| name.len() <= MAX_NAME_BYTES)
+        .and_then(|n| Name::new(n).ok())
 }
 
 /// The camera of a topic of images, with the calibration beside it; `None` for a topic that gives no name.
 pub fn camera(topic: &str, form: ImageForm) -> Option<CameraSettings> {
-    let base = IMAGE_ENDS.iter().find_map(|end| topic.strip_suffix(end));
-    let base = base.unwrap_or_else(|| topic.rsplit_once('/').map_or("", |(base, _)| base));
-    let words: String = base.trim_matches('/').to_lowercase();
-    let name = words.replace('/', "-");
-    let name = Name::new(if name.is_empty() { "camera".to_owned() } else { name }).ok()?;
-    let mut camera = CameraSettings::conventional(name, base, form);
+    let base = base(topic).unwrap_or_else(|| topic.rsplit_once('/').map_or("", |(base, _)| base));
+    let mut camera = CameraSettings::conventional(name(base)?, base, form);
     topic.clone_into(&mut camera.image);
     camera.is_rectified = topic.contains("/image_rect");
     Some(camera)
@@ -155,5 +210,41 @@ mod tests {
         let expected = expected.map(|(n, i, c, r)| (n.to_owned(), i.to_owned(), c.to_owned(), r));
         assert_eq!(found, expected);
         assert!(is_bag(&channels));
+    }
+
+    fn images(topics: &[&str], infos: &[&str]) -> Vec<(String, String)> {
+        let channel = |topic: &&str, schema: &str| ChannelInfo {
+            topic: (*topic).to_owned(),
+            encoding: "cdr".to_owned(),
+            schema: format!("sensor_msgs/msg/{schema}"),
+        };
+        let images = topics.iter().map(|topic| channel(topic, "Image"));
+        let channels: Vec<_> = images.chain(infos.iter().map(|topic| channel(topic, "CameraInfo"))).collect();
+        cameras(&channels).into_iter().map(|c| (c.name.to_string(), c.image)).collect()
+    }
+
+    #[test]
+    fn depth_takes_no_cameras_place_and_calibrated_ones_come_first() {
+        let depth: Vec<String> = (0..8).map(|i| format!("/camera{i}/depth/image_rect_raw")).collect();
+        let mut topics: Vec<&str> = depth.iter().map(String::as_str).collect();
+        topics.extend(["/camera/aligned_depth_to_color/image_raw", "/stereo/disparity", "/zed/image_raw"]);
+        assert_eq!(images(&topics, &[]), [("zed".to_owned(), "/zed/image_raw".to_owned())]);
+        let many: Vec<String> = (0..12).map(|i| format!("/a{i}/image_raw")).collect();
+        let mut topics: Vec<&str> = many.iter().map(String::as_str).collect();
+        topics.push("/zed/image_raw");
+        let found = images(&topics, &["/zed/camera_info"]);
+        assert_eq!(found.len(), MAX_CAMERAS);
+        assert!(found.iter().any(|(name, _)| name == "zed"), "{found:?}");
+    }
+
+    #[test]
+    fn two_cameras_of_one_folder_and_long_topics_have_names() {
+        let found = images(&["/stereo/left", "/stereo/right"], &[]);
+        assert_eq!(
+            found.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>(),
+            ["stereo", "stereo-right"]
+        );
+        let long = format!("/{}/front/image_raw", "x".repeat(MAX_NAME_BYTES));
+        assert_eq!(images(&[&long], &[])[0].0, "front");
     }
 }

@@ -4,6 +4,7 @@
 use super::quad_choice::{picked, quads, refusal};
 use crate::{
     failure::{Class, Failure},
+    pictures,
     session::Session,
 };
 use client::{ClientError, LandmarkRegion, NewView, api::TrainingView};
@@ -29,9 +30,14 @@ impl Photograph<'_> {
         view: impl Fn(NewView) -> NewView,
     ) -> Result<TrainingView, Failure> {
         let path = self.path;
-        let image = std::fs::read(path).map_err(|error| {
+        let sent = pictures::photograph(path).map_err(|error| {
             Failure::new(Class::Usage, "unreadable", format!("{}: {error}", path.display()))
         })?;
+        if let Some([[w, h], [to_w, to_h]]) = sent.shrunk {
+            let name = path.display();
+            session.note(&format!("{name}: {w}x{h} px made {to_w}x{to_h}; corners are of that size."));
+        }
+        let image = sent.bytes;
         let send = |region| {
             session.maps().upload_view_with(map, landmark, view(NewView::new(image.clone(), region)))
         };

@@ -3,8 +3,9 @@
 use super::{photograph::Photograph, show};
 use crate::{
     arg_parsers::{height_m, numbers},
-    camera_arg::camera,
+    camera_arg::{CameraArg, camera},
     failure::{Class, Failure},
+    pictures,
     session::Session,
 };
 use client::{
@@ -50,9 +51,10 @@ pub(super) struct PlaceArgs {
     /// The framed object to take where the photograph shows several: 1 is the leftmost.
     #[arg(long, value_name = "N", requires = "photo")]
     pick: Option<usize>,
-    /// The camera of the photograph: the file that `waymark camera calibrate --json` wrote, or fx,fy,cx,cy in pixels.
+    /// The camera of the photograph: the file that `waymark camera calibrate --json` wrote, ROS' ost.yaml, or
+    /// fx,fy,cx,cy in pixels.
     #[arg(long, value_name = "FILE|FX,FY,CX,CY", value_parser = camera)]
-    camera: Option<Intrinsics>,
+    camera: Option<CameraArg>,
     /// Where the camera stood and looked: x,y in metres, direction in degrees.
     #[arg(long, value_name = "X,Y,DEG", value_parser = standpoint, allow_hyphen_values = true)]
     from: Option<[f64; 3]>,
@@ -156,7 +158,10 @@ async fn by_photograph(session: &Session, map: &str, args: &PlaceArgs) -> anyhow
         return Err(Failure::usage("--photo needs --camera, --from and --camera-height.").into());
     };
     let photograph = Photograph { path, region: LandmarkRegion::Detect, pick: args.pick };
-    let capture = capture(camera, from, args.from_sigma, height_m, args.camera_tilt);
+    let sent = pictures::photograph(path)
+        .map_err(|error| Failure::new(Class::Usage, "unreadable", format!("{}: {error}", path.display())))?;
+    let capture =
+        capture(&camera.of_photograph(&sent.bytes)?, from, args.from_sigma, height_m, args.camera_tilt);
     let view = |view| NewView { capture: Some(capture.clone()), keep_near_duplicate: true, ..view };
     let view = photograph.send(session, (map, &args.landmark), view).await?;
     match view.placing {

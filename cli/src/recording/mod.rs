@@ -3,6 +3,7 @@
 pub(crate) mod record;
 pub(crate) mod recorder;
 pub(crate) mod replay;
+mod playable;
 mod player;
 mod report;
 

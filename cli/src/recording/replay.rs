@@ -2,6 +2,7 @@
 
 use super::{
     Endpoints, PROGRAM, new_file,
+    playable::playable,
     player::{Player, PlayerOptions},
     report::{ReplayReport, table},
 };
@@ -166,6 +167,7 @@ async fn inputs_used(
 fn opened(path: &Path) -> anyhow::Result<BufReader<File>> {
     let unreadable =
         |error| Failure::new(Class::Usage, "unreadable", format!("{}: {error}", unreadable(path)));
+    let path = playable(path)?;
     Ok(BufReader::new(File::open(path).map_err(unreadable)?))
 }
 
@@ -195,7 +197,11 @@ fn recorded_robot(named: Option<&Name>, names: &BTreeSet<&str>, file: &Path) -> 
     let all = || names.iter().copied().collect::<Vec<_>>().join(", ");
     let missing = |sentence: String| Failure::new(Class::NotFound, "not_recorded", sentence);
     match (named, names.len()) {
-        (_, 0) => Err(missing(format!("No robot's messages are in {}.", file.display())).into()),
+        (_, 0) => {
+            let advice = "Messages of ROS 1 are not read: `rosbags-convert` makes a bag of ROS 2.";
+            let missing = missing(format!("No robot's messages are in {}.", file.display()));
+            Err(missing.advise(advice).into())
+        }
         (Some(named), _) if names.contains(named.as_str()) => Ok(named.clone()),
         (Some(named), _) => {
             let sentence =

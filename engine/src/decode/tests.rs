@@ -51,18 +51,112 @@ fn every_depth_and_colour_of_png_is_read() {
     let grey: Vec<u8> = (0..12).map(|i| i * 20).collect();
     let l8 = as_png(&grey, 4, 3, ExtendedColorType::L8);
     assert_eq!(decode_upload(&l8, ImageLimits::UPLOAD).unwrap().grey().data(), grey);
-    let la8: Vec<u8> = grey.iter().flat_map(|g| [*g, 9]).collect();
+    let la8: Vec<u8> = grey.iter().flat_map(|g| [*g, 255]).collect();
     let la8 = as_png(&la8, 4, 3, ExtendedColorType::La8);
     assert_eq!(decode_upload(&la8, ImageLimits::UPLOAD).unwrap().grey().data(), grey);
     let wide: Vec<u8> = grey.iter().flat_map(|g| u16::from_be_bytes([*g, 77]).to_ne_bytes()).collect();
     let l16 = as_png(&wide, 4, 3, ExtendedColorType::L16);
     assert_eq!(decode_upload(&l16, ImageLimits::UPLOAD).unwrap().grey().data(), grey);
-    let rgba: Vec<u8> = grey.iter().flat_map(|g| [*g, *g, *g, 0]).collect();
+    let rgba: Vec<u8> = grey.iter().flat_map(|g| [*g, *g, *g, 255]).collect();
     let rgba = as_png(&rgba, 4, 3, ExtendedColorType::Rgba8);
     assert_eq!(decode_upload(&rgba, ImageLimits::UPLOAD).unwrap().grey().data(), grey);
     let rgb16: Vec<u8> = wide.chunks_exact(2).flat_map(|s| s.repeat(3)).collect();
     let rgb16 = as_png(&rgb16, 4, 3, ExtendedColorType::Rgb16);
     assert_eq!(decode_upload(&rgb16, ImageLimits::UPLOAD).unwrap().grey().data(), grey);
+}
+
+/// A logo on nothing is taught as it is printed: on white.
+#[test]
+fn what_is_transparent_is_white() {
+    let decode = |raw: &[u8], colours| {
+        decode_upload(&as_png(raw, 3, 1, colours), ImageLimits::UPLOAD).unwrap().into_grey().data().to_vec()
+    };
+    assert_eq!(decode(&[100, 255, 100, 0, 0, 128], ExtendedColorType::La8), [100, 255, 127]);
+    let rgba = [0, 0, 0, 0, 200, 200, 200, 255, 255, 0, 0, 0];
+    assert_eq!(decode(&rgba, ExtendedColorType::Rgba8), [255, 200, 255]);
+    let wide: Vec<u8> =
+        [20_000_u16, 65_535, 20_000, 0, 65_535, 65_535].iter().flat_map(|s| s.to_ne_bytes()).collect();
+    assert_eq!(decode(&wide, ExtendedColorType::La16), [78, 255, 255]);
+}
+
+#[test]
+fn ten_and_twelve_bits_in_sixteen_are_not_black() {
+    let decode = |samples: [u16; 3], colours| {
+        let raw: Vec<u8> = samples.iter().flat_map(|sample| sample.to_ne_bytes()).collect();
+        let width = if colours == ExtendedColorType::L16 { 3 } else { 1 };
+        decode_upload(&as_png(&raw, width, 1, colours), ImageLimits::UPLOAD)
+            .unwrap()
+            .into_grey()
+            .data()
+            .to_vec()
+    };
+    assert_eq!(decode([1023, 512, 0], ExtendedColorType::L16), [255, 128, 0]);
+    assert_eq!(decode([4095, 2048, 16], ExtendedColorType::L16), [255, 128, 1]);
+    assert_eq!(decode([65_535, 2048, 0], ExtendedColorType::L16), [255, 8, 0]);
+    assert_eq!(decode([4095, 4095, 4095], ExtendedColorType::Rgb16), [255]);
+}
+
+/// USB cameras' MJPEG: the tables are those of the standard, and left out.
+#[test]
+fn a_jpeg_without_huffman_tables_has_the_standard_ones() {
+    let raw = rgb(64, 48);
+    let whole = as_jpeg(&raw, 64, 48, ExtendedColorType::Rgb8);
+    let (mut bare, mut at) = (whole[..2].to_vec(), 2);
+    while whole[at + 1] != 0xda {
+        let end = at + 2 + usize::from(u16::from_be_bytes([whole[at + 2], whole[at + 3]]));
+        if whole[at + 1] != 0xc4 {
+            bare.extend_from_slice(&whole[at..end]);
+        }
+        at = end;
+    }
+    bare.extend_from_slice(&whole[at..]);
+    assert!(bare.len() + 400 < whole.len());
+    let decode = |bytes: &[u8]| decode_upload(bytes, ImageLimits::UPLOAD).unwrap();
+    assert_eq!(decode(&bare), decode(&whole));
+    let frame = frame(v1::ImageEncoding::Jpeg, 64, 48, bare);
+    assert_eq!(decode_frame(&frame, ImageLimits::FRAME).unwrap(), decode(&whole));
+}
+
+/// First bytes of files of other formats, and words of the refusal.
+#[test]
+fn other_formats_are_refused_by_name() {
+    let heic = b"\0\0\0\x18ftypheic\0\0\0\0mif1heic".as_slice();
+    for (bytes, words) in [
+        (heic, "Most Compatible"),
+        (b"\0\0\0\x18ftypmif1", "HEIC"),
+        (b"\0\0\0\x18ftypavif", "AVIF"),
+        (b"BM\x36\0", "BMP file; only JPEG and PNG are read. Save it as one of them"),
+        (b"II*\0\x08\0", "TIFF"),
+        (b"MM\0*\0\0", "TIFF"),
+        (b"RIFF\x10\0\0\0WEBPVP8 ", "WebP"),
+        (b"GIF89a", "GIF"),
+        (b"\xff\x0a\xfa", "JPEG XL"),
+        (b"\0\0\0\x0cJXL \x0d", "JPEG XL"),
+        (b"%PDF-1.7", "PDF"),
+        (b"<svg xmlns", "SVG"),
+        (b"<?xml version", "XML"),
+        (b"", "empty"),
+        (b"hello", "neither a JPEG nor a PNG"),
+        (b"\xff\xd8", "neither a JPEG nor a PNG"),
+    ] {
+        let refused = decode_upload(bytes, ImageLimits::UPLOAD).unwrap_err();
+        assert_eq!((refused.code, &*refused.field), (Code::WrongEncoding, "image"), "{words}");
+        assert!(refused.detail.contains(words), "{refused}");
+    }
+}
+
+#[test]
+fn a_photograph_over_the_limit_is_told_its_size() {
+    let mut png = as_png(&[0; 12], 4, 3, ExtendedColorType::L8);
+    png[16..24].copy_from_slice(&[0, 0, 0x1f, 0x40, 0, 0, 0x17, 0x70]);
+    let refused = decode_upload(&png, ImageLimits::UPLOAD).unwrap_err();
+    assert_eq!(refused.code, Code::TooLarge);
+    assert!(
+        refused
+            .detail
+            .ends_with("8000x6000 px are more than 16777216 in all: shrink it to 4729x3547 px or less"),
+        "{refused}"
+    );
 }
 
 /// Every level of each colour, and mixtures.
@@ -84,7 +178,7 @@ fn raw_colour_gives_the_planes_of_the_same_png() {
     let with_alpha = |high: u8| -> Vec<u8> {
         let sample =
             |s: u8| if high == 0 { vec![s] } else { u16::from_be_bytes([s, high]).to_ne_bytes().to_vec() };
-        rgb.chunks_exact(3).flat_map(|p| [p[0], p[1], p[2], 7].into_iter().flat_map(sample)).collect()
+        rgb.chunks_exact(3).flat_map(|p| [p[0], p[1], p[2], 255].into_iter().flat_map(sample)).collect()
     };
     for (colours, raw) in
         [(ExtendedColorType::Rgba8, with_alpha(0)), (ExtendedColorType::Rgba16, with_alpha(77))]

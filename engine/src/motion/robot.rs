@@ -195,9 +195,10 @@ impl RobotState {
         self.moved_at = Some(received);
     }
 
-    /// Time since odometry was last applied, s.
+    /// Time since odometry was last applied, s; by the clock of a simulation that runs faster.
     fn elapsed_s(&self, now: Instant) -> f64 {
-        self.moved_at.map_or(0.0, |at| now.saturating_duration_since(at).as_secs_f64())
+        let elapsed_s = self.moved_at.map_or(0.0, |at| now.saturating_duration_since(at).as_secs_f64());
+        elapsed_s * self.clock.rate().max(1.0)
     }
 
     /// Time since a capture by the robot's clock.

@@ -21,6 +21,7 @@ use vision::model::LandmarkId;
 mod by_hand;
 mod guided;
 mod recordings;
+mod simulated_time;
 mod stamps;
 
 /// A time of the server's clock.

@@ -26,7 +26,7 @@ pub struct LocaliseForm {
     /// PNG or JPEG; with it, `intrinsics` and `mounting` are needed.
     #[schema(value_type = Option<String>, format = Binary)]
     pub image: Option<Vec<u8>>,
-    /// JSON, `{"fx_px", "fy_px", "cx_px", "cy_px", ...}`.
+    /// JSON, `{"fx_px", "fy_px", "cx_px", "cy_px", ...}`, with `width_px` and `height_px` as a photograph has them.
     pub intrinsics: Option<String>,
     /// JSON, `robot_from_camera`: `{"x_m", "y_m", "z_m", "qw", "qx", "qy", "qz"}`.
     pub mounting: Option<String>,

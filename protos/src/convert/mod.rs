@@ -9,6 +9,7 @@ pub mod image_header;
 pub mod localise;
 pub mod motion;
 pub mod result;
+mod sample_bits;
 
 pub use frame::quads::{self, CheckedPatch, CheckedQuad};
 pub use frame::{CheckedFrame, EncodedImage, Encoding, Pixels};
@@ -16,3 +17,4 @@ pub use gaze::CheckedGaze;
 pub use image_header::image_header;
 pub use localise::CheckedLocalise;
 pub use motion::{CheckedOdometry, CheckedScan};
+pub use sample_bits::sample_bits;

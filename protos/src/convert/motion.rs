@@ -3,6 +3,7 @@
 use super::geometry;
 use crate::{Code, Rejection, v1};
 use map::{
+    check::OutOfRange,
     laser::{Scan, ScanError},
     pose2::Pose2,
 };
@@ -57,6 +58,12 @@ impl TryFrom<v1::Scan> for CheckedScan {
         let scan =
             Scan::new(robot_from_laser, s.first_bearing_rad, s.bearing_step_rad, s.max_range_m, s.ranges_m);
         let scan = scan.map_err(|error| match &error {
+            ScanError::OutOfRange(inner @ OutOfRange { field: "fan_rad", .. }) => {
+                let refused = geometry::refused(inner);
+                let detail =
+                    format!("{}: bearing_step_rad times the beams is more than a turn", refused.detail);
+                Rejection { detail, ..refused }
+            }
             ScanError::OutOfRange(inner) => geometry::refused(inner),
             ScanError::Beams(_) => Rejection::new(Code::OutOfRange, "ranges_m", error.to_string()),
         })?;
@@ -106,7 +113,9 @@ mod tests {
             refused(|s| s.first_bearing_rad = f64::NAN),
             (Code::NotFinite, "first_bearing_rad".into())
         );
-        assert_eq!(refused(|s| s.bearing_step_rad = 4.0), (Code::OutOfRange, "bearing_step_rad".into()));
+        assert_eq!(refused(|s| s.bearing_step_rad = 4.0), (Code::OutOfRange, "fan_rad".into()));
+        assert_eq!(refused(|s| s.bearing_step_rad = 0.0), (Code::OutOfRange, "bearing_step_rad".into()));
+        assert_eq!(refused(|s| s.max_range_m = f64::INFINITY), (Code::NotFinite, "max_range_m".into()));
         assert_eq!(refused(|s| s.max_range_m = 0.0), (Code::OutOfRange, "max_range_m".into()));
         assert_eq!(refused(|s| s.max_range_m = MAX_RANGE_M + 1.0), (Code::OutOfRange, "max_range_m".into()));
         assert_eq!(refused(|s| s.robot_from_laser = None), (Code::Missing, "robot_from_laser".into()));
@@ -115,6 +124,13 @@ mod tests {
             refused(|s| s.odom_from_robot = Some(far)),
             (Code::OutOfRange, "odom_from_robot.x_m".into())
         );
+    }
+
+    /// LDS-01 in Gazebo: 360 rays, the last one a hair more than a turn after the first.
+    #[test]
+    fn the_first_ray_may_come_again() {
+        let wire = v1::Scan { bearing_step_rad: 0.017_501_922_324_299_812, ..scan(360) };
+        assert_eq!(CheckedScan::try_from(wire).unwrap().scan.ranges_m().len(), 359);
     }
 
     #[test]

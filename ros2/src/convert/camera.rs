@@ -4,6 +4,7 @@
 //! image_geometry/src/pinhole_camera_model.cpp` (region of interest, then binning). Pixel centres are at integers.
 
 use crate::messages::CameraInfo;
+use protos::v1;
 
 /// How a lens bends rays; coefficients in the order of OpenCV.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -57,6 +58,9 @@ pub enum CameraError {
         /// How many there are.
         count: usize,
     },
+    /// The server would refuse it: field and reason.
+    #[error("{0}")]
+    Refused(String),
     /// The rectified image belongs to a camera that is turned: one of a stereo pair. Its frame is another one than
     /// the header's.
     #[error("the image is rectified into a turned frame; send the raw image")]
@@ -70,7 +74,7 @@ impl CameraModel {
     /// Of the raw image, with the lens.
     pub fn of_raw(info: &CameraInfo<'_>) -> Result<Self, CameraError> {
         let k = &info.k;
-        Self::of(info, [k[0], k[4], k[2], k[5]], lens(info)?)
+        Self::of(info, [k[0], k[4], k[2], k[5]], LensModel::of(info.distortion_model, &info.d)?)
     }
 
     /// Of the rectified image (`image_rect`), which has no lens.
@@ -81,6 +85,24 @@ impl CameraModel {
         }
         let p = &info.p;
         Self::of(info, [p[0], p[5], p[2], p[6]], LensModel::Rectified)
+    }
+
+    /// As frames carry it.
+    pub fn to_wire(&self) -> v1::Intrinsics {
+        let mut wire = v1::Intrinsics {
+            fx_px: self.fx_px,
+            fy_px: self.fy_px,
+            cx_px: self.cx_px,
+            cy_px: self.cy_px,
+            ..v1::Intrinsics::default()
+        };
+        match self.lens {
+            LensModel::Rectified => {}
+            LensModel::PlumbBob(d) => wire.plumb_bob = d.to_vec(),
+            LensModel::RationalPolynomial(d) => wire.rational_polynomial = d.to_vec(),
+            LensModel::Equidistant(d) => wire.equidistant = d.to_vec(),
+        }
+        wire
     }
 
     fn of(info: &CameraInfo<'_>, calibrated: [f64; 4], lens: LensModel) -> Result<Self, CameraError> {
@@ -126,35 +148,46 @@ impl CameraModel {
     }
 }
 
-/// Some calibrations give four coefficients for `plumb_bob`, and OpenCV up to 14 for `rational_polynomial`, of which
-/// those after the eighth have to be 0.
-fn lens(info: &CameraInfo<'_>) -> Result<LensModel, CameraError> {
-    let d = &info.d;
-    if d.iter().any(|c| !c.is_finite()) {
-        return Err(CameraError::Field("d"));
-    }
-    if d.is_empty() {
-        return Ok(LensModel::Rectified);
-    }
-    let model = || info.distortion_model.chars().take(MAX_MODEL_CHARS).collect();
-    let wrong = || CameraError::Coefficients { model: model(), count: d.len() };
-    match info.distortion_model {
-        "plumb_bob" => match *d.as_slice() {
-            [k1, k2, p1, p2] => Ok(LensModel::PlumbBob([k1, k2, p1, p2, 0.0])),
-            [k1, k2, p1, p2, k3] => Ok(LensModel::PlumbBob([k1, k2, p1, p2, k3])),
-            _ => Err(wrong()),
-        },
-        "rational_polynomial" => match d.split_first_chunk() {
-            Some((first, rest)) if rest.iter().all(|c| c.abs() <= 0.0) => {
-                Ok(LensModel::RationalPolynomial(*first))
-            }
-            _ => Err(wrong()),
-        },
-        "equidistant" | "fisheye" => {
-            <[f64; 4]>::try_from(d.as_slice()).ok().map(LensModel::Equidistant).ok_or_else(wrong)
+/// Names of a lens that bends nothing. `CameraInfo` of simulations and of rectified streams has them.
+const NO_LENS: [&str; 6] = ["", "none", "None", "pinhole", "perspective", "rectified"];
+
+impl LensModel {
+    /// The lens by the coefficients that are not 0, in the order of OpenCV: some drivers send `plumb_bob` with 8
+    /// coefficients, `rational_polynomial` with 5, or up to 14 (thin prism and tilt), the last ones 0. `plumb_bob` with k4
+    /// to k6 is the rational model, as OpenCV reads it.
+    pub fn of(name: &str, d: &[f64]) -> Result<Self, CameraError> {
+        if d.iter().any(|c| !c.is_finite()) {
+            return Err(CameraError::Field("d"));
         }
-        _ => Err(CameraError::UnknownModel(model())),
+        if d.is_empty() {
+            return Ok(Self::Rectified);
+        }
+        let used = d.iter().rposition(|c| c.abs() > 0.0).map_or(0, |last| last + 1);
+        let model = || name.chars().take(MAX_MODEL_CHARS).collect();
+        let wrong = || CameraError::Coefficients { model: model(), count: used };
+        match name {
+            "plumb_bob" | "radtan" | "rational_polynomial" => match used {
+                0..=5 => Ok(Self::PlumbBob(filled(d))),
+                6..=8 => Ok(Self::RationalPolynomial(filled(d))),
+                _ => Err(wrong()),
+            },
+            // Without coefficients it bends rays, too.
+            "equidistant" | "fisheye" | "kannala_brandt" | "kannala_brandt4" => {
+                if used <= 4 {
+                    Ok(Self::Equidistant(filled(d)))
+                } else {
+                    Err(wrong())
+                }
+            }
+            name if used == 0 && NO_LENS.contains(&name) => Ok(Self::Rectified),
+            _ => Err(CameraError::UnknownModel(model())),
+        }
     }
+}
+
+/// The first coefficients, and 0 for those that are left out.
+fn filled<const N: usize>(d: &[f64]) -> [f64; N] {
+    std::array::from_fn(|i| d.get(i).copied().unwrap_or(0.0))
 }
 
 #[cfg(test)]
@@ -225,7 +258,6 @@ mod tests {
         fourteen[13] = 1e-3;
         let wrong = |model: &str, count| Err(CameraError::Coefficients { model: model.into(), count });
         assert_eq!(of("rational_polynomial", &fourteen), wrong("rational_polynomial", 14));
-        assert_eq!(of("plumb_bob", &eight), wrong("plumb_bob", 8));
         assert_eq!(of("equidistant", &eight[..5]), wrong("equidistant", 5));
         assert_eq!(of("", &[]), Ok(LensModel::Rectified));
         assert_eq!(of("thin_prism", &eight), Err(CameraError::UnknownModel("thin_prism".into())));

@@ -6,6 +6,7 @@
 
 use super::planar::{PlanarPose, tilt_rad};
 use crate::messages::LaserScan;
+use map::laser::{MAX_BEAMS, MAX_FAN_RAD, MAX_RANGE_M};
 use nalgebra::Isometry3;
 use std::f64::consts::PI;
 
@@ -13,6 +14,11 @@ use std::f64::consts::PI;
 pub const MAX_LASER_TILT_RAD: f64 = 5.0 * PI / 180.0;
 /// Longest accepted time of a scan, seconds.
 pub const MAX_SCAN_S: f64 = 10.0;
+
+/// Largest accepted angle of the first ray, smallest step and smallest `range_max`, as of [`map::laser::Scan`].
+const MAX_ANGLE_RAD: f32 = MAX_FAN_RAD as f32;
+const MIN_STEP_RAD: f32 = 1e-5;
+const MIN_RANGE_MAX_M: f32 = 0.1;
 
 const NS_PER_S: f64 = 1e9;
 
@@ -27,7 +33,8 @@ pub struct PlanarScan {
     pub first_bearing_rad: f64,
     /// Angle from one ray to the next, radians, signed.
     pub bearing_step_rad: f64,
-    /// Largest valid range, metres.
+    /// Largest valid range, metres, at most [`MAX_RANGE_M`]: drivers without a limit send the largest number, or
+    /// infinity.
     pub max_range_m: f64,
     /// Ranges, metres; NaN where invalid.
     pub ranges_m: Vec<f32>,
@@ -39,6 +46,14 @@ pub enum LaserError {
     /// No ray.
     #[error("a scan without rays")]
     Empty,
+    /// More rays than [`MAX_BEAMS`].
+    #[error("a scan of {0} rays, {MAX_BEAMS} accepted")]
+    Rays(usize),
+    /// The rays span more than [`MAX_FAN_RAD`].
+    #[error(
+        "`angle_increment` times the rays of the scan is {0} rad, more than a turn: angles are in radians"
+    )]
+    Fan(f64),
     /// A number is not finite or makes no sense: a step of 0, `range_max` not above `range_min`, a negative time.
     #[error("`{field}` of the scan is {value}")]
     Field {
@@ -56,6 +71,9 @@ impl PlanarScan {
     /// Checks the numbers and makes invalid ranges NaN.
     pub fn of(scan: &LaserScan<'_>) -> Result<Self, LaserError> {
         let steps = scan.ranges.len().checked_sub(1).ok_or(LaserError::Empty)? as f64;
+        if scan.ranges.len() > MAX_BEAMS {
+            return Err(LaserError::Rays(scan.ranges.len()));
+        }
         let wanted = |field, value: f32, is_right: bool| {
             let value = f64::from(value);
             if is_right && value.is_finite() { Ok(value) } else { Err(LaserError::Field { field, value }) }
@@ -64,12 +82,17 @@ impl PlanarScan {
         if step_ns * steps > MAX_SCAN_S * NS_PER_S {
             return Err(LaserError::Field { field: "time_increment", value: step_ns / NS_PER_S });
         }
-        let first_bearing_rad = wanted("angle_min", scan.angle_min, true)?;
-        let is_step = scan.angle_increment.abs() > 0.0;
+        let first_bearing_rad = wanted("angle_min", scan.angle_min, scan.angle_min.abs() <= MAX_ANGLE_RAD)?;
+        let is_step = scan.angle_increment.abs() >= MIN_STEP_RAD;
         let bearing_step_rad = wanted("angle_increment", scan.angle_increment, is_step)?;
+        if bearing_step_rad.abs() * steps > MAX_FAN_RAD {
+            return Err(LaserError::Fan(bearing_step_rad.abs() * steps));
+        }
         wanted("range_min", scan.range_min, true)?;
-        let max_range_m = wanted("range_max", scan.range_max, scan.range_max > scan.range_min.max(0.0))?;
-        let valid = scan.range_min..=scan.range_max;
+        let farthest = scan.range_max.min(MAX_RANGE_M as f32);
+        let is_above = scan.range_max > scan.range_min.max(MIN_RANGE_MAX_M);
+        let max_range_m = wanted("range_max", if is_above { farthest } else { scan.range_max }, is_above)?;
+        let valid = scan.range_min..=farthest;
         let first_ray_ns = scan.header.stamp.to_ns();
         Ok(Self {
             first_ray_ns,

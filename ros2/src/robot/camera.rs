@@ -5,13 +5,11 @@ use super::{
     settings::CameraSettings,
 };
 use crate::{
-    convert::{
-        CameraError, CameraModel, Compression, ImageRows, LensModel, TransformTree, body_from_optical,
-    },
+    convert::{CameraError, CameraModel, Compression, ImageRows, TransformTree, body_from_optical},
     messages::{CameraInfo, CompressedImage, Header, Image},
 };
 use protos::{
-    convert::{geometry::pose3_wire, image_header},
+    convert::{geometry, geometry::pose3_wire, image_header},
     prost::bytes::Bytes,
     v1,
 };
@@ -62,25 +60,12 @@ impl CameraState {
         if calibrated != given {
             return Err(lack(age_ns, LackReason::ImageSize { calibrated, given }));
         }
-        Ok(intrinsics_wire(&model))
+        let wire = model.to_wire();
+        // A frame with a calibration that the server refuses would be refused as a whole; without it, it still names.
+        geometry::intrinsics(&wire)
+            .map_err(|refused| lack(age_ns, CameraError::Refused(refused.to_string()).into()))?;
+        Ok(wire)
     }
-}
-
-fn intrinsics_wire(model: &CameraModel) -> v1::Intrinsics {
-    let mut wire = v1::Intrinsics {
-        fx_px: model.fx_px,
-        fy_px: model.fy_px,
-        cx_px: model.cx_px,
-        cy_px: model.cy_px,
-        ..v1::Intrinsics::default()
-    };
-    match model.lens {
-        LensModel::Rectified => {}
-        LensModel::PlumbBob(d) => wire.plumb_bob = d.to_vec(),
-        LensModel::RationalPolynomial(d) => wire.rational_polynomial = d.to_vec(),
-        LensModel::Equidistant(d) => wire.equidistant = d.to_vec(),
-    }
-    wire
 }
 
 /// Raw images of more pixels travel as grey. So many in colour, 1.6 MB, 20 times a second are what a robot may send by the

@@ -8,7 +8,6 @@ use crate::{
     convert::{LaserMounting, PlanarPose, PlanarScan},
     messages::LaserScan,
 };
-use map::laser::MAX_RANGE_M;
 use protos::v1;
 
 /// A scan without number and odometry. Its time is that of the middle ray: what the robot moved during the turn then
@@ -33,7 +32,7 @@ pub(super) fn scan(
         robot_from_laser: Some(planar_wire(&mounting.robot_from_laser)),
         first_bearing_rad: scan.first_bearing_rad,
         bearing_step_rad: scan.bearing_step_rad,
-        max_range_m: scan.max_range_m.min(MAX_RANGE_M),
+        max_range_m: scan.max_range_m,
         ranges_m: scan.ranges_m,
         ..v1::Scan::default()
     })

@@ -4,14 +4,17 @@
 mod attachments;
 mod bounds;
 mod bridge;
+mod camera_variants;
 mod fields;
 mod golden;
 mod hex;
+mod image_variants;
 mod keys;
 mod padding;
 mod received;
 mod robot;
 mod rosbags;
 mod round_trips;
+mod scan_variants;
 mod tokens;
 mod trees;

@@ -15,26 +15,26 @@ use ros2::{
 };
 
 const EPOCH: u64 = 77;
-const IMAGE: &str = "/camera/image_raw";
-const CAMERA_INFO: &str = "/camera/camera_info";
-const OPTICAL: &str = "camera_optical_frame";
+pub(super) const IMAGE: &str = "/camera/image_raw";
+pub(super) const CAMERA_INFO: &str = "/camera/camera_info";
+pub(super) const OPTICAL: &str = "camera_optical_frame";
 /// Axes of an optical frame in those of a body.
 const OPTICAL_AXES: Quaternion = Quaternion { x: -0.5, y: 0.5, z: -0.5, w: 0.5 };
 
-fn settings() -> RobotSettings {
+pub(super) fn settings() -> RobotSettings {
     let camera = CameraSettings::conventional(Name::new("front").expect("a name"), "/camera", ImageForm::Raw);
     RobotSettings { cameras: vec![camera], ..RobotSettings::default() }
 }
 
-fn robot() -> RobotAdapter {
+pub(super) fn robot() -> RobotAdapter {
     RobotAdapter::new(settings(), EPOCH).expect("settings")
 }
 
-fn header(ms: i64, frame_id: &str) -> Header<'_> {
+pub(super) fn header(ms: i64, frame_id: &str) -> Header<'_> {
     Header { stamp: Time::from_ns(ms * 1_000_000).expect("a time"), frame_id }
 }
 
-fn info(ms: i64) -> CameraInfo<'static> {
+pub(super) fn info(ms: i64) -> CameraInfo<'static> {
     CameraInfo {
         header: header(ms, OPTICAL),
         height: 2,
@@ -46,7 +46,7 @@ fn info(ms: i64) -> CameraInfo<'static> {
     }
 }
 
-fn image(ms: i64) -> AnyMessage<'static> {
+pub(super) fn image(ms: i64) -> AnyMessage<'static> {
     let data = &[10, 20, 30, 40, 50, 60, 70, 80];
     let (height, width) = (2, 4);
     AnyMessage::Image(Image {
@@ -77,7 +77,7 @@ fn tf(transforms: Vec<TransformStamped<'_>>) -> AnyMessage<'_> {
 }
 
 /// Camera and laser on the robot, over a link between.
-fn mountings() -> AnyMessage<'static> {
+pub(super) fn mountings() -> AnyMessage<'static> {
     let level = Quaternion::default();
     tf(vec![
         link(0, "base_link", "mast", [0.1, 0.0, 1.0], level),
@@ -86,7 +86,7 @@ fn mountings() -> AnyMessage<'static> {
     ])
 }
 
-fn wheels(ms: i64, x_m: f64) -> AnyMessage<'static> {
+pub(super) fn wheels(ms: i64, x_m: f64) -> AnyMessage<'static> {
     let position = Vector3 { x: x_m, y: 0.0, z: 0.0 };
     let pose = Pose { position, orientation: Quaternion::default() };
     AnyMessage::Odometry(Odometry {
@@ -97,7 +97,7 @@ fn wheels(ms: i64, x_m: f64) -> AnyMessage<'static> {
     })
 }
 
-fn turn(ms: i64) -> LaserScan<'static> {
+pub(super) fn turn(ms: i64) -> LaserScan<'static> {
     LaserScan {
         header: header(ms, "laser"),
         angle_min: -0.5,
@@ -116,7 +116,7 @@ fn scan(ms: i64) -> AnyMessage<'static> {
     AnyMessage::LaserScan(turn(ms))
 }
 
-fn frames(taken: &Taken) -> Vec<(&v1::Frame, &[Lack])> {
+pub(super) fn frames(taken: &Taken) -> Vec<(&v1::Frame, &[Lack])> {
     let frames = taken.messages.iter().filter_map(|message| match message {
         RobotMessage::Frame { frame, lacks, .. } => Some((frame, lacks.as_slice())),
         _ => None,
@@ -124,7 +124,7 @@ fn frames(taken: &Taken) -> Vec<(&v1::Frame, &[Lack])> {
     frames.collect()
 }
 
-fn scans(taken: &Taken) -> Vec<&v1::Scan> {
+pub(super) fn scans(taken: &Taken) -> Vec<&v1::Scan> {
     let scans = taken.messages.iter().filter_map(|message| match message {
         RobotMessage::Scan(scan) => Some(scan),
         _ => None,

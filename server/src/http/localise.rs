@@ -4,6 +4,7 @@ use super::{
     AppState,
     error::ApiError,
     extract::{PathParams, json, too_large},
+    photograph_camera::PhotographCamera,
     upload::{FORM_OVERHEAD, Form},
 };
 use crate::{
@@ -32,7 +33,6 @@ use std::{
     time::{Duration, Instant},
 };
 use utoipa_axum::{router::OpenApiRouter, routes};
-use vision::frame::Intrinsics;
 
 pub(super) fn router(upload_bytes: usize) -> OpenApiRouter<AppState> {
     OpenApiRouter::new().routes(routes!(at)).layer(DefaultBodyLimit::max(upload_bytes + FORM_OVERHEAD))
@@ -49,7 +49,7 @@ impl Drop for GivenUp {
 
 /// What a form holds, checked.
 struct Sensed {
-    frame: Option<(axum::body::Bytes, Intrinsics, CameraExtrinsics)>,
+    frame: Option<(axum::body::Bytes, PhotographCamera, CameraExtrinsics)>,
     scan: Option<Scan>,
 }
 
@@ -60,7 +60,7 @@ struct Sensed {
     request_body(content = LocaliseForm, content_type = "multipart/form-data"),
     responses((status = 200, body = LocaliseResult), (status = 404, body = Problem), (status = 413, body = Problem),
     (status = 422, body = Problem, description = "missing, bad_image, wrong_encoding, too_large, out_of_range, not_finite, \
-     invalid_value")))]
+     invalid_value, size_mismatch")))]
 async fn at(
     State(app): State<AppState>,
     PathParams(map): PathParams<String>,
@@ -73,11 +73,13 @@ async fn at(
     let stopped = Arc::new(AtomicBool::new(false));
     let _given_up = GivenUp(stopped.clone());
     let found = app.on_vision_thread(move |app| {
-        let picture =
-            sensed.frame.as_ref().map(|(bytes, ..)| picture::decode(bytes, app.config.limits.upload()));
-        let picture = picture.transpose()?;
-        let frame = sensed.frame.as_ref().zip(picture.as_ref());
-        let frame = frame.map(|((_, camera, extrinsics), picture)| {
+        let frame = sensed.frame.as_ref().map(|(bytes, camera, extrinsics)| {
+            let picture = picture::decode(bytes, app.config.limits.upload())?;
+            let camera = camera.of_picture([picture.width(), picture.height()])?;
+            Ok::<_, ApiError>((picture, camera, extrinsics))
+        });
+        let frame = frame.transpose()?;
+        let frame = frame.as_ref().map(|(picture, camera, extrinsics)| {
             let picture = picture.into();
             LocaliseFrame { picture, camera, extrinsics }
         });
@@ -107,8 +109,7 @@ fn sensed(form: &mut Form, max_scan_bytes: usize) -> Result<Sensed, ApiError> {
         }
         return Ok(Sensed { frame: None, scan });
     };
-    let wire: v1::Intrinsics = json(&form.needed("intrinsics")?, "intrinsics")?;
-    let intrinsics = geometry::intrinsics(&wire).map_err(|r| r.inside("intrinsics"))?;
+    let intrinsics = PhotographCamera::read(&form.needed("intrinsics")?)?;
     let wire: v1::Pose3 = json(&form.needed("mounting")?, "mounting")?;
     let mounting = geometry::mounting(&wire).map_err(|r| r.inside("mounting"))?;
     Ok(Sensed { frame: Some((image, intrinsics, mounting)), scan })

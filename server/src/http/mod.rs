@@ -37,6 +37,7 @@ mod page_session;
 mod pages;
 mod pose_by_hand;
 mod peer;
+mod photograph_camera;
 mod pictures;
 mod recognise;
 mod refused_views;

@@ -3,7 +3,8 @@
 use super::{
     AppState,
     error::ApiError,
-    extract::{PathParams, json},
+    extract::PathParams,
+    photograph_camera::PhotographCamera,
     upload::{FORM_OVERHEAD, Form},
 };
 use crate::store::StoreError;
@@ -15,7 +16,6 @@ use axum::{
 use engine::{frame_answer::answer_to_photograph, picture};
 use protos::{
     api::{PhotographForm, Problem},
-    convert::geometry,
     v1,
 };
 use utoipa_axum::{router::OpenApiRouter, routes};
@@ -29,7 +29,8 @@ pub(super) fn router(upload_bytes: usize) -> OpenApiRouter<AppState> {
     request_body(content = PhotographForm, content_type = "multipart/form-data"),
     responses((status = 200, body = Object, description = "`Answer` of protos/waymark/v1/waymark.proto as JSON"),
     (status = 404, body = Problem), (status = 413, body = Problem),
-    (status = 422, body = Problem, description = "bad_image, wrong_encoding, too_large, out_of_range, not_finite")))]
+    (status = 422, body = Problem, description = "bad_image, wrong_encoding, too_large, out_of_range, not_finite, \
+     size_mismatch")))]
 async fn recognise(
     State(app): State<AppState>,
     PathParams(map): PathParams<String>,
@@ -39,15 +40,11 @@ async fn recognise(
     let snapshot = snapshot.ok_or_else(|| StoreError::NotFound { what: Kind::Map, name: map })?;
     let mut form = Form::read(&app, request, &["image", "intrinsics"]).await?;
     let bytes = form.needed("image")?;
-    let camera = match form.optional("intrinsics") {
-        Some(text) => {
-            let wire: v1::Intrinsics = json(&text, "intrinsics")?;
-            Some(geometry::intrinsics(&wire).map_err(|r| r.inside("intrinsics"))?)
-        }
-        None => None,
-    };
+    let camera = form.optional("intrinsics").map(|part| PhotographCamera::read(&part)).transpose()?;
     let answer = app.on_vision_thread(move |app| {
         let picture = picture::decode(&bytes, app.config.limits.upload())?;
+        let size = [picture.width(), picture.height()];
+        let camera = camera.map(|camera| camera.of_picture(size)).transpose()?;
         Ok(answer_to_photograph(&picture, camera.as_ref(), &snapshot))
     });
     answer.await?.map(Json)

@@ -32,6 +32,13 @@ impl IntrinsicsSigmas {
     }
 }
 
+/// Steps from the middle to a corner in which a model is looked at for poles.
+const POLE_STEPS: usize = 256;
+
+/// How much farther out than without a lens a corner may lie, where a model has large coefficients: before a pole it goes to
+/// infinity.
+const SANE_GROWTH: std::ops::RangeInclusive<f64> = 0.5..=2.0;
+
 /// A calibrated camera: zero skew, pixel (0, 0) at the centre of the top-left pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Intrinsics {
@@ -52,8 +59,16 @@ pub struct Intrinsics {
 }
 
 impl Intrinsics {
+    /// Largest distortion coefficient whose model is taken without a look at it. Larger ones are of rational models whose
+    /// numerator and denominator nearly cancel: calibrations of long lenses give thousands.
+    pub const LARGE_COEFFICIENT: f64 = 100.0;
+    /// Largest accepted distortion coefficient.
+    pub const MAX_COEFFICIENT: f64 = 1e6;
+
     /// Checks that every number is finite, focal lengths lie in 10 to 100 000 px, the principal point within
-    /// +-20 000 px and distortion coefficients within +-100.
+    /// +-20 000 px and distortion coefficients within +-[`Self::LARGE_COEFFICIENT`]; or within
+    /// +-[`Self::MAX_COEFFICIENT`] if the model is invertible at the corners of a picture with the principal point in
+    /// its middle.
     pub fn new(
         fx_px: f64,
         fy_px: f64,
@@ -73,9 +88,34 @@ impl Intrinsics {
         check("cx_px", cx_px, -2e4, 2e4)?;
         check("cy_px", cy_px, -2e4, 2e4)?;
         for value in distortion.coefficients() {
-            check("distortion", *value, -100.0, 100.0)?;
+            check("distortion", *value, -Self::MAX_COEFFICIENT, Self::MAX_COEFFICIENT)?;
         }
-        Ok(Self { fx_px, fy_px, cx_px, cy_px, distortion, sigmas: None })
+        let made = Self { fx_px, fy_px, cx_px, cy_px, distortion, sigmas: None };
+        let large = distortion.coefficients().iter().find(|value| value.abs() > Self::LARGE_COEFFICIENT);
+        match large {
+            Some(&value) if !made.is_invertible() => {
+                Err(FrameError::Intrinsics { field: "distortion", value })
+            }
+            _ => Ok(made),
+        }
+    }
+
+    /// Whether the distortion is invertible at the corners of a picture with the principal point in its middle.
+    fn is_invertible(&self) -> bool {
+        let (right, below) = (2.0 * self.cx_px, 2.0 * self.cy_px);
+        let corners = [[0.0, 0.0], [right, 0.0], [right, below], [0.0, below]];
+        // A pole is narrow: the picture must grow outwards in small steps.
+        let grows = |corner: Point2<f64>| {
+            let radius = |i: usize| {
+                let share = i as f64 / POLE_STEPS as f64;
+                self.distortion.distort(&Point2::from(corner.coords * share)).point.coords.norm()
+            };
+            let share = radius(POLE_STEPS) / corner.coords.norm();
+            (0..POLE_STEPS).all(|i| radius(i + 1) > radius(i)) && SANE_GROWTH.contains(&share)
+        };
+        let straight =
+            |corner: &[f64; 2]| self.distortion.undistort(&self.normalised(&Point2::from(*corner)));
+        corners.iter().all(|corner| straight(corner).is_some_and(grows))
     }
 
     /// The 3x3 matrix K.
@@ -116,5 +156,25 @@ impl Intrinsics {
 
     pub(crate) fn normalised(&self, px: &Point2<f64>) -> Point2<f64> {
         Point2::new((px.x - self.cx_px) / self.fx_px, (px.y - self.cy_px) / self.fy_px)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of a report on a long lens: k4 to k6 nearly cancel k1 to k3.
+    const LONG_LENS: [f64; 8] = [-13.2, -98.0, 1e-4, -2e-4, 1357.8, -13.1, -102.4, 1383.1];
+
+    #[test]
+    fn large_coefficients_are_used_where_the_model_is_sane() {
+        let camera = |fx: f64, k| Intrinsics::new(fx, fx, 960.0, 600.0, Distortion::RationalPolynomial(k));
+        // Half a picture's diagonal is 0.19 of the focal length; the model has its pole at 0.28.
+        assert!(camera(6000.0, LONG_LENS).is_ok());
+        let refused = Err(FrameError::Intrinsics { field: "distortion", value: 1357.8 });
+        for fx in [100.0, 400.0, 1500.0] {
+            assert_eq!(camera(fx, LONG_LENS), refused, "{fx}");
+        }
+        assert!(camera(6000.0, [2e6; 8]).is_err());
     }
 }

@@ -6,11 +6,13 @@ mod picture;
 mod lens;
 mod intrinsics;
 mod sigmas;
+mod sized;
 
 pub use image::{FrameError, GrayImage, MAX_AREA_PX, MAX_SIDE_PX};
 pub use intrinsics::{Intrinsics, IntrinsicsSigmas};
 pub use lens::{DistortedPoint, Distortion, MAX_RAY_RAD};
 pub use picture::{COLOUR_PLANES, Picture, PictureRef, luma};
+pub use sized::PictureSizeError;
 
 #[cfg(test)]
 mod tests {

@@ -2042,6 +2042,11 @@ export interface components {
              * @description Standard deviation of the focal length.
              */
             fx_sigma_px: number;
+            /**
+             * Format: int32
+             * @description Height of these pictures.
+             */
+            height_px?: number | null;
             /** @description As frames carry it, with the standard deviations below: what is not known of the camera is then in the poses. */
             intrinsics: Record<string, never>;
             /**
@@ -2065,6 +2070,11 @@ export interface components {
             views: components["schemas"]["CalibrationViewReport"][];
             /** @description Why it should not be believed without a look: empty where nothing speaks against it. */
             warnings: string[];
+            /**
+             * Format: int32
+             * @description Width of the pictures that it was calibrated with; absent in older reports.
+             */
+            width_px?: number | null;
         };
         /** @description What to calibrate from. */
         CalibrationRequest: {
@@ -3181,7 +3191,7 @@ export interface components {
              * @description PNG or JPEG; with it, `intrinsics` and `mounting` are needed.
              */
             image?: string | null;
-            /** @description JSON, `{"fx_px", "fy_px", "cx_px", "cy_px", ...}`. */
+            /** @description JSON, `{"fx_px", "fy_px", "cx_px", "cy_px", ...}`, with `width_px` and `height_px` as a photograph has them. */
             intrinsics?: string | null;
             /** @description JSON, `robot_from_camera`: `{"x_m", "y_m", "z_m", "qw", "qx", "qy", "qz"}`. */
             mounting?: string | null;
@@ -4187,7 +4197,9 @@ export interface components {
             image: string;
             /**
              * @description JSON: `fx_px`, `fy_px`, `cx_px`, `cy_px` and optionally a lens: `plumb_bob` (5 numbers), `rational_polynomial` (8) or
-             *     `equidistant` (4). Without it there is recognition but no pose.
+             *     `equidistant` (4). `width_px` and `height_px` say of which size of picture they are: one of another scale has them
+             *     scaled, one of other proportions is refused. Without them a principal point far off the middle is refused. Without
+             *     intrinsics there is recognition but no pose.
              */
             intrinsics?: string | null;
         };
@@ -13877,7 +13889,7 @@ export interface operations {
                 /**
                  * @example {
                  *       "image": "@frame.jpg",
-                 *       "intrinsics": "{\"fx_px\": 600.0, \"fy_px\": 600.0, \"cx_px\": 320.0, \"cy_px\": 240.0}",
+                 *       "intrinsics": "{\"fx_px\": 600.0, \"fy_px\": 600.0, \"cx_px\": 319.5, \"cy_px\": 319.5, \"width_px\": 640, \"height_px\": 640}",
                  *       "mounting": "{\"qx\": -0.5, \"qy\": 0.5, \"qz\": -0.5, \"qw\": 0.5, \"x_m\": 0.1, \"y_m\": 0.0, \"z_m\": 1.2}",
                  *       "scan": "{\"robot_from_laser\": {\"x_m\": 0.2, \"y_m\": 0.0, \"theta_rad\": 0.0}, \"first_bearing_rad\": -0.2, \"bearing_step_rad\": 0.1, \"max_range_m\": 12.0, \"ranges_m\": [2.0, 1.98, 1.97, null, 2.0]}"
                  *     }
@@ -13957,7 +13969,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description missing, bad_image, wrong_encoding, too_large, out_of_range, not_finite, invalid_value */
+            /** @description missing, bad_image, wrong_encoding, too_large, out_of_range, not_finite, invalid_value, size_mismatch */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -14888,7 +14900,7 @@ export interface operations {
                 /**
                  * @example {
                  *       "image": "@photograph.jpg",
-                 *       "intrinsics": "{\"fx_px\": 600.0, \"fy_px\": 600.0, \"cx_px\": 320.0, \"cy_px\": 240.0}"
+                 *       "intrinsics": "{\"fx_px\": 600.0, \"fy_px\": 600.0, \"cx_px\": 319.5, \"cy_px\": 319.5, \"width_px\": 640, \"height_px\": 640}"
                  *     }
                  */
                 "multipart/form-data": components["schemas"]["PhotographForm"];
@@ -14967,7 +14979,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description bad_image, wrong_encoding, too_large, out_of_range, not_finite, invalid_value */
+            /** @description bad_image, wrong_encoding, too_large, out_of_range, not_finite, size_mismatch, invalid_value */
             422: {
                 headers: {
                     [name: string]: unknown;

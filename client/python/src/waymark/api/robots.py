@@ -256,7 +256,8 @@ class CalibrationViewReport:
 
 @dataclass(frozen=True, slots=True)
 class CalibrationReport:
-    """A calibrated camera. Standard deviations are infinite where the views do not determine them."""
+    """A calibrated camera, for pictures of `width_px` x `height_px`. Standard deviations are infinite where the views do
+    not determine them."""
 
     intrinsics: Intrinsics
     fx_sigma_px: float = field(metadata={NULL: math.inf})
@@ -269,6 +270,8 @@ class CalibrationReport:
     warnings: tuple[str, ...]
     views: tuple[CalibrationViewReport, ...]
     linear_fx_px: float | None = None
+    width_px: int | None = None
+    height_px: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
