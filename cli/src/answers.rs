@@ -53,6 +53,9 @@ fn no_standpoint(refusal: &str) -> Option<&'static str> {
             "the camera would be below the floor or 5 m above it; check size, place and height of the landmark"
         }
         "gate_inconsistent" => "the landmarks contradict one another; check their sizes and places",
+        "gate_imprecise" => {
+            "the landmarks give its position worse than to 15 cm; photograph from closer, from the side, or several"
+        }
         _ => "the corners do not determine it",
     })
 }

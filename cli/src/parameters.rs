@@ -58,13 +58,7 @@ impl ParameterArgs {
         for (path, value) in self.flags() {
             put(&mut all, path, value)?;
         }
-        for assignment in &self.set {
-            let (path, text) =
-                assignment.split_once('=').with_context(|| format!("{assignment} is not PATH=VALUE"))?;
-            // Words need no quotes.
-            let value = serde_json::from_str(text).unwrap_or_else(|_| Value::from(text));
-            put(&mut all, path, value)?;
-        }
+        self.set.iter().try_for_each(|assignment| assign(&mut all, assignment))?;
         serde_path_to_error::deserialize(&all)
             .map_err(|error| anyhow::anyhow!("parameter {}: {}", error.path(), error.inner()))
     }
@@ -114,6 +108,13 @@ fn two(text: &str) -> Result<[f64; 2], String> {
     let numbers: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse()).collect();
     let numbers = numbers.map_err(|error| error.to_string())?;
     numbers.try_into().map_err(|other: Vec<f64>| format!("{} numbers, not two", other.len()))
+}
+
+/// Sets one parameter by `PATH=VALUE`; words need no quotes.
+pub fn assign(all: &mut Value, assignment: &str) -> anyhow::Result<()> {
+    let (path, text) =
+        assignment.split_once('=').with_context(|| format!("{assignment} is not PATH=VALUE"))?;
+    put(all, path, serde_json::from_str(text).unwrap_or_else(|_| Value::from(text)))
 }
 
 /// Sets what is at a path of names between dots. The path must exist: a typing error must not add a parameter.

@@ -44,6 +44,8 @@ pub enum NoFix {
     GateInconsistent,
     /// The camera would be below the floor or far above it.
     GateCameraHeight,
+    /// The position of the camera is known too poorly.
+    GateImprecise,
 }
 
 impl NoFix {
@@ -62,6 +64,7 @@ impl NoFix {
             Self::GateBehindWall => "gate_behind_wall",
             Self::GateInconsistent => "gate_inconsistent",
             Self::GateCameraHeight => "gate_camera_height",
+            Self::GateImprecise => "gate_imprecise",
         }
     }
 }
@@ -84,6 +87,7 @@ impl From<CameraPoseRefusal> for NoFix {
             CameraPoseRefusal::Ambiguous => Self::Ambiguous,
             CameraPoseRefusal::Height => Self::GateCameraHeight,
             CameraPoseRefusal::Disagree => Self::GateInconsistent,
+            CameraPoseRefusal::Imprecise => Self::GateImprecise,
         }
     }
 }

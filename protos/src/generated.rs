@@ -479,7 +479,8 @@ pub struct Answer {
     #[prost(message, optional, tag = "20")]
     pub camera_pose: ::core::option::Option<CameraPose>,
     /// Why recognised landmarks gave no pose of the camera: empty, landmark_not_placed, landmark_quarantined, ambiguous,
-    /// gate_camera_height (below the floor or more than 5 m above it), gate_inconsistent, degenerate.
+    /// gate_camera_height (below the floor or more than 5 m above it), gate_inconsistent,
+    /// gate_imprecise (its position is known worse than to 15 cm), degenerate.
     #[prost(string, tag = "21")]
     pub camera_pose_refusal: ::prost::alloc::string::String,
     /// The server that answers, over zenoh; empty over HTTP.

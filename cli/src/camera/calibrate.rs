@@ -18,8 +18,8 @@ use vision::{
 /// `waymark camera calibrate`.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// Pictures by one camera (PNG, JPEG, or folders of them) of one flat, textured rectangle: 3 to 32, from sides that
-    /// differ by more than 15 degrees.
+    /// Pictures by one camera (PNG, JPEG, or folders of them) of one flat, textured rectangle: 2 to 32, better 3 or more,
+    /// from sides that differ by more than 15 degrees.
     #[arg(required_unless_present = "corners")]
     images: Vec<PathBuf>,
     /// Width and height of the object in metres, such as 0.60x0.84. With corners only their ratio matters for the camera;

@@ -23,6 +23,9 @@ use vision::{
 
 /// Heights above the floor, metres, at which a camera is accepted.
 const CAMERA_HEIGHT_M: std::ops::RangeInclusive<f64> = 0.0..=5.0;
+/// Largest standard deviation of the position, metres (root of the trace), that is accepted: beyond it the pose says
+/// in which room the camera is, and hardly more. Chosen on photoreal worlds 1 to 14.
+const MAX_POSITION_SIGMA_M: f64 = 0.15;
 /// Two minima whose chi2 differs by less are ambiguous: see [`vision::pose::AMBIGUOUS_CHI2`].
 const AMBIGUOUS_CHI2: f64 = 16.0;
 /// Two minima nearer than this (metres and radians) are one.
@@ -50,6 +53,8 @@ pub enum CameraPoseRefusal {
     Height,
     /// The landmarks contradict one another.
     Disagree,
+    /// The corners determine the position worse than to 15 cm: too far away, too small, or seen from the front.
+    Imprecise,
 }
 
 /// The camera's pose from the landmarks of one photograph. Errors name a number that is out of range.
@@ -60,7 +65,13 @@ pub fn camera_pose(
     for observation in observations {
         observation.place.check()?;
     }
-    Ok(decide(observations))
+    Ok(decide(observations).and_then(precise))
+}
+
+/// The pose, if its position is known well enough.
+fn precise(pose: CameraPose) -> Result<CameraPose, CameraPoseRefusal> {
+    let position_m2 = pose.covariance.fixed_view::<3, 3>(3, 3).trace();
+    if position_m2 <= MAX_POSITION_SIGMA_M.powi(2) { Ok(pose) } else { Err(CameraPoseRefusal::Imprecise) }
 }
 
 /// A pose of the camera by one solution of one landmark.

@@ -20,6 +20,7 @@ use crate::{
             edge_segments::{EdgeSegment, segments as straight_segments},
         },
         suppression::{
+            blank::doubt_blanks,
             nested_borders::{by_corners, canonical},
             nested_quads::absorb,
             non_maximum::{snap_sides, suppress_non_maxima, suppress_overlaps},
@@ -112,7 +113,9 @@ fn by_proposals(
     let (rated, edges, segments) = proposed(memory, work, p, trace);
     let gradients = Gradients { image: work.grey(), gx: edges.gx(), gy: edges.gy() };
     let found: Vec<Quad> = if p.quads.choose_sides {
-        suppress_non_maxima(snap_sides(rated, &gradients, &p.quads), &p.quads)
+        let mut classified = snap_sides(rated, &gradients, &p.quads);
+        doubt_blanks(&mut classified, work, &p.quads);
+        suppress_non_maxima(classified, &p.quads)
     } else {
         suppress_overlaps(rated, &p.quads)
     };

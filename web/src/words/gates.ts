@@ -28,6 +28,7 @@ const POSE_GATES: Record<string, string> = {
   gate_behind_wall: "the robot would stand behind the wall",
   gate_inconsistent: "the landmarks contradict one another",
   gate_camera_height: "the camera would be below the floor or far above it",
+  gate_imprecise: "the landmarks give the camera's position worse than to 15 cm",
 };
 
 export const poseGateText = (code: string) => POSE_GATES[code] ?? gateText(code);

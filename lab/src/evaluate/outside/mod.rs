@@ -4,19 +4,24 @@
 mod world;
 mod teach;
 mod recognise;
+mod bound;
 mod poses;
 mod score;
 mod report;
 mod table;
 mod draw;
+mod listing;
 mod peer;
 mod strangers;
 
 use anyhow::Context as _;
-use cli::{parameters::ParameterArgs, screen};
+use cli::{
+    parameters::{ParameterArgs, assign},
+    screen,
+};
 use engine::snapshot::MapSnapshot;
 use report::Report;
-use score::{PictureScore, View};
+use score::PictureScore;
 use std::{
     path::{Path, PathBuf},
     sync::Arc,
@@ -39,6 +44,9 @@ pub(crate) struct Args {
     /// Name every full view without a name, and why, every wrong name and every false quad.
     #[arg(long)]
     misses: bool,
+    /// Name every camera pose with its error, the stated standard deviation, and what corners of 0.3 px can tell.
+    #[arg(long)]
+    poses: bool,
     /// Teach each world and show it the pictures of the next one: every name is wrong, but on a landmark that shows
     /// the same picture (lab/reviewed/same-pictures.json).
     #[arg(long)]
@@ -56,6 +64,14 @@ pub(crate) struct Args {
     /// The Python that has OpenCV.
     #[arg(long, default_value = "python3", value_name = "PROGRAM")]
     python: PathBuf,
+    /// Take the places of landmarks to be exact, as they are here, instead of measured with a tape (1 cm, half a
+    /// degree): then several landmarks in one picture tell more.
+    #[arg(long)]
+    exact_places: bool,
+    /// Set one parameter of the algorithm other than the detector's, after the lesson, such as
+    /// `recognise.texture.search=true`. May be repeated.
+    #[arg(long, value_name = "PATH=VALUE")]
+    algorithm: Vec<String>,
     #[command(flatten)]
     parameters: ParameterArgs,
 }
@@ -67,7 +83,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let detect = args.parameters.parameters()?;
     let teacher = Teacher::start()?;
     let maps =
-        worlds.iter().enumerate().map(|(i, world)| Ok(detecting_with(&detect, &*teacher.teach(world, i)?)));
+        worlds.iter().enumerate().map(|(i, world)| adjusted(args, &detect, &*teacher.teach(world, i)?));
     let maps: Vec<MapSnapshot> = maps.collect::<anyhow::Result<_>>()?;
     let (mut scores, mut unreadable) = (Vec::new(), 0);
     for (i, map) in maps.iter().enumerate() {
@@ -78,7 +94,10 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     }
     teacher.stop();
     if args.misses {
-        scores.iter().for_each(name_misses);
+        scores.iter().for_each(listing::name_misses);
+    }
+    if args.poses {
+        scores.iter().for_each(listing::name_pose);
     }
     let mut report = Report::new(worlds.len(), &scores, unreadable);
     if args.peer {
@@ -116,10 +135,21 @@ fn read(path: &Path, sigmas: CameraSigmas) -> anyhow::Result<World> {
     Ok(world)
 }
 
-/// The map, recognised with these parameters of the detector.
-fn detecting_with(detect: &DetectParams, map: &MapSnapshot) -> MapSnapshot {
-    let params = Params { detect: detect.clone(), ..Params::clone(&map.params) };
-    MapSnapshot { params: Arc::new(params), ..map.clone() }
+/// Variance of a coordinate of a place that is taken to be exact, m^2 and rad^2.
+const EXACT: f64 = 1e-12;
+
+/// The map, recognised with the parameters that are asked for.
+fn adjusted(args: &Args, detect: &DetectParams, map: &MapSnapshot) -> anyhow::Result<MapSnapshot> {
+    let mut all = serde_json::to_value(Params { detect: detect.clone(), ..Params::clone(&map.params) })?;
+    args.algorithm.iter().try_for_each(|assignment| assign(&mut all, assignment))?;
+    let params: Params = serde_json::from_value(all).context("--algorithm")?;
+    let mut map = MapSnapshot { params: Arc::new(params), ..map.clone() };
+    if args.exact_places {
+        for place in map.landmarks.values_mut().filter_map(|landmark| landmark.place.as_mut()) {
+            place.covariance = nalgebra::Matrix6::identity() * EXACT;
+        }
+    }
+    Ok(map)
 }
 
 /// Scores all pictures of a world; the number of those that cannot be read.
@@ -149,30 +179,4 @@ fn of_world(
     }
     progress.finish_and_clear();
     Ok(unreadable)
-}
-
-fn name_misses(score: &PictureScore) {
-    let at = |corners: &vision::geometry::Corners| {
-        let centre = corners.points().iter().fold([0.0; 2], |s, p| [s[0] + 0.25 * p.x, s[1] + 0.25 * p.y]);
-        format!("at ({:.0}, {:.0})", centre[0], centre[1])
-    };
-    let of = format!("{}/{}", score.world, score.file);
-    for label in score.labels.iter().filter(|l| l.view == View::Full && !l.is_named()) {
-        let name = label.landmark.as_deref().unwrap_or("a distractor");
-        let angle = label.angle_rad.map_or(String::new(), |a| format!(", angle {:.0} deg", a.to_degrees()));
-        screen::complain(&format!(
-            "{of}: {name} {} not named, side {:.0} px{angle}: {} ({})",
-            at(&label.corners),
-            label.side_px,
-            label.miss.reason,
-            label.miss.detail
-        ));
-    }
-    for wrong in &score.wrong {
-        let is = wrong.is.as_deref().unwrap_or("nothing labelled");
-        screen::complain(&format!("{of}: WRONG {} {} is {is}", wrong.named, at(&wrong.corners)));
-    }
-    for corners in score.false_quads.iter().flatten() {
-        screen::complain(&format!("{of}: false quad {}", at(corners)));
-    }
 }

@@ -1,6 +1,9 @@
 //! Poses against the truth: of the camera in the map, and of each named landmark in the camera frame.
 
-use super::world::{CameraTruth, LandmarkTruth};
+use super::{
+    bound::position_bound,
+    world::{CameraTruth, LandmarkTruth},
+};
 use nalgebra::{Isometry3, Matrix3, Matrix3x6, Matrix6, Vector6};
 use protos::{convert::geometry::pose3, v1};
 use vision::{
@@ -12,7 +15,7 @@ use vision::{
 };
 
 /// A camera pose against the truth.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(super) struct CameraScore {
     pub(super) position_m: f64,
     pub(super) direction_rad: f64,
@@ -22,6 +25,24 @@ pub(super) struct CameraScore {
     pub(super) nees_of_view: Option<f64>,
     /// Standard deviation of the position that this covariance states, root of the trace.
     pub(super) stated_m: Option<f64>,
+    /// The same as stated in the answer, the place included.
+    pub(super) stated_whole_m: f64,
+    /// Landmarks that give the pose; and the nearest one's distance.
+    pub(super) names: Vec<String>,
+    pub(super) distance_m: f64,
+    /// Covariance of the position by the true corners of these, and of all landmarks in full view.
+    pub(super) bound: Option<Matrix3<f64>>,
+    pub(super) bound_of_all: Option<Matrix3<f64>>,
+}
+
+/// What of the world bears on a camera's pose.
+pub(super) struct Evidence<'a> {
+    /// The landmark that gives the pose, as it was seen and as it hangs.
+    pub(super) decisive: Option<(&'a LandmarkPose, &'a LandmarkTruth)>,
+    /// All landmarks that give the pose.
+    pub(super) used: Vec<&'a LandmarkTruth>,
+    /// All landmarks in full view.
+    pub(super) in_view: Vec<&'a LandmarkTruth>,
 }
 
 /// A landmark's pose in the camera frame against the truth.
@@ -41,24 +62,43 @@ pub(super) struct MeasurementScore {
     pub(super) is_ambiguous: bool,
 }
 
-/// `None` where the answer's numbers are no pose. `seen` is the landmark that gives the pose, as it was seen.
+/// `None` where the answer's numbers are no pose.
 pub(super) fn camera_score(
     pose: &v1::CameraPose,
     truth: &CameraTruth,
-    seen: Option<(&LandmarkPose, &LandmarkTruth)>,
+    evidence: &Evidence<'_>,
 ) -> Option<CameraScore> {
     let map_from_camera = pose3(pose.map_from_camera.as_ref()?).ok()?;
     let true_pose = truth.camera_from_world.inverse();
     let error = true_pose.translation.vector - map_from_camera.translation.vector;
     let covariance = Matrix6::from_row_slice(pose.covariance.get(..36)?);
     let of_position: Matrix3<f64> = covariance.fixed_view::<3, 3>(3, 3).into_owned();
-    let of_view = seen.map(|(seen, landmark)| position_covariance(seen, landmark, &map_from_camera));
+    let of_view =
+        evidence.decisive.map(|(seen, landmark)| position_covariance(seen, landmark, &map_from_camera));
+    let distance =
+        |l: &LandmarkTruth| (l.world_from_landmark.translation.vector - true_pose.translation.vector).norm();
+    let both = || evidence.used.iter().chain(&evidence.in_view).copied();
     Some(CameraScore {
         position_m: error.norm(),
         direction_rad: map_from_camera.rotation.angle_to(&true_pose.rotation),
         nees: error.dot(&of_position.cholesky()?.solve(&error)),
         nees_of_view: of_view.and_then(|c| Some(error.dot(&c.cholesky()?.solve(&error)))),
         stated_m: of_view.map(|c| c.trace().sqrt()),
+        stated_whole_m: of_position.trace().sqrt(),
+        names: pose.landmarks.clone(),
+        distance_m: evidence.used.iter().map(|l| distance(l)).fold(f64::INFINITY, f64::min),
+        bound: position_bound(evidence.used.iter().copied(), truth),
+        bound_of_all: position_bound(distinct(both()), truth),
+    })
+}
+
+/// Each landmark once.
+fn distinct<'a>(all: impl Iterator<Item = &'a LandmarkTruth>) -> impl Iterator<Item = &'a LandmarkTruth> {
+    let mut seen: Vec<&LandmarkTruth> = Vec::new();
+    all.filter(move |l| {
+        let is_new = !seen.iter().any(|s| std::ptr::eq(*s, *l));
+        seen.push(l);
+        is_new
     })
 }
 

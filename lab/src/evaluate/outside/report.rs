@@ -1,6 +1,8 @@
 //! The figures of all pictures together. Shares and errors are `null` where nothing was counted.
 
+use super::bound::drawn_m;
 use super::peer::PeerReport;
+use super::poses::CameraScore;
 use super::score::{FOUND, FOUND_WELL, LabelScore, PICTURES, PictureScore, PoseOutcome, View};
 use crate::evaluate::statistics::{median, quantile};
 use serde::Serialize;
@@ -16,6 +18,8 @@ const MISFIT_SIGMAS: f64 = 3.0;
 const SIDES_PX: [u32; 4] = [30, 50, 100, 200];
 /// Lower ends of the groups by view angle, degrees.
 const ANGLES_DEG: [u32; 4] = [0, 30, 50, 60];
+/// Lower ends of the groups by distance of the nearest landmark, metres.
+const DISTANCES_M: [f64; 4] = [0.0, 2.0, 3.0, 4.0];
 /// Kinds whose border lies in one plane with the picture.
 const FLAT: [&str; 2] = ["poster", "canvas"];
 
@@ -78,8 +82,34 @@ pub(super) struct CameraFigures {
     pub(super) nees_of_view: Nees,
     /// Standard deviation of the position by that covariance.
     pub(super) stated_m: Errors,
+    /// All of them, by the number of landmarks that give the pose, and by the distance of the nearest one.
+    pub(super) groups: Vec<(String, PositionFigures)>,
     /// Why pictures have no pose, by the word.
     pub(super) refusals: Vec<(String, usize)>,
+}
+
+/// Errors of the camera's position, and what corners with 0.3 px can tell.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct PositionFigures {
+    pub(super) position_m: Errors,
+    pub(super) stated_m: Errors,
+    /// Errors drawn from the bound by the landmarks that give the pose.
+    pub(super) bound_m: Errors,
+    /// The same by all landmarks in full view.
+    pub(super) bound_of_all_m: Errors,
+}
+
+impl PositionFigures {
+    fn of<'a>(scores: impl Iterator<Item = &'a CameraScore>) -> Self {
+        let scores: Vec<&CameraScore> = scores.collect();
+        let all = || scores.iter();
+        Self {
+            position_m: Errors::of(all().map(|s| s.position_m)),
+            stated_m: Errors::of(all().filter_map(|s| s.stated_m)),
+            bound_m: Errors::of(drawn_m(all().filter_map(|s| s.bound)).into_iter()),
+            bound_of_all_m: Errors::of(drawn_m(all().filter_map(|s| s.bound_of_all)).into_iter()),
+        }
+    }
 }
 
 /// Poses of named landmarks in the camera frame, with the stated camera; their place plays no part.
@@ -249,8 +279,27 @@ fn camera(scores: &[PictureScore]) -> CameraFigures {
         nees: Nees::of(3, given().map(|s| s.nees)),
         nees_of_view: Nees::of(3, given().filter_map(|s| s.nees_of_view)),
         stated_m: Errors::of(given().filter_map(|s| s.stated_m)),
+        groups: position_groups(&given().collect::<Vec<_>>()),
         refusals: refusals.into_iter().collect(),
     }
+}
+
+fn position_groups(given: &[&CameraScore]) -> Vec<(String, PositionFigures)> {
+    let of =
+        |pick: &dyn Fn(&CameraScore) -> bool| PositionFigures::of(given.iter().copied().filter(|s| pick(s)));
+    let mut groups = vec![
+        ("all".to_owned(), of(&|_| true)),
+        ("one landmark".to_owned(), of(&|s| s.names.len() == 1)),
+        ("two and more".to_owned(), of(&|s| s.names.len() > 1)),
+    ];
+    for (i, low) in DISTANCES_M.iter().enumerate() {
+        let high = DISTANCES_M.get(i + 1);
+        let inside = |s: &CameraScore| s.distance_m >= *low && high.is_none_or(|h| s.distance_m < *h);
+        let name = high.map_or(format!("from {low} m"), |h| format!("{low} to {h} m"));
+        groups.push((name, of(&inside)));
+    }
+    groups.retain(|(_, figures)| figures.position_m.count > 0);
+    groups
 }
 
 fn measurements(scores: &[PictureScore]) -> MeasurementFigures {

@@ -1,7 +1,7 @@
 //! One picture: quads, names and poses of its answer against the truth.
 
 use super::{
-    poses::{CameraScore, MeasurementScore, camera_score, measurement_score},
+    poses::{CameraScore, Evidence, MeasurementScore, camera_score, measurement_score},
     recognise::Recognised,
     world::{LandmarkTruth, World},
 };
@@ -117,7 +117,7 @@ pub(super) fn score(world: &World, image: &TruthImage, map: &MapSnapshot, r: &Re
     let pose = match world.cameras.get(&image.file) {
         None => PoseOutcome::NoTruth,
         Some(camera) => match r.answer.camera_pose.as_ref() {
-            Some(pose) => camera_score(pose, camera, decisive(world, pose, r))
+            Some(pose) => camera_score(pose, camera, &evidence(world, image, pose, r))
                 .map_or_else(|| PoseOutcome::Refused("no_pose".to_owned()), PoseOutcome::Given),
             None => PoseOutcome::Refused(r.answer.camera_pose_refusal.clone()),
         },
@@ -180,6 +180,20 @@ fn label(
         measurement,
         miss: if named.is_some() { Miss::default() } else { miss(quad, map, r) },
     })
+}
+
+fn evidence<'a>(
+    world: &'a World,
+    image: &TruthImage,
+    pose: &v1::CameraPose,
+    r: &'a Recognised,
+) -> Evidence<'a> {
+    let full_views = image.quads.iter().filter(|q| view(q) == Some(View::Full));
+    Evidence {
+        decisive: decisive(world, pose, r),
+        used: pose.landmarks.iter().filter_map(|name| world.landmarks.get(name)).collect(),
+        in_view: full_views.filter_map(|q| world.landmarks.get(q.landmark.as_ref()?)).collect(),
+    }
 }
 
 /// The landmark that gives the camera's pose, as it was seen and as it hangs.

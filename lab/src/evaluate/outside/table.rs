@@ -1,8 +1,9 @@
 //! The report for people.
 
 use super::{
+    bound::CORNER_SIGMA_PX,
     peer::PeerReport,
-    report::{Errors, Group, Nees, Report},
+    report::{Errors, Group, Nees, PositionFigures, Report},
 };
 
 /// A share, or a line where nothing was counted.
@@ -81,6 +82,19 @@ fn counts<'a>(all: impl IntoIterator<Item = &'a (String, usize)>) -> String {
     if all.is_empty() { "none".to_owned() } else { all.join(", ") }
 }
 
+/// Errors of the position beside those that corners can tell at best.
+fn position(name: &str, f: &PositionFigures) -> String {
+    let of = |e: &Errors| format!("{:>5}  {:>5}", number(e.median, 100.0, 1), number(e.most, 100.0, 1));
+    format!(
+        "    {name:<16}{:>5}   {}    {}   {}      {}",
+        f.position_m.count,
+        of(&f.position_m),
+        of(&f.stated_m),
+        of(&f.bound_m),
+        of(&f.bound_of_all_m)
+    )
+}
+
 fn poses(lines: &mut Vec<String>, r: &Report) {
     let (c, m) = (&r.camera, &r.measurements);
     if c.pictures == 0 {
@@ -101,6 +115,14 @@ fn poses(lines: &mut Vec<String>, r: &Report) {
         ),
         format!("    NEES as stated, with the errors of places by hand: {}", nees(&c.nees)),
         format!("    stated standard deviation of the position, cm: {}", errors(&c.stated_m, 100.0, 1)),
+        format!(
+            "    {:<16}{:>5}   position, cm    stated       corners of {CORNER_SIGMA_PX} px   of all in view",
+            "", "poses"
+        ),
+        format!("    {:<21}   med.   90 %     med.   90 %    med.   90 %       med.   90 %", ""),
+    ]);
+    lines.extend(c.groups.iter().map(|(name, figures)| position(name, figures)));
+    lines.extend([
         format!("  landmarks in the camera frame, {} of them ambiguous", m.ambiguous),
         format!("    position, cm: {}", errors(&m.position_m, 100.0, 1)),
         format!("    direction, deg: {}", errors(&m.direction_deg, 1.0, 2)),

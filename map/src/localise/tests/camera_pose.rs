@@ -107,6 +107,28 @@ fn landmarks_that_contradict_one_another_and_impossible_heights_give_no_pose() {
     assert_eq!(camera_pose(&[]).unwrap_err().field, "observations");
 }
 
+#[test]
+fn a_photograph_from_afar_gives_no_pose_unless_several_landmarks_do() {
+    let (place, mut random) = (place(), Random::new(19));
+    let other = beside(&place, 2.0);
+    let (mut near, mut imprecise, mut decided) = (0, 0, 0);
+    for _ in 0..40 {
+        let close = held(&place, 2.0, 35.0);
+        let look = photograph(&place, &close, 0.3, &mut random);
+        near += usize::from(camera_pose(&[seen(1, &look, &place)]).unwrap().is_ok());
+        let afar = held(&place, 6.0, 15.0);
+        let (a, b) =
+            (photograph(&place, &afar, 0.3, &mut random), photograph(&other, &afar, 0.3, &mut random));
+        if camera_pose(&[seen(1, &a, &place)]).unwrap() == Err(CameraPoseRefusal::Imprecise) {
+            imprecise += 1;
+            let both = camera_pose(&[seen(1, &a, &place), seen(2, &b, &other)]).unwrap();
+            decided +=
+                usize::from(both.is_ok_and(|found| error(&found, &afar).fixed_rows::<3>(3).norm() < 0.3));
+        }
+    }
+    assert!(near == 40 && imprecise > 10 && decided > imprecise / 2, "{near} near, {imprecise}, {decided}");
+}
+
 /// The landmark `beside`, metres along its wall to the right.
 fn beside(place: &LandmarkPlace, along_m: f64) -> LandmarkPlace {
     let mut other = *place;
