@@ -138,8 +138,7 @@ pub(super) fn png(
 /// Whether a PGM can hold its pixels, so that a short file with a large head costs no memory.
 fn is_long_enough(bytes: &[u8], colour: ColorType, pixels: usize) -> bool {
     match bytes {
-        [b'P', b'5', ..] => bytes.len() > pixels.saturating_mul(usize::from(colour.bytes_per_pixel())),
-        [b'P', b'6', ..] => bytes.len() > pixels.saturating_mul(usize::from(colour.bytes_per_pixel())),
+        [b'P', b'5' | b'6', ..] => bytes.len() > pixels.saturating_mul(usize::from(colour.bytes_per_pixel())),
         // A digit and a separator each.
         [b'P', b'2', ..] => bytes.len() > pixels.saturating_mul(2) - 1,
         [b'P', b'3', ..] => bytes.len() > pixels.saturating_mul(6) - 1,
