@@ -91,6 +91,13 @@ pub fn params(path: Option<&PathBuf>) -> anyhow::Result<SlamParams> {
 pub(crate) async fn run(args: &Args) -> anyhow::Result<()> {
     let recording = scan_log::read(&args.recording, &args.laser.defaults())
         .with_context(|| args.recording.display().to_string())?;
+    if let Some(cut) = &recording.cut {
+        screen::complain(&format!(
+            "{}: {cut}: the log ends there; {} scans before are used.",
+            args.recording.display(),
+            recording.records.len()
+        ));
+    }
     let Built { map, seconds } =
         build(&recording.records, |i| recording.records[i].odom, params(args.params.as_ref())?)?;
     let file = MapFile::of(&map);

@@ -43,8 +43,8 @@ pub(crate) struct ImportArgs {
 /// A file with walls.
 #[derive(Debug, Clone, clap::Args)]
 pub(super) struct SourceArgs {
-    /// A `map_server` YAML file (or its PGM or PNG, with the YAML of the same name beside it), a vector map (`x1, y1, x2,
-    /// y2` in metres, one segment a line; or `.geojson` in map metres: lines are walls with the free side on their left,
+    /// A `map_server` YAML file (or its picture, with the YAML of the same name beside it), a vector map (`x1, y1, x2,
+    /// y2` in metres, one segment a line; or `.geojson` in map metres or degrees: lines are walls with the free side on their left,
     /// polygons are rooms with columns for holes), an SVG floor plan, or a map of `waymark map build`.
     file: PathBuf,
     /// Leave out pieces of a grid's walls shorter than this, metres, but for those that alone explain some cells.
@@ -82,6 +82,9 @@ impl SourceArgs {
             let hint = if self.picture.is_none() { " --picture FILE draws it." } else { "" };
             screen::complain(&format!("{warning}{hint}"));
         }
+        if let Some(note) = &imported.report.note {
+            screen::complain(&format!("{}: {note}.", self.file.display()));
+        }
         Ok(imported)
     }
 }
@@ -96,7 +99,7 @@ pub(super) fn summary(report: &ImportReport) -> Value {
             "length_on_wall_cells": g.length_on_wall_cells,
         })
     });
-    json!({ "segments": report.segments, "length_m": report.length_m, "grid": grid })
+    json!({ "segments": report.segments, "length_m": report.length_m, "grid": grid, "note": report.note })
 }
 
 /// What was taken of a file, for people.
@@ -199,8 +202,8 @@ mod tests {
 
     #[test]
     fn a_summary_names_what_was_taken() {
-        let report = ImportReport { segments: 1, length_m: 2.5, grid: None };
+        let report = ImportReport { segments: 1, length_m: 2.5, grid: None, note: None };
         assert_eq!(sentence(&report), "1 segment, 2.5 m of walls");
-        assert_eq!(summary(&report), json!({ "segments": 1, "length_m": 2.5, "grid": null }));
+        assert_eq!(summary(&report), json!({ "segments": 1, "length_m": 2.5, "grid": null, "note": null }));
     }
 }

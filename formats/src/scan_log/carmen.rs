@@ -1,4 +1,4 @@
-//! CARMEN logs: `FLASER` and `ROBOTLASER1` lines; all others are ignored. In: lines. Out: scans with the laser's
+//! CARMEN logs: `FLASER` and `ROBOTLASER1` lines; all others, and scans of no beam, are ignored. In: lines. Out: scans with the laser's
 //! pose (by odometry, or corrected), which is also taken as the robot's.
 
 use super::{
@@ -14,15 +14,18 @@ use map::{
 pub(super) fn record(line: usize, text: &str, laser: &LaserDefaults) -> Result<Option<LogEntry>, BadLine> {
     let mut words = LineTokens::new(line, text);
     match words.word("message")? {
-        "FLASER" => flaser(&mut words, laser).map(Some),
-        "ROBOTLASER1" => robotlaser(&mut words).map(Some),
+        "FLASER" => flaser(&mut words, laser),
+        "ROBOTLASER1" => robotlaser(&mut words),
         _ => Ok(None),
     }
 }
 
 /// `FLASER n ranges.. x y theta odom_x odom_y odom_theta time host logger_time`.
-fn flaser(words: &mut LineTokens<'_>, laser: &LaserDefaults) -> Result<LogEntry, BadLine> {
+fn flaser(words: &mut LineTokens<'_>, laser: &LaserDefaults) -> Result<Option<LogEntry>, BadLine> {
     let n = words.count("number of readings", MAX_BEAMS)?;
+    if n == 0 {
+        return Ok(None);
+    }
     let ranges = words.ranges(n)?;
     let pose = words.pose("laser pose")?;
     words.pose("odometry pose")?;
@@ -33,12 +36,12 @@ fn flaser(words: &mut LineTokens<'_>, laser: &LaserDefaults) -> Result<LogEntry,
     let step = field / steps.max(1) as f64;
     let scan = Scan::new(Pose2::default(), -0.5 * field, step, laser.max_range_m, ranges)
         .map_err(|e| words.bad("scan", e.to_string()))?;
-    Ok(LogEntry { odom: pose, truth: Some(pose), time_s, scan })
+    Ok(Some(LogEntry { odom: pose, truth: Some(pose), time_s, scan }))
 }
 
 /// `ROBOTLASER1 type start fan step max accuracy mode n ranges.. m remissions.. laser(x y theta) robot(x y theta)
 /// ..`.
-fn robotlaser(words: &mut LineTokens<'_>) -> Result<LogEntry, BadLine> {
+fn robotlaser(words: &mut LineTokens<'_>) -> Result<Option<LogEntry>, BadLine> {
     words.number("laser type")?;
     let start = words.number("start angle")?;
     words.number("field of view")?;
@@ -47,6 +50,9 @@ fn robotlaser(words: &mut LineTokens<'_>) -> Result<LogEntry, BadLine> {
     words.number("accuracy")?;
     words.number("remission mode")?;
     let n = words.count("number of readings", MAX_BEAMS)?;
+    if n == 0 {
+        return Ok(None);
+    }
     let ranges = words.ranges(n)?;
     let m = words.count("number of remissions", MAX_BEAMS)?;
     words.ranges(m)?;
@@ -58,5 +64,5 @@ fn robotlaser(words: &mut LineTokens<'_>) -> Result<LogEntry, BadLine> {
     let time_s = words.number("time").ok();
     let scan = Scan::new(Pose2::default(), start, step, max, ranges)
         .map_err(|e| words.bad("scan", e.to_string()))?;
-    Ok(LogEntry { odom: pose, truth: Some(pose), time_s, scan })
+    Ok(Some(LogEntry { odom: pose, truth: Some(pose), time_s, scan }))
 }

@@ -1,5 +1,6 @@
 //! Entries of a scan log: scans with odometry, and the truth if it is known.
 
+use super::text::BadLine;
 use map::{laser::Scan, pose2::Pose2};
 
 /// A larger gap between entries is a pause or a changed clock, and does not count as recorded time.
@@ -40,6 +41,8 @@ pub struct LogEntry {
 pub struct ScanLog {
     /// The scans, oldest first.
     pub records: Vec<LogEntry>,
+    /// The last line, if it could not be used: the log was cut there.
+    pub cut: Option<BadLine>,
 }
 
 impl ScanLog {

@@ -19,13 +19,18 @@ enum Format {
     Numbered(numbered::Numbered),
 }
 
-/// Reads a log of any known format; `.gz` is unpacked.
+/// Reads a log of any known format; `.gz` is unpacked. A last line that cannot be used, as of a log that was cut while it
+/// was written, is left out and told; any other one is an error.
 pub fn read(path: &Path, laser: &LaserDefaults) -> Result<ScanLog, ReadError> {
     let mut format: Option<Format> = None;
     let mut recording = ScanLog::default();
+    let mut last: Option<BadLine> = None;
     lines(path, |line, text| {
         if text.is_empty() || text.starts_with('#') {
             return Ok(());
+        }
+        if let Some(bad) = last.take() {
+            return Err(bad.into());
         }
         if format.is_none() {
             format = Some(match text.chars().next() {
@@ -38,10 +43,18 @@ pub fn read(path: &Path, laser: &LaserDefaults) -> Result<ScanLog, ReadError> {
             }
         }
         let record = match &mut format {
-            Some(Format::Carmen) => carmen::record(line, text, laser)?,
-            Some(Format::Recording(head)) => Some(head.record(line, text)?),
-            Some(Format::Numbered(numbered)) => Some(numbered.record(line, text, laser)?),
-            None => None,
+            Some(Format::Carmen) => carmen::record(line, text, laser),
+            Some(Format::Recording(head)) => head.record(line, text).map(Some),
+            Some(Format::Numbered(numbered)) => numbered.record(line, text, laser).map(Some),
+            None => Ok(None),
+        };
+        let record = match record {
+            Ok(record) => record,
+            Err(bad) if recording.records.is_empty() => return Err(bad.into()),
+            Err(bad) => {
+                last = Some(bad);
+                return Ok(());
+            }
         };
         if recording.records.len() >= MAX_SCANS {
             return Err(ReadError::TooMany);
@@ -49,6 +62,7 @@ pub fn read(path: &Path, laser: &LaserDefaults) -> Result<ScanLog, ReadError> {
         recording.records.extend(record);
         Ok(())
     })?;
+    recording.cut = last;
     if recording.records.is_empty() { Err(ReadError::Unknown) } else { Ok(recording) }
 }
 

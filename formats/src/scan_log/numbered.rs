@@ -15,6 +15,8 @@ use map::{
 pub(super) struct Numbered {
     odom: Pose2,
     scans: usize,
+    /// Ranges of the scan before.
+    ranges: usize,
 }
 
 impl Numbered {
@@ -35,6 +37,9 @@ impl Numbered {
         if n == 0 || n > MAX_BEAMS {
             return Err(words.bad("ranges", format!("{n} of them, 1 to {MAX_BEAMS} accepted")));
         }
+        if n < self.ranges {
+            return Err(words.bad("ranges", format!("{n} of them where {} were before", self.ranges)));
+        }
         let ranges = words.ranges(n)?;
         let field = laser.field_deg.to_radians();
         let steps = if n % 2 == 1 { n.saturating_sub(1) } else { n };
@@ -44,7 +49,7 @@ impl Numbered {
         let odom = self.odom;
         let next = odom.compose(&motion);
         next.check().map_err(|e| words.bad("odometry", e.to_string()))?;
-        (self.odom, self.scans) = (next, self.scans + 1);
+        (self.odom, self.scans, self.ranges) = (next, self.scans + 1, n);
         Ok(LogEntry { odom, truth: None, time_s: None, scan })
     }
 }

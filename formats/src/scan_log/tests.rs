@@ -62,10 +62,9 @@ fn errors_name_line_and_field() {
     assert_eq!(bad("PARAM a\nFLASER 3 1.0 2.0"), (2, "range 2".into()));
     assert_eq!(bad("FLASER x"), (1, "number of readings".into()));
     assert_eq!(bad("FLASER 99999 1"), (1, "number of readings".into()));
-    assert_eq!(bad("FLASER 1 nan 0 0 0 0 0 0 1 h 1"), (1, "range 0".into()));
+    assert_eq!(bad("FLASER 1 x 0 0 0 0 0 0 1 h 1"), (1, "range 0".into()));
     assert_eq!(bad("FLASER 1 1 9e9 0 0 0 0 0 1 h 1\n"), (1, "laser pose".into()));
-    assert_eq!(bad("FLASER 0 0 0 0 0 0 0 1 h 1"), (1, "scan".into()));
-    assert_eq!(bad("0 0 0 0 1 1 1\n2 0 0 0 1 1 1"), (2, "scan number".into()));
+    assert_eq!(bad("0 0 0 0 1 1 1\n2 0 0 0 1 1 1\n3 0 0 0 1 1 1"), (2, "scan number".into()));
     assert_eq!(bad("0 0 0 0"), (1, "ranges".into()));
     let head = r#"{"waymark_recording":1,"first_bearing_rad":-1,"bearing_step_rad":1,"max_range_m":9}"#;
     assert_eq!(bad(&format!("{head}\n{{\"odom\":[0,0],\"ranges_m\":[1]}}")), (2, "odom".into()));
@@ -91,4 +90,46 @@ fn the_own_format_and_numbered_scans_are_read() {
     assert_eq!(numbered.records[0].odom, Pose2::default());
     let last = numbered.records[2].odom;
     assert!((last.x_m - 1.0).abs() < 1e-6 && (last.y_m - 1.0).abs() < 1e-6, "{last:?}");
+}
+
+const FLASER: &str = "FLASER 3 1 2 3 0 0 0 0 0 0 1 h 1\n";
+
+/// `(name, log, scans, the line that was cut)`.
+const USED: &[(&str, &[u8], usize, Option<usize>)] = &[
+    ("whole", b"FLASER 3 1 2 3 0 0 0 0 0 0 1 h 1\n", 1, None),
+    ("without a last line break", b"FLASER 3 1 2 3 0 0 0 0 0 0 1 h 1", 1, None),
+    ("cut within ranges", b"FLASER 3 1 2 3 0 0 0 0 0 0 1 h 1\nFLASER 3 1 2", 1, Some(2)),
+    ("cut within the pose", b"FLASER 3 1 2 3 0 0 0 0 0 0 1 h 1\nFLASER 3 1 2 3 0 0", 1, Some(2)),
+    ("cut within the count", b"FLASER 3 1 2 3 0 0 0 0 0 0 1 h 1\nFLASER", 1, Some(2)),
+    ("cut within a number", b"FLASER 3 1 2 3 0 0 0 0 0 0 1 h 1\nFLASER 3 1 2 3 0 0 0 0 -", 1, Some(2)),
+    ("cut before a comment", b"FLASER 3 1 2 3 0 0 0 0 0 0 1 h 1\nFLASER 3 1\n# end\n\n", 1, Some(2)),
+    ("no return as infinity", b"FLASER 3 1 inf 3 0 0 0 0 0 0 1 h 1\n", 1, None),
+    ("no return as NaN", b"FLASER 3 1 nan 3 0 0 0 0 0 0 1 h 1\n", 1, None),
+    ("Latin-1 in a comment", b"# B\xfcro\nFLASER 3 1 2 3 0 0 0 0 0 0 1 h 1\n", 1, None),
+    ("Latin-1 as a host", b"FLASER 3 1 2 3 0 0 0 0 0 0 1 B\xfcro 1\n", 1, None),
+    ("a byte order mark", b"\xef\xbb\xbfFLASER 3 1 2 3 0 0 0 0 0 0 1 h 1\n", 1, None),
+    ("lines of Windows", b"FLASER 3 1 2 3 0 0 0 0 0 0 1 h 1\r\n", 1, None),
+    ("a scan of no beam", b"FLASER 0 0 0 0 0 0 0 1 h 1\nFLASER 3 1 2 3 0 0 0 0 0 0 1 h 1\n", 1, None),
+    ("numbered, cut", b"0 0 0 0 1 1 1\n1 0 0 0 1 1\n", 1, Some(2)),
+    (
+        "the own format, cut",
+        b"{\"waymark_recording\":1,\"first_bearing_rad\":-1,\"bearing_step_rad\":1,\"max_range_m\":9}\n\
+        {\"odom\":[0,0,0],\"ranges_m\":[1,2]}\n{\"odom\":[0,0",
+        1,
+        Some(3),
+    ),
+];
+
+#[test]
+fn logs_are_used_up_to_where_they_end() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, bytes, scans, cut) in USED {
+        let path = folder.path().join("a.log");
+        std::fs::write(&path, bytes).unwrap();
+        let log = read(&path, &LaserDefaults::default()).unwrap_or_else(|e| panic!("{name}: {e}"));
+        assert_eq!((log.records.len(), log.cut.as_ref().map(|bad| bad.line)), (*scans, *cut), "{name}");
+    }
+    // In the middle a line that cannot be used is no end.
+    assert_eq!(bad(&format!("{FLASER}FLASER 3 1 2\n{FLASER}")), (2, "range 2".into()));
+    assert!(matches!(reading("none.log", "FLASER 0 0 0 0 0 0 0 1 h 1\n"), Err(ReadError::Unknown)));
 }

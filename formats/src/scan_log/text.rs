@@ -14,7 +14,7 @@ pub const MAX_BYTES: u64 = 2 << 30;
 pub const MAX_LINE_BYTES: u64 = 1 << 20;
 
 /// A line that cannot be used.
-#[derive(Debug, thiserror::Error, PartialEq)]
+#[derive(Debug, Clone, thiserror::Error, PartialEq)]
 #[error("line {line}: {field}: {problem}")]
 pub struct BadLine {
     /// Counts from 1.
@@ -93,9 +93,14 @@ impl<'a> LineTokens<'a> {
         Ok(pose)
     }
 
-    /// The next `n` tokens as ranges, metres.
+    /// The next `n` tokens as ranges, metres. Infinite ones, and those that are no number, are beams without a return.
     pub fn ranges(&mut self, n: usize) -> Result<Vec<f32>, BadLine> {
-        (0..n).map(|i| Ok(self.number(&format!("range {i}"))? as f32)).collect()
+        let range = |i: usize| {
+            let word = self.word(&format!("range {i}"))?;
+            let bad = |_form| self.bad(&format!("range {i}"), format!("`{word}` is no number"));
+            word.parse::<f64>().map(|range| range as f32).map_err(bad)
+        };
+        (0..n).map(range).collect()
     }
 }
 
@@ -123,8 +128,9 @@ pub fn lines(
         if taken > MAX_LINE_BYTES {
             return Err(bad(format!("longer than {MAX_LINE_BYTES} bytes")).into());
         }
-        let text = std::str::from_utf8(&buffer).map_err(|e| bad(e.to_string()))?;
-        each(line, text.trim())?;
+        // Numbers and keywords are ASCII; letters of another encoding are in comments.
+        let text = String::from_utf8_lossy(&buffer);
+        each(line, text.trim_start_matches('\u{feff}').trim())?;
     }
     Ok(())
 }

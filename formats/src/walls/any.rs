@@ -1,5 +1,8 @@
 //! Files of walls of every kind, told by the extension of their names.
 
+mod encoding;
+mod other_kinds;
+
 use super::{
     evidence::Evidence,
     floor_plan::{self, PlanError},
@@ -12,6 +15,7 @@ use super::{
     vector_map,
 };
 use crate::scan_log::ReadError;
+use encoding::decoded;
 use map::check::OutOfRange;
 use std::{io::Read as _, path::Path};
 
@@ -45,6 +49,17 @@ pub enum WallFileError {
     /// Larger than a file of its kind may be.
     #[error("more than {0} bytes")]
     TooLarge(u64),
+    /// In no encoding that is read.
+    #[error(
+        "the text is neither UTF-8 nor UTF-16 with a byte order mark, nor Latin-1 as its first line says"
+    )]
+    Encoding,
+    /// A file of a known kind without a reader.
+    #[error("{0}")]
+    OtherKind(&'static str),
+    /// Nothing usable in it.
+    #[error("no walls in it: nothing is changed by it")]
+    NoWalls,
     /// More walls than are read.
     #[error("more than {MAX_WALLS} segments")]
     TooMany,
@@ -93,8 +108,9 @@ pub struct Imported {
 
 impl Imported {
     fn of(map: MapFile) -> Self {
-        let length_m = map.segments.iter().map(Wall::length_m).sum();
-        let report = ImportReport { segments: map.segments.len(), length_m, grid: None };
+        // The sum of nothing is -0.
+        let length_m = map.segments.iter().map(Wall::length_m).sum::<f64>() + 0.0;
+        let report = ImportReport { segments: map.segments.len(), length_m, grid: None, note: None };
         Self { map, report, underlay: None, grid: None }
     }
 
@@ -119,18 +135,43 @@ fn extension(path: &Path) -> String {
     path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default()
 }
 
-/// The text of a file of at most `max` bytes.
+/// The text of a file of at most `max` bytes, unpacked.
 fn text(path: &Path, max: u64) -> Result<String, WallFileError> {
-    let mut bytes = Vec::new();
-    std::fs::File::open(path)?.take(max + 1).read_to_end(&mut bytes)?;
-    if bytes.len() as u64 > max {
-        return Err(WallFileError::TooLarge(max));
-    }
-    Ok(String::from_utf8(bytes).map_err(|e| std::io::Error::new(std::io::ErrorKind::InvalidData, e))?)
+    decoded(bytes(path, max)?, max)
 }
 
-/// Reads the walls of `.yaml` (`map_server`; or its `.pgm` or `.png`), `.json` (map file), `.geojson`, `.svg` (floor
-/// plan), or else of a vector map.
+fn bytes(path: &Path, max: u64) -> Result<Vec<u8>, WallFileError> {
+    let mut bytes = Vec::new();
+    std::fs::File::open(path)?.take(max + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > max { Err(WallFileError::TooLarge(max)) } else { Ok(bytes) }
+}
+
+/// A map file, or GeoJSON under its name.
+fn json(path: &Path) -> Result<Imported, WallFileError> {
+    #[derive(serde::Deserialize)]
+    struct Kind {
+        r#type: String,
+    }
+    let error = match MapFile::read(path) {
+        Ok(map) => return Ok(Imported::of(map)),
+        Err(error) => error,
+    };
+    let text = text(path, geojson::MAX_BYTES).ok();
+    match text.filter(|text| serde_json::from_str::<Kind>(text).is_ok_and(|kind| !kind.r#type.is_empty())) {
+        Some(text) => geojson_file(&text),
+        None => Err(error.into()),
+    }
+}
+
+fn geojson_file(text: &str) -> Result<Imported, WallFileError> {
+    let (segments, note) = geojson::walls(text)?;
+    let mut imported = Imported::of(MapFile { segments, ..MapFile::default() });
+    imported.report.note = note;
+    Ok(imported)
+}
+
+/// Reads the walls of `.yaml` (`map_server`; or its picture), `.json` (map file or GeoJSON), `.geojson`, `.svg` and `.svgz`
+/// (floor plan), or else of a vector map. Errors: a file without any wall, too.
 pub fn import(path: &Path, options: &ImportOptions) -> Result<Imported, WallFileError> {
     let of = |segments| Imported::of(MapFile { segments, ..MapFile::default() });
     let of_grid = |yaml: &Path| -> Result<Imported, WallFileError> {
@@ -139,12 +180,22 @@ pub fn import(path: &Path, options: &ImportOptions) -> Result<Imported, WallFile
     };
     let imported = match extension(path).as_str() {
         "yaml" | "yml" => of_grid(path)?,
-        "pgm" | "png" => of_grid(&ros_grid::yaml_beside(path).ok_or(WallFileError::OnlyPicture)?)?,
-        "json" => Imported::of(MapFile::read(path)?),
-        "geojson" => of(geojson::walls(&text(path, geojson::MAX_BYTES)?)?),
-        "svg" => of(floor_plan::walls(&text(path, floor_plan::MAX_BYTES)?, options.metres_per_unit)?),
-        _ => of(vector_map::read(path)?),
+        "pgm" | "png" | "bmp" | "jpg" | "jpeg" | "webp" | "ppm" => {
+            of_grid(&ros_grid::yaml_beside(path).ok_or(WallFileError::OnlyPicture)?)?
+        }
+        "json" => json(path)?,
+        "geojson" => geojson_file(&text(path, geojson::MAX_BYTES)?)?,
+        "svg" | "svgz" => {
+            of(floor_plan::walls(&text(path, floor_plan::MAX_BYTES)?, options.metres_per_unit)?)
+        }
+        extension => match other_kinds::advice(extension) {
+            Some(advice) => return Err(WallFileError::OtherKind(advice)),
+            None => of(vector_map::read(path)?),
+        },
     };
+    if imported.map.segments.is_empty() {
+        return Err(WallFileError::NoWalls);
+    }
     if imported.map.segments.len() > MAX_WALLS {
         return Err(WallFileError::TooMany);
     }
@@ -175,6 +226,9 @@ pub fn write(map: &MapFile, path: &Path, resolution_m: f64) -> Result<(), WallFi
 }
 
 #[cfg(test)]
+mod variants;
+
+#[cfg(test)]
 mod tests {
     use super::*;
 
@@ -188,7 +242,7 @@ mod tests {
         std::fs::write(&path, "a\u{e4}").unwrap();
         assert!(matches!(text(&path, 1), Err(WallFileError::TooLarge(1))), "cut within a letter");
         std::fs::write(&path, [0xff]).unwrap();
-        assert!(matches!(text(&path, 9), Err(WallFileError::Io(_))));
+        assert!(matches!(text(&path, 9), Err(WallFileError::Encoding)));
     }
 
     #[test]

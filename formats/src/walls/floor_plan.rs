@@ -2,13 +2,19 @@
 //! transforms, units and styles resolved.
 //!
 //! In: the text of a file and its scale. Out: walls in metres, the origin at the lower left corner of the page, y up. A
-//! plan does not say on which side the floor is, so each line becomes two walls, one for each side.
+//! plan does not say on which side the floor is, so each line becomes two walls, one for each side. What nobody sees is no
+//! wall: the page's background, transparent shapes, and what a clip path cuts off.
+
+mod clip;
+mod visible;
 
 use super::map_file::{MAX_WALLS, Wall};
+use clip::Clip;
 use usvg::{
     Group, ImageHrefResolver, Node, Options, Tree, roxmltree,
     tiny_skia_path::{PathSegment, Point},
 };
+use visible::Drawn;
 
 /// Largest file.
 pub(super) const MAX_BYTES: u64 = 32 << 20;
@@ -39,7 +45,7 @@ pub enum PlanError {
     TooDeep,
     /// Nobody said how large it is.
     #[error(
-        "the plan has no scale: say how many metres one of its units is, or give its width in mm, cm or in"
+        "the plan has no scale: say how many metres one of its units is, or give its width and height in mm, cm, in or pt"
     )]
     NoScale,
     /// A scale that cannot be.
@@ -74,18 +80,23 @@ pub(super) fn walls(text: &str, metres_per_unit: Option<f64>) -> Result<Vec<Wall
     let tree = Tree::from_xmltree(&document, &options).map_err(|e| PlanError::Format(e.to_string()))?;
     let metres_per_px = scale(document.root_element(), &tree, metres_per_unit)?;
     let page = Page { metres_per_px, height_px: f64::from(tree.size().height()) };
+    let mut drawn = Drawn::on(tree.size());
     let mut walls = Vec::new();
-    page.add_group(&mut walls, tree.root())?;
+    page.add_group(&mut walls, tree.root(), &[], &mut drawn)?;
     if walls.is_empty() { Err(PlanError::NoLines) } else { Ok(walls) }
 }
 
 fn scale(root: roxmltree::Node, tree: &Tree, metres_per_unit: Option<f64>) -> Result<f64, PlanError> {
     let Some(metres) = metres_per_unit else {
-        let is_physical = |name| {
+        // A side that is left out follows from the other by the `viewBox`.
+        let is_given = |name: &str| root.attribute(name).is_some_and(|value| value.trim() != "auto");
+        let is_physical = |name: &str| {
             let value = root.attribute(name).unwrap_or_default().trim();
             PHYSICAL.iter().any(|unit| value.ends_with(unit))
         };
-        let is_sized = is_physical("width") && is_physical("height");
+        let sides = ["width", "height"];
+        let is_sized = sides.iter().any(|side| is_physical(side))
+            && sides.iter().all(|side| is_physical(side) || !is_given(side));
         return is_sized.then(|| INCH_M / f64::from(DPI)).ok_or(PlanError::NoScale);
     };
     let view_box = root.attribute("viewBox").unwrap_or_default();
@@ -109,14 +120,39 @@ struct Page {
 }
 
 impl Page {
-    fn add_group(&self, walls: &mut Vec<Wall>, group: &Group) -> Result<(), PlanError> {
+    fn add_group(
+        &self,
+        walls: &mut Vec<Wall>,
+        group: &Group,
+        clips: &[Clip],
+        drawn: &mut Drawn,
+    ) -> Result<(), PlanError> {
+        if group.opacity().get() <= 0.0 {
+            return Ok(());
+        }
+        let own = group.clip_path().filter(|_| drawn.may_clip());
+        let own = own.map(|clip| Clip::of(clip, group.abs_transform(), self));
+        let Some(own) = own else { return self.add_children(walls, group, clips, drawn) };
+        drawn.count_clip(own.len());
+        self.add_children(walls, group, &[clips, &[own]].concat(), drawn)
+    }
+
+    fn add_children(
+        &self,
+        walls: &mut Vec<Wall>,
+        group: &Group,
+        clips: &[Clip],
+        drawn: &mut Drawn,
+    ) -> Result<(), PlanError> {
         for node in group.children() {
             match node {
-                Node::Group(inner) => self.add_group(walls, inner)?,
-                Node::Path(path) if path.is_visible() => {
+                Node::Group(inner) => self.add_group(walls, inner, clips, drawn)?,
+                Node::Path(path) if drawn.is_seen(path) => {
                     // None where the transform makes nothing of it.
                     if let Some(shape) = path.data().clone().transform(path.abs_transform()) {
-                        self.add_path(walls, shape.segments())?;
+                        for [a, b] in self.chords(shape.segments()) {
+                            add_line(walls, a, b, clips)?;
+                        }
                     }
                 }
                 Node::Path(_) | Node::Image(_) | Node::Text(_) => {}
@@ -125,11 +161,9 @@ impl Page {
         Ok(())
     }
 
-    fn add_path(
-        &self,
-        walls: &mut Vec<Wall>,
-        segments: impl Iterator<Item = PathSegment>,
-    ) -> Result<(), PlanError> {
+    /// The chords of a path, metres.
+    fn chords(&self, segments: impl Iterator<Item = PathSegment>) -> Vec<[[f64; 2]; 2]> {
+        let mut chords = Vec::new();
         let (mut start, mut at) = ([0.0; 2], [0.0; 2]);
         for segment in segments {
             match segment {
@@ -137,17 +171,17 @@ impl Page {
                     start = self.point(p);
                     at = start;
                 }
-                PathSegment::LineTo(p) => add_curve(walls, &mut at, &[self.point(p)])?,
+                PathSegment::LineTo(p) => add_curve(&mut chords, &mut at, &[self.point(p)]),
                 PathSegment::QuadTo(p, q) => {
-                    add_curve(walls, &mut at, &[self.point(p), self.point(q)])?;
+                    add_curve(&mut chords, &mut at, &[self.point(p), self.point(q)]);
                 }
                 PathSegment::CubicTo(p, q, r) => {
-                    add_curve(walls, &mut at, &[self.point(p), self.point(q), self.point(r)])?;
+                    add_curve(&mut chords, &mut at, &[self.point(p), self.point(q), self.point(r)]);
                 }
-                PathSegment::Close => add_curve(walls, &mut at, &[start])?,
+                PathSegment::Close => add_curve(&mut chords, &mut at, &[start]),
             }
         }
-        Ok(())
+        chords
     }
 
     fn point(&self, p: Point) -> [f64; 2] {
@@ -156,7 +190,7 @@ impl Page {
 }
 
 /// Adds the chords of a Bezier curve from `at` through its other control points.
-fn add_curve(walls: &mut Vec<Wall>, at: &mut [f64; 2], others: &[[f64; 2]]) -> Result<(), PlanError> {
+fn add_curve(chords: &mut Vec<[[f64; 2]; 2]>, at: &mut [f64; 2], others: &[[f64; 2]]) {
     let mut controls = vec![*at];
     controls.extend(others);
     // Second differences bound how far n chords lie from the curve: degree (degree - 1) / 8 n^2 times the largest.
@@ -166,17 +200,31 @@ fn add_curve(walls: &mut Vec<Wall>, at: &mut [f64; 2], others: &[[f64; 2]]) -> R
         .map(|p| [0, 1].map(|k| p[0][k] - 2.0 * p[1][k] + p[2][k]))
         .map(|d| d[0].hypot(d[1]))
         .fold(0.0, f64::max);
-    let chords = (degree * (degree - 1.0) / 8.0 * bend / FLAT_M).sqrt().ceil().clamp(1.0, MAX_CHORDS);
-    for k in 1..=chords as usize {
-        let to = bezier(&controls, k as f64 / chords);
+    let count = (degree * (degree - 1.0) / 8.0 * bend / FLAT_M).sqrt().ceil().clamp(1.0, MAX_CHORDS);
+    for k in 1..=count as usize {
+        let to = bezier(&controls, k as f64 / count);
         if (to[0] - at[0]).hypot(to[1] - at[1]) < map::segments::MIN_SEGMENT_M {
+            continue;
+        }
+        chords.push([*at, to]);
+        *at = to;
+    }
+}
+
+/// Adds the walls of the parts of a line that the clip paths leave.
+fn add_line(walls: &mut Vec<Wall>, a: [f64; 2], b: [f64; 2], clips: &[Clip]) -> Result<(), PlanError> {
+    let mut parts = vec![[a, b]];
+    for clip in clips {
+        parts = parts.iter().flat_map(|part| clip.inside(part)).collect();
+    }
+    for [a, b] in parts {
+        if (b[0] - a[0]).hypot(b[1] - a[1]) < map::segments::MIN_SEGMENT_M {
             continue;
         }
         if walls.len() + 2 > MAX_WALLS {
             return Err(PlanError::TooMany);
         }
-        walls.extend([Wall::between(*at, to), Wall::between(to, *at)]);
-        *at = to;
+        walls.extend([Wall::between(a, b), Wall::between(b, a)]);
     }
     Ok(())
 }
@@ -191,122 +239,4 @@ fn bezier(controls: &[[f64; 2]], s: f64) -> [f64; 2] {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn page(attributes: &str, body: &str) -> String {
-        format!(
-            r#"<?xml version="1.0"?><!DOCTYPE svg PUBLIC "-//W3C//DTD SVG 1.1//EN" "http://www.w3.org/Graphics/SVG/1.1/DTD/svg11.dtd"><svg xmlns="http://www.w3.org/2000/svg" {attributes}><g stroke="black" fill="none">{body}</g></svg>"#
-        )
-    }
-
-    /// Every other wall, ends in whole millimetres.
-    fn ends(text: &str, scale: Option<f64>) -> Vec<[i64; 4]> {
-        let all = walls(text, scale).unwrap();
-        let mm = |v: f64| (v * 1000.0).round() as i64;
-        for pair in all.chunks(2) {
-            assert_eq!((pair[0].a, pair[0].b), (pair[1].b, pair[1].a), "one wall for each side");
-        }
-        all.iter().step_by(2).map(|w| [mm(w.a[0]), mm(w.a[1]), mm(w.b[0]), mm(w.b[1])]).collect()
-    }
-
-    #[test]
-    fn every_shape_is_its_walls() {
-        let square = [
-            [1000, 3000, 3000, 3000],
-            [3000, 3000, 3000, 2000],
-            [3000, 2000, 1000, 2000],
-            [1000, 2000, 1000, 3000],
-        ];
-        for body in [
-            r#"<rect x="10" y="10" width="20" height="10"/>"#,
-            r#"<polygon points="10,10 30,10 30,20 10,20"/>"#,
-            r#"<polyline points="10,10 30,10 30,20 10,20 10,10"/>"#,
-            r#"<path d="M10 10h20v10H10z"/>"#,
-            r#"<path d="m 10,10 l 20,0 0,10 -20,0 z"/>"#,
-            r#"<rect transform="translate(10 10) scale(2)" width="10" height="5"/>"#,
-            r#"<g transform="matrix(0 1 -1 0 30 10)"><path d="M0 20V0H10V20z"/></g>"#,
-            r##"<defs><rect id="r" width="20" height="10"/></defs><use href="#r" x="10" y="10"/>"##,
-        ] {
-            assert_eq!(ends(&page(r#"viewBox="0 0 40 40""#, body), Some(0.1)), square, "{body}");
-        }
-        let line = r#"<line x1="0" y1="40" x2="40" y2="40"/>"#;
-        assert_eq!(ends(&page(r#"viewBox="0 0 40 40""#, line), Some(0.1)), [[0, 0, 4000, 0]]);
-        // Half a circle of 1 m: chords within 2 cm of it.
-        let arc = page(r#"viewBox="0 0 40 40""#, r#"<path d="M10 20A10 10 0 0 1 30 20"/>"#);
-        let chords = walls(&arc, Some(0.1)).unwrap();
-        assert!(chords.len() > 8 && chords.len() < 64, "{}", chords.len());
-        for wall in chords {
-            let middle = [0.5 * (wall.a[0] + wall.b[0]) - 2.0, 0.5 * (wall.a[1] + wall.b[1]) - 2.0];
-            assert!((middle[0].hypot(middle[1]) - 1.0).abs() < FLAT_M, "{wall:?}");
-        }
-    }
-
-    #[test]
-    fn the_scale_is_given_or_that_of_the_page() {
-        let line = r#"<line x1="0" y1="0" x2="10" y2="0"/>"#;
-        let length = |attributes: &str, scale| {
-            let [x, _, to, _] = ends(&page(attributes, line), scale)[0];
-            to - x
-        };
-        // A page of 8 m in millimetres, half of them a unit; and drawn at 1:50 as somebody says.
-        let sized = r#"width="8000mm" height="4000mm" viewBox="0 0 4000 2000""#;
-        assert_eq!(length(sized, None), 20);
-        assert_eq!(length(sized, Some(0.05)), 500);
-        assert_eq!(length(r#"width="80cm" height="40cm" viewBox="0 0 80 40""#, None), 100);
-        // A page without units: pixels have no length.
-        for unsized_page in
-            [r#"width="800" height="400""#, r#"viewBox="0 0 9 9""#, r#"width="1in" height="9""#]
-        {
-            assert_eq!(walls(&page(unsized_page, line), None).unwrap_err(), PlanError::NoScale);
-            assert_eq!(length(unsized_page, Some(0.1)), 1000);
-        }
-    }
-
-    #[test]
-    fn what_is_not_drawn_is_no_wall() {
-        let hidden = r#"<g display="none"><rect width="9" height="9"/></g><rect visibility="hidden" width="9" height="9"/>
-            <defs><rect width="9" height="9"/></defs><text>9</text><image href="/etc/hostname" width="9" height="9"/>"#;
-        let text = page(r#"viewBox="0 0 40 40""#, hidden);
-        assert_eq!(walls(&text, Some(1.0)).unwrap_err(), PlanError::NoLines);
-    }
-
-    #[test]
-    fn plans_are_bounded_and_what_is_wrong_is_named() {
-        let bad = |text: &str, scale| walls(text, scale).unwrap_err();
-        assert!(matches!(bad("<svg", Some(1.0)), PlanError::Format(_)));
-        assert!(matches!(bad("<html/>", Some(1.0)), PlanError::Format(_)));
-        for scale in [0.0, -1.0, 1e4, f64::NAN] {
-            assert!(matches!(bad("<svg/>", Some(scale)), PlanError::Scale(_)), "{scale}");
-        }
-        // Two walls for each of n - 1 lines.
-        let long = |points: usize| {
-            let points = (0..points).map(|i| format!("{i},{}", i % 2)).collect::<Vec<_>>().join(" ");
-            page(r#"viewBox="0 0 40 40""#, &format!(r#"<polyline points="{points}"/>"#))
-        };
-        assert_eq!(walls(&long(MAX_WALLS / 2 + 1), Some(1.0)).unwrap().len(), MAX_WALLS);
-        assert_eq!(bad(&long(MAX_WALLS / 2 + 2), Some(1.0)), PlanError::TooMany);
-        let deep = |groups: usize| {
-            let body = r#"<path d="M0 0H9"/>"#;
-            page(r#"viewBox="0 0 9 9""#, &("<g>".repeat(groups) + body + &"</g>".repeat(groups)))
-        };
-        // The document, the page, its group and the path besides.
-        assert_eq!(walls(&deep(MAX_DEPTH - 4), Some(1.0)).unwrap().len(), 2);
-        assert_eq!(bad(&deep(MAX_DEPTH - 3), Some(1.0)), PlanError::TooDeep);
-    }
-
-    proptest::proptest! {
-        #[test]
-        fn no_text_is_a_panic(at in 0..400_usize, byte in 0_u8..128, cut in 0..400_usize) {
-            let body = r#"<rect x="1" width="20" height="1e1" transform="rotate(3)"/><path d="M1 2C3 4 5 6 7 8A9 9 0 0 1 3 2z"/>"#;
-            let mut bytes = page(r#"width="9mm" height="9mm" viewBox="0 0 9 9""#, body).into_bytes();
-            let at = bytes.len() - 1 - at % bytes.len();
-            bytes[at] = byte;
-            if cut % 3 == 0 {
-                bytes.truncate(bytes.len() - cut % bytes.len());
-            }
-            // An answer, whichever.
-            walls(std::str::from_utf8(&bytes).expect("ASCII"), None).ok();
-        }
-    }
-}
+mod tests;

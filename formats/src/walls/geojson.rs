@@ -1,8 +1,11 @@
-//! Walls from and to a GeoJSON file in map metres: lines are walls as drawn, polygons are rooms, whose walls face
+//! Walls from and to a GeoJSON file in map metres, or in degrees (RFC 7946), which are projected to metres: lines are walls as drawn, polygons are rooms, whose walls face
 //! inwards, and their holes (columns, blocks), whose walls face outwards. Points, and properties of any kind, are
 //! passed over, but for the covariance of a wall.
 
+mod degrees;
+
 use super::map_file::{MAX_WALLS, Wall};
+use degrees::{Projection, is_degrees};
 use geojson::{Feature, FeatureCollection, GeoJson, Geometry, GeometryValue, JsonObject, Position};
 use serde::Deserialize as _;
 use serde_json::Value;
@@ -42,8 +45,11 @@ pub enum GeoJsonError {
         /// Which line, from 0.
         line: usize,
     },
-    /// Longitudes and latitudes are no metres.
-    #[error("a coordinate reference system other than map metres (`crs`) is not understood")]
+    /// Neither map metres nor longitude and latitude.
+    #[error(
+        "its coordinate reference system (`crs`) is neither map metres nor longitude and latitude: save it as RFC 7946 \
+         (QGIS: CRS EPSG:4326)"
+    )]
     Crs,
     /// Collections in collections.
     #[error("geometry collections more than {MAX_DEPTH} deep")]
@@ -62,8 +68,8 @@ struct Line {
     covariance: Option<Value>,
 }
 
-/// The walls of a file's text.
-pub(super) fn walls(text: &str) -> Result<Vec<Wall>, GeoJsonError> {
+/// The walls of a file's text, and what a person should know of them.
+pub(super) fn walls(text: &str) -> Result<(Vec<Wall>, Option<String>), GeoJsonError> {
     let file: GeoJson = text.parse().map_err(|e: geojson::Error| GeoJsonError::Format(e.to_string()))?;
     let own = |f: Feature| {
         let mut properties = f.properties.unwrap_or_default();
@@ -82,9 +88,11 @@ pub(super) fn walls(text: &str) -> Result<Vec<Wall>, GeoJsonError> {
             (vec![(geometry, None)], members)
         }
     };
-    if members.is_some_and(|m| m.get("crs").is_some_and(|crs| !crs.is_null())) {
-        return Err(GeoJsonError::Crs);
-    }
+    let members = members.unwrap_or_default();
+    let is_stated = match members.get("crs").filter(|crs| !crs.is_null()) {
+        Some(crs) if !is_degrees(crs) => return Err(GeoJsonError::Crs),
+        crs => crs.is_some(),
+    };
     let mut lines = vec![];
     for (geometry, covariance) in geometries {
         let first = lines.len();
@@ -93,11 +101,18 @@ pub(super) fn walls(text: &str) -> Result<Vec<Wall>, GeoJsonError> {
             line.covariance.clone_from(&covariance);
         }
     }
+    let is_metres = members.contains_key(FRAME.0);
+    let position = |p: &Position| match p.as_slice() {
+        [x, y, ..] => Some([*x, *y]),
+        _ => None,
+    };
+    let positions = lines.iter().flat_map(|line| &line.points).filter_map(position);
+    let projection = if is_metres { None } else { Projection::of(positions, is_stated) };
     let mut walls = vec![];
     for (number, line) in lines.iter().enumerate() {
-        add(&mut walls, number, line)?;
+        add(&mut walls, number, line, projection.as_ref())?;
     }
-    Ok(walls)
+    Ok((walls, projection.map(|projection| projection.to_string())))
 }
 
 /// A file of the walls, one line each, free side on the left.
@@ -139,14 +154,27 @@ fn add_lines(lines: &mut Vec<Line>, geometry: GeometryValue, depth: usize) -> Re
     Ok(())
 }
 
-fn add(walls: &mut Vec<Wall>, number: usize, line: &Line) -> Result<(), GeoJsonError> {
+fn add(
+    walls: &mut Vec<Wall>,
+    number: usize,
+    line: &Line,
+    projection: Option<&Projection>,
+) -> Result<(), GeoJsonError> {
     let point = |(position, p): (usize, &Position)| match p.as_slice() {
         // A height may follow.
-        [x, y, ..] if x.is_finite() && y.is_finite() => Ok([*x, *y]),
+        [x, y, ..] if x.is_finite() && y.is_finite() => {
+            Ok(projection.map_or([*x, *y], |projection| projection.metres([*x, *y])))
+        }
         _ => Err(GeoJsonError::Position { line: number, position }),
     };
     let mut points = line.points.iter().enumerate().map(point).collect::<Result<Vec<[f64; 2]>, _>>()?;
     if let Some(free_inside) = line.free_inside {
+        // Coordinates that were rounded or computed need not meet to the last bit.
+        if let (Some(first), Some(last)) = (points.first().copied(), points.last_mut())
+            && (last[0] - first[0]).hypot(last[1] - first[1]) < map::segments::MIN_SEGMENT_M
+        {
+            *last = first;
+        }
         let area: f64 = points.windows(2).map(|p| p[0][0] * p[1][1] - p[1][0] * p[0][1]).sum();
         let (first, last) = (points.first(), points.last());
         if points.len() < 4 || first != last || !(area.abs() > 0.0 && area.is_finite()) {
@@ -181,126 +209,4 @@ fn add(walls: &mut Vec<Wall>, number: usize, line: &Line) -> Result<(), GeoJsonE
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn ends(text: &str) -> Vec<[[f64; 2]; 2]> {
-        walls(text).unwrap().iter().map(|w| [w.a, w.b]).collect()
-    }
-
-    #[test]
-    fn rooms_face_inwards_and_columns_outwards_whichever_way_round() {
-        let room = "[[0,0],[4,0],[4,3],[0,3],[0,0]]";
-        let turned = "[[0,0],[0,3],[4,3],[4,0],[0,0]]";
-        let column = "[[1,1],[2,1],[2,2],[1,1]]";
-        let free_side = |text: &str, inside: [f64; 2], free: bool| {
-            for [a, b] in ends(text) {
-                let left = (b[0] - a[0]) * (inside[1] - a[1]) - (b[1] - a[1]) * (inside[0] - a[0]);
-                assert_eq!(left > 0.0, free, "{a:?} {b:?}");
-            }
-        };
-        for ring in [room, turned] {
-            let text = format!(r#"{{"type":"Polygon","coordinates":[{ring}]}}"#);
-            assert_eq!(ends(&text).len(), 4);
-            free_side(&text, [2.0, 1.5], true);
-            let holed = format!(r#"{{"type":"Polygon","coordinates":[{ring},{column}]}}"#);
-            let alone = ends(&holed).split_off(4);
-            for [a, b] in alone {
-                let left = (b[0] - a[0]) * (1.25 - a[1]) - (b[1] - a[1]) * (1.75 - a[0]);
-                assert!(left < 0.0, "the column's inside is not free");
-            }
-        }
-    }
-
-    #[test]
-    fn lines_and_collections_are_read_and_the_rest_is_ignored() {
-        let text = r#"{"type":"FeatureCollection","name":"plan","features":[
-            {"type":"Feature","properties":{"kind":"wall"},"geometry":{"type":"LineString","coordinates":[[0,0],[5,0,2.5],[5,1]]}},
-            {"type":"Feature","properties":null,"geometry":null},
-            {"type":"Feature","geometry":{"type":"Point","coordinates":[1,1]}},
-            {"type":"Feature","geometry":{"type":"MultiLineString","coordinates":[[[0,2],[1,2]],[[3,3],[3,3]]]}}]}"#;
-        assert_eq!(
-            ends(text),
-            [[[0.0, 0.0], [5.0, 0.0]], [[5.0, 0.0], [5.0, 1.0]], [[0.0, 2.0], [1.0, 2.0]]]
-        );
-        let feature = r#"{"type":"Feature","geometry":{"type":"LineString","coordinates":[[0,0],[1,0]]}}"#;
-        assert_eq!(ends(feature).len(), 1);
-    }
-
-    #[test]
-    fn walls_come_back_as_they_were_written() {
-        let all = [Wall::between([0.1, -2.0], [1.0 / 3.0, 7e-3]), Wall::between([5.0, 1.0], [4.0, 1.0])];
-        let text = text(&all);
-        assert!(text.contains(r#""waymark:frame":"map metres""#), "{text}");
-        assert_eq!(walls(&text).unwrap(), all);
-        assert_eq!(walls(&super::text(&[])).unwrap(), []);
-    }
-
-    #[test]
-    fn collections_are_read_to_a_depth() {
-        let nested = |depth: usize| {
-            let line = r#"{"type":"LineString","coordinates":[[0,0],[1,0]]}"#.to_owned();
-            (0..depth).fold(line, |g, _| format!(r#"{{"type":"GeometryCollection","geometries":[{g}]}}"#))
-        };
-        assert_eq!(ends(&nested(MAX_DEPTH)), [[[0.0, 0.0], [1.0, 0.0]]]);
-        assert_eq!(walls(&nested(MAX_DEPTH + 1)).unwrap_err(), GeoJsonError::TooDeep);
-    }
-
-    proptest::proptest! {
-        #[test]
-        fn no_text_is_a_panic(at in 0..200_usize, byte in 0_u8..128, cut in 0..200_usize) {
-            let mut bytes = text(&[Wall::between([0.0, 0.0], [1.0, 2.0])]).into_bytes();
-            let at = at % bytes.len();
-            bytes[at] = byte;
-            bytes.truncate(bytes.len() - cut % bytes.len());
-            // An answer, whichever.
-            walls(std::str::from_utf8(&bytes).expect("ASCII")).ok();
-        }
-    }
-
-    #[test]
-    fn a_wall_keeps_its_covariance() {
-        let known = Wall::about_middle([40.0, 1.0], [44.0, 1.5], Some([4e-6, 1e-6, 1e-4])).unwrap();
-        let by_hand = Wall::between([0.0, 0.0], [1.0, 2.0]);
-        let again = walls(&text(&[known, by_hand])).unwrap();
-        let (was, is) = (known.covariance.unwrap(), again[0].covariance.unwrap());
-        assert!(was.iter().zip(is).all(|(a, b)| (a - b).abs() < 1e-12 + 1e-9 * a.abs()), "{was:?} {is:?}");
-        assert_eq!((again[0].a, again[1]), (known.a, by_hand));
-        let with = |points: &str, covariance: &str| {
-            let line = format!(r#"{{"type":"LineString","coordinates":[{points}]}}"#);
-            let properties = format!(r#"{{"{COVARIANCE}":{covariance}}}"#);
-            walls(&format!(r#"{{"type":"Feature","geometry":{line},"properties":{properties}}}"#))
-        };
-        assert_eq!(with("[0,0],[1,0]", "[1e-6,0,1e-4]").unwrap().len(), 1);
-        let bad = Err(GeoJsonError::Covariance { line: 0 });
-        for covariance in ["[1e-6,0]", "[1e-6,1,1e-6]", "[-1,0,1]", "7", "null"] {
-            assert_eq!(with("[0,0],[1,0]", covariance), bad, "{covariance}");
-        }
-        assert_eq!(with("[0,0],[1,0],[2,0]", "[1e-6,0,1e-4]"), bad);
-    }
-
-    #[test]
-    fn errors_name_line_and_position() {
-        let bad = |text: &str| walls(text).unwrap_err();
-        assert!(matches!(bad("{"), GeoJsonError::Format(_)));
-        assert!(matches!(bad(r#"{"type":"Walls"}"#), GeoJsonError::Format(_)));
-        assert!(matches!(bad("[]"), GeoJsonError::Format(_)));
-        assert_eq!(
-            bad(r#"{"type":"LineString","coordinates":[[0,0],[1]]}"#),
-            GeoJsonError::Position { line: 0, position: 1 }
-        );
-        for ring in ["[[0,0],[1,0],[1,1]]", "[[0,0],[1,0],[1,1],[0,1]]", "[[0,0],[1,0],[2,0],[0,0]]"] {
-            assert_eq!(
-                bad(&format!(r#"{{"type":"Polygon","coordinates":[{ring}]}}"#)),
-                GeoJsonError::Ring { line: 0 }
-            );
-        }
-        assert_eq!(bad(r#"{"type":"Point","coordinates":[0,0],"crs":{"type":"name"}}"#), GeoJsonError::Crs);
-        let long = |n: usize| {
-            let points: Vec<[usize; 2]> = (0..n).map(|i| [i, 0]).collect();
-            serde_json::json!({ "type": "LineString", "coordinates": points }).to_string()
-        };
-        assert_eq!(walls(&long(MAX_WALLS + 1)).unwrap().len(), MAX_WALLS);
-        assert_eq!(bad(&long(MAX_WALLS + 2)), GeoJsonError::TooMany);
-    }
-}
+mod tests;

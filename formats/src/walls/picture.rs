@@ -1,4 +1,6 @@
-//! Pictures of grid maps: PGM (text and binary, 8 and 16 bit) and PNG, with limits checked before any pixel is decoded.
+//! Pictures of grid maps: PGM and PPM (text and binary, 8 and 16 bit), PNG, BMP and JPEG, with limits checked before any
+//! pixel is decoded. WebP and TIFF, which `nav2_map_server` reads as well, would be two more decoders with their own
+//! dependencies, for files that any program saves as PNG.
 
 use super::grid::{GridError, MAX_CELLS};
 use image::{ColorType, DynamicImage, ImageDecoder as _, ImageFormat, ImageReader, Limits};
@@ -47,9 +49,14 @@ impl Picture {
 
     fn decode(bytes: &[u8], max_cells: usize) -> Result<Self, String> {
         let format = match bytes {
-            [b'P', b'2' | b'5', ..] => ImageFormat::Pnm,
+            [b'P', b'2' | b'3' | b'5' | b'6', ..] => ImageFormat::Pnm,
             [0x89, b'P', b'N', b'G', ..] => ImageFormat::Png,
-            _ => return Err("neither PGM (P2, P5) nor PNG".to_owned()),
+            [b'B', b'M', ..] => ImageFormat::Bmp,
+            [0xff, 0xd8, 0xff, ..] => ImageFormat::Jpeg,
+            [b'R', b'I', b'F', b'F', ..] => return Err(other("WebP")),
+            [b'I', b'I', b'*', 0, ..] | [b'M', b'M', 0, b'*', ..] => return Err(other("TIFF")),
+            [b'G', b'I', b'F', ..] => return Err(other("GIF")),
+            _ => return Err("none of PGM, PPM, PNG, BMP and JPEG".to_owned()),
         };
         let mut decoder =
             ImageReader::with_format(Cursor::new(bytes), format).into_decoder().map_err(|e| e.to_string())?;
@@ -105,6 +112,10 @@ impl Picture {
     }
 }
 
+fn other(kind: &str) -> String {
+    format!("{kind} is not read: save it as PNG, and name that in the .yaml")
+}
+
 /// Encodes 8 bit samples as PNG.
 pub(super) fn png(
     samples: &[u8],
@@ -127,9 +138,12 @@ pub(super) fn png(
 /// Whether a PGM can hold its pixels, so that a short file with a large head costs no memory.
 fn is_long_enough(bytes: &[u8], colour: ColorType, pixels: usize) -> bool {
     match bytes {
-        [b'P', b'5', ..] => bytes.len() > pixels.saturating_mul(usize::from(colour.bytes_per_pixel())),
+        [b'P', b'5' | b'6', ..] => bytes.len() > pixels.saturating_mul(usize::from(colour.bytes_per_pixel())),
         // A digit and a separator each.
         [b'P', b'2', ..] => bytes.len() > pixels.saturating_mul(2) - 1,
+        [b'P', b'3', ..] => bytes.len() > pixels.saturating_mul(6) - 1,
+        // Rows of a bit a pixel at least, but for those that are run lengths.
+        [b'B', b'M', ..] => bytes.len() > pixels / 256,
         _ => true,
     }
 }
@@ -175,6 +189,38 @@ mod tests {
             assert_eq!(brightness(bytes), [0, 254, 205, 128], "{:?}", String::from_utf8_lossy(bytes));
         }
         assert_eq!(brightness(b"P2 2 1 100 0 50"), [0, 128], "another white than 255");
+    }
+
+    #[test]
+    fn other_pictures_of_nav2_say_the_same() {
+        let grey = image::GrayImage::from_raw(2, 2, vec![0, 254, 205, 128]).unwrap();
+        let rgb = DynamicImage::ImageLuma8(grey).into_rgb8();
+        let written = |format| {
+            let mut bytes = Cursor::new(Vec::new());
+            rgb.write_to(&mut bytes, format).unwrap();
+            bytes.into_inner()
+        };
+        for format in [ImageFormat::Bmp, ImageFormat::Png] {
+            assert_eq!(brightness(&written(format)), [0, 254, 205, 128], "{format:?}");
+        }
+        assert_eq!(brightness(b"P3 2 2 255 0 0 0 254 254 254 205 205 205 128 128 128\n"), [0, 254, 205, 128]);
+        let ppm = b"P6 2 2 255\n\x00\x00\x00\xfe\xfe\xfe\xcd\xcd\xcd\x80\x80\x80";
+        assert_eq!(brightness(ppm), [0, 254, 205, 128]);
+        let mut jpeg = Cursor::new(Vec::new());
+        image::RgbImage::from_pixel(2, 2, image::Rgb([200; 3]))
+            .write_to(&mut jpeg, ImageFormat::Jpeg)
+            .unwrap();
+        assert!(brightness(&jpeg.into_inner()).iter().all(|level| level.abs_diff(200) <= 2));
+        for (bytes, words) in [
+            (&b"RIFF\x10\0\0\0WEBPVP8 "[..], "WebP"),
+            (b"II*\0\x08\0\0\0", "TIFF"),
+            (b"MM\0*\0\0\0\x08", "TIFF"),
+            (b"GIF89a", "GIF"),
+            (b"P4 2 2\n\0", "none of PGM"),
+            (b"", "none of PGM"),
+        ] {
+            assert!(Picture::decode(bytes, 16).unwrap_err().contains(words), "{words}");
+        }
     }
 
     #[test]

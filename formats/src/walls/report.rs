@@ -31,6 +31,8 @@ pub struct ImportReport {
     pub length_m: f64,
     /// Of a grid: how much of it they explain.
     pub grid: Option<GridReport>,
+    /// What a person should know of how it was read.
+    pub note: Option<String>,
 }
 
 /// How much of a grid its walls explain. A wall explains the cells within 0.2 m of it (a cell's side, where that is

@@ -45,8 +45,8 @@ pub(super) fn read(yaml: &Path) -> Result<(OccupancyGrid, Underlay), GridError> 
     if bytes.starts_with(b"P5") || bytes.starts_with(b"P2") || bytes.starts_with(b"\x89PNG") {
         return Err(unread("this is the picture; give its .yaml".to_owned()));
     }
-    let meta = ros_yaml::parse(&String::from_utf8_lossy(&bytes))?;
-    let picture = Picture::read(&yaml.parent().unwrap_or(Path::new(".")).join(&meta.image))?;
+    let meta = ros_yaml::parse(String::from_utf8_lossy(&bytes).trim_start_matches('\u{feff}'))?;
+    let picture = Picture::read(&picture_path(yaml, &meta.image))?;
     let (width, height) = (picture.width, picture.height);
     let underlay = Underlay {
         png: picture.grey_png()?,
@@ -56,6 +56,16 @@ pub(super) fn read(yaml: &Path) -> Result<(OccupancyGrid, Underlay), GridError> 
         origin: meta.origin,
     };
     Ok((grid(&meta, &picture), underlay))
+}
+
+/// Where the picture is: beside the YAML file, at an absolute path, or under the home folder (`~/`), as `nav2_map_server`
+/// takes it.
+fn picture_path(yaml: &Path, image: &str) -> PathBuf {
+    let home = image.strip_prefix("~/").zip(std::env::var_os("HOME"));
+    match home {
+        Some((rest, home)) => Path::new(&home).join(rest),
+        None => yaml.parent().unwrap_or(Path::new(".")).join(image),
+    }
 }
 
 fn grid(meta: &GridMeta, picture: &Picture) -> OccupancyGrid {

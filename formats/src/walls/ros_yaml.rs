@@ -50,6 +50,9 @@ pub(super) fn parse(text: &str) -> Result<GridMeta, GridError> {
     let Value::Object(fields) = value else {
         return Err(yaml("no fields; a map's .yaml has image, resolution, origin, negate, ...".to_owned()));
     };
+    if let Some(kind) = other_kind(&fields) {
+        return Err(yaml(kind.to_owned()));
+    }
     let fields = Fields(fields);
     let meta = GridMeta {
         image: fields.image()?,
@@ -64,6 +67,27 @@ pub(super) fn parse(text: &str) -> Result<GridMeta, GridError> {
         return Err(field("free_thresh", "must not be above occupied_thresh"));
     }
     Ok(meta)
+}
+
+/// What a YAML file is that has fields of another program.
+fn other_kind(fields: &Map<String, Value>) -> Option<&'static str> {
+    let has = |name: &str| fields.contains_key(name);
+    if has("image") {
+        None
+    } else if has("levels") {
+        Some(
+            "this is a building of Open-RMF's traffic editor, whose walls are in pixels of its drawing: give the .yaml of a \
+             grid map, or the drawing as SVG with a size",
+        )
+    } else if has("camera_matrix") {
+        Some("this is the calibration of a camera; give a map's .yaml")
+    } else if has("rosbag2_bagfile_information") {
+        Some("this is the metadata of a bag; give a map's .yaml")
+    } else if has("robot") || fields.values().any(|value| value.get("ros__parameters").is_some()) {
+        Some("these are settings of a program; give a map's .yaml")
+    } else {
+        None
+    }
 }
 
 fn field(field: &'static str, problem: impl Into<String>) -> GridError {
@@ -120,9 +144,9 @@ impl Fields {
     fn mode(&self) -> Result<GridMode, GridError> {
         match self.0.get("mode") {
             None | Some(Value::Null) => Ok(GridMode::Trinary),
-            Some(Value::String(mode)) if mode == "trinary" => Ok(GridMode::Trinary),
-            Some(Value::String(mode)) if mode == "scale" => Ok(GridMode::Scale),
-            Some(Value::String(mode)) if mode == "raw" => Ok(GridMode::Raw),
+            Some(Value::String(mode)) if mode.eq_ignore_ascii_case("trinary") => Ok(GridMode::Trinary),
+            Some(Value::String(mode)) if mode.eq_ignore_ascii_case("scale") => Ok(GridMode::Scale),
+            Some(Value::String(mode)) if mode.eq_ignore_ascii_case("raw") => Ok(GridMode::Raw),
             Some(other) => Err(field("mode", format!("must be trinary, scale or raw, not {other}"))),
         }
     }
@@ -178,9 +202,14 @@ mod tests {
             let meta = parse(&PLAIN.replace("negate: 0", &format!("negate: {word}"))).unwrap();
             assert_eq!(meta.is_negated, is_negated, "{word}");
         }
-        for (word, mode) in
-            [("trinary", GridMode::Trinary), ("scale", GridMode::Scale), ("raw", GridMode::Raw)]
-        {
+        for (word, mode) in [
+            ("trinary", GridMode::Trinary),
+            ("Trinary", GridMode::Trinary),
+            ("scale", GridMode::Scale),
+            ("SCALE", GridMode::Scale),
+            ("raw", GridMode::Raw),
+            ("Raw", GridMode::Raw),
+        ] {
             assert_eq!(parse(&format!("{PLAIN}mode: {word}\n")).unwrap().mode, mode);
         }
     }
@@ -209,6 +238,16 @@ mod tests {
         ] {
             let error = parse(&PLAIN.replace(from, to)).unwrap_err().to_string();
             assert!(error.contains(sentence), "{to}: {error}");
+        }
+        for (text, words) in [
+            ("name: office\nlevels: {L1: {walls: []}}\ncrowd_sim: {}\n", "Open-RMF"),
+            ("image_width: 640\ncamera_matrix: {rows: 3}\n", "calibration of a camera"),
+            ("rosbag2_bagfile_information: {version: 5}\n", "metadata of a bag"),
+            ("slam_toolbox: {ros__parameters: {resolution: 0.05}}\n", "settings of a program"),
+            ("resolution: 0.05\n", "image: missing"),
+        ] {
+            let error = parse(text).unwrap_err().to_string();
+            assert!(error.contains(words), "{words}: {error}");
         }
         assert!(parse("- a\n- b\n").unwrap_err().to_string().contains("no fields"));
         let comment = format!("{PLAIN}#{}", "x".repeat(MAX_YAML_BYTES - PLAIN.len() - 1));

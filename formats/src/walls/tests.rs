@@ -105,7 +105,8 @@ fn what_is_no_grid_is_refused_by_name() {
 fn a_picture_is_read_by_the_yaml_beside_it() {
     let folder = tempfile::tempdir().unwrap();
     let picture = folder.path().join("m.pgm");
-    std::fs::write(&picture, b"P5 2 2 255\n\x00\xfe\xcd\x00").unwrap();
+    let cells = [&[0_u8; 20][..], &[0xfe; 19], &[0xcd]].concat();
+    std::fs::write(&picture, [b"P5 20 2 255\n", &cells[..]].concat()).unwrap();
     let alone = import(&picture, &ImportOptions::default()).unwrap_err();
     assert!(matches!(alone, WallFileError::OnlyPicture), "{alone}");
     assert!(alone.to_string().contains("this is the picture; give its .yaml"), "{alone}");
@@ -115,7 +116,7 @@ fn a_picture_is_read_by_the_yaml_beside_it() {
     let text = "image: m.pgm\nresolution: 0.1\norigin: [0, 0, 0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n";
     std::fs::write(folder.path().join("m.yaml"), text).unwrap();
     let report = import(&picture, &ImportOptions::default()).unwrap().report.grid.unwrap();
-    assert_eq!((report.occupied, report.free, report.unknown, report.grey), (2, 1, 1, 0));
+    assert_eq!((report.occupied, report.free, report.unknown, report.grey), (20, 19, 1, 0));
 }
 
 #[test]

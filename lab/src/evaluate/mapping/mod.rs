@@ -169,7 +169,7 @@ fn simulated(seed: u64) -> ScanLog {
             seed ^ (s.index << 8),
         ),
     };
-    ScanLog { records: Drive::new(building.clone(), &params).map(record).collect() }
+    ScanLog { records: Drive::new(building.clone(), &params).map(record).collect(), ..ScanLog::default() }
 }
 
 fn row(args: &Args, name: &str, recording: &ScanLog) -> anyhow::Result<Row> {
