@@ -53,10 +53,14 @@ async fn photograph(session: &Session, map: &str, args: &Args, path: &Path) -> R
     if let Some([[w, h], [to_w, to_h]]) = shrunk {
         session.note(&format!("{name}: {w}x{h} px made {to_w}x{to_h}; corners are of that size."));
     }
-    let camera = args.camera.map(|camera| camera.of_photograph(&image)).transpose();
-    let camera =
-        camera.map_err(|failure| Failure { sentence: format!("{name}: {}", failure.sentence), ..failure })?;
-    let answer = session.maps().recognise(map, image, camera.as_ref()).await;
+    let checked = args.camera.map(|camera| camera.of_photograph(&image)).transpose();
+    checked.map_err(|failure| Failure { sentence: format!("{name}: {}", failure.sentence), ..failure })?;
+    let maps = session.maps();
+    let answer = match args.camera.map(CameraArg::stated) {
+        Some((camera, Some(size_px))) => maps.recognise_of_size(map, image, (&camera, size_px)).await,
+        Some((camera, None)) => maps.recognise(map, image, Some(&camera)).await,
+        None => maps.recognise(map, image, None).await,
+    };
     let answer = session.explained(answer.map_err(Into::into)).await.map_err(|error| {
         let failure = Failure::of(&error);
         match failure.class {

@@ -59,7 +59,7 @@ enum Verb {
     ///   waymark landmark place poster --xy 4.20,7.35 --facing 90 --height 1.50
     ///   waymark landmark place poster --photo p.jpg --camera 610,610,320,240 --from 2.5,3.0,45 --camera-height 1.2
     #[command(verbatim_doc_comment)]
-    Place(place::PlaceArgs),
+    Place(Box<place::PlaceArgs>),
     /// Set the width and height of a landmark.
     Size {
         /// The landmark.

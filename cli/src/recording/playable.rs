@@ -100,7 +100,7 @@ mod tests {
             match (playable(folder.path()), expected) {
                 (Ok(path), Ok(name)) => assert_eq!(path, folder.path().join(name)),
                 (Err(failure), Err(words)) => {
-                    assert!(failure.sentence.contains(words), "{words}: {failure:?}")
+                    assert!(failure.sentence.contains(words), "{words}: {failure:?}");
                 }
                 (found, _) => panic!("{expected:?}: {found:?}"),
             }

@@ -40,7 +40,9 @@ impl Simulation {
     /// After all phases.
     fn of(phases: &[Phase]) -> Self {
         let mut simulation = Self::new(5.0);
-        phases.iter().for_each(|phase| simulation.run(*phase));
+        for phase in phases {
+            simulation.run(*phase);
+        }
         simulation
     }
 
@@ -65,7 +67,7 @@ impl Simulation {
         let message =
             v1::Odometry { epoch: 1, seq: self.seq, captured_ns, odom_from_robot, ..Default::default() };
         self.motion.odometry(&self.r1, message.encode_to_vec().into(), received);
-        if self.seq % 6 == 0 {
+        if self.seq.is_multiple_of(6) {
             self.frame(captured_ns, received);
         }
         let Some(fixed_s) = self.fixed_s else { return };
