@@ -89,7 +89,7 @@ mod tests {
             });
             let covariance = [nalgebra::Matrix2::identity() * CORNER_SIGMA_PX.powi(2); 4];
             let corners = Corners::try_from(corners).unwrap();
-            let pose = landmark_pose(&corners, covariance, landmark.size, &camera.intrinsics).unwrap();
+            let pose = landmark_pose(&corners, &covariance, landmark.size, &camera.intrinsics).unwrap();
             let position = pose.best.camera_from_landmark.inverse().translation.vector;
             squares += (position - truth).norm_squared();
         }

@@ -90,6 +90,7 @@ pub(super) struct CameraFigures {
 
 /// Errors of the camera's position, and what corners with 0.3 px can tell.
 #[derive(Debug, Clone, Serialize)]
+#[expect(clippy::struct_field_names, reason = "all are in metres")]
 pub(super) struct PositionFigures {
     pub(super) position_m: Errors,
     pub(super) stated_m: Errors,
@@ -256,7 +257,7 @@ fn binned(
 fn camera(scores: &[PictureScore]) -> CameraFigures {
     let given = || {
         scores.iter().filter_map(|s| match &s.pose {
-            PoseOutcome::Given(score) => Some(score),
+            PoseOutcome::Given(score) => Some(&**score),
             PoseOutcome::NoTruth | PoseOutcome::Refused(_) => None,
         })
     };

@@ -84,7 +84,7 @@ pub(super) struct WrongName {
 pub(super) enum PoseOutcome {
     /// The set has no poses.
     NoTruth,
-    Given(CameraScore),
+    Given(Box<CameraScore>),
     /// With the word of the answer; empty where nothing was recognised.
     Refused(String),
 }
@@ -117,8 +117,10 @@ pub(super) fn score(world: &World, image: &TruthImage, map: &MapSnapshot, r: &Re
     let pose = match world.cameras.get(&image.file) {
         None => PoseOutcome::NoTruth,
         Some(camera) => match r.answer.camera_pose.as_ref() {
-            Some(pose) => camera_score(pose, camera, &evidence(world, image, pose, r))
-                .map_or_else(|| PoseOutcome::Refused("no_pose".to_owned()), PoseOutcome::Given),
+            Some(pose) => camera_score(pose, camera, &evidence(world, image, pose, r)).map_or_else(
+                || PoseOutcome::Refused("no_pose".to_owned()),
+                |s| PoseOutcome::Given(Box::new(s)),
+            ),
             None => PoseOutcome::Refused(r.answer.camera_pose_refusal.clone()),
         },
     };
