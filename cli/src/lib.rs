@@ -258,12 +258,8 @@ pub fn main() -> ExitCode {
             Ok(ExitCode::SUCCESS)
         }
         Command::Version => {
-            println!(
-                "waymark {} ({} {})",
-                env!("CARGO_PKG_VERSION"),
-                std::env::consts::OS,
-                std::env::consts::ARCH
-            );
+            let (version, system) = (env!("CARGO_PKG_VERSION"), std::env::consts::OS);
+            screen::say(&format!("waymark {version} ({system} {})", std::env::consts::ARCH));
             Ok(ExitCode::SUCCESS)
         }
         Command::Man(args) => shell::man(args, Cli::command()).map(done),

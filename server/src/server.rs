@@ -61,8 +61,7 @@ impl Server {
         let (listeners, sockets) = (Listeners::open(&config).await?, Sockets::take(&config).await?);
         let (store, writer) = Catalogue::open(&config).await?;
         let (stop, stopping) = watch::channel(false);
-        let certificates = open_certificates(&config, &stopping)?;
-        let listeners = listeners.encrypted(certificates.as_ref())?;
+        let (certificates, listeners) = encrypted(&config, listeners, &stopping)?;
         let (http_addr, metrics_addr) = (listeners.http_addr, listeners.metrics_addr);
         let local_token = write_local_token(&config, &store, http_addr.port())?;
         let sessions = Arc::<Sessions>::default();
@@ -210,6 +209,17 @@ fn watch_disk(
 fn enrolment(certificates: Option<&Arc<Certificates>>, zenoh: &str) -> Option<Enrolment> {
     let certificates = certificates.filter(|_| zenoh.starts_with("tls/"))?.clone();
     Some(Enrolment { certificates, zenoh: zenoh.to_owned() })
+}
+
+/// The certificates, where there is encryption, and the listeners that show the server's.
+fn encrypted(
+    config: &Config,
+    listeners: Listeners,
+    stopping: &watch::Receiver<bool>,
+) -> Result<(Option<Arc<Certificates>>, Listeners), StartError> {
+    let certificates = open_certificates(config, stopping)?;
+    let listeners = listeners.encrypted(certificates.as_ref())?;
+    Ok((certificates, listeners))
 }
 
 /// The certificates, if connections are encrypted; they renew themselves until the server stops.

@@ -8,10 +8,11 @@ pub(crate) fn lines(inputs: &[RobotInput]) -> Vec<String> {
 }
 
 fn input_lines(of: &RobotInput) -> Vec<String> {
-    let mut counts = format!("{:<12} {} used, {} refused", of.input, of.used, of.refused);
-    if of.refused_in_a_row > 1 {
-        counts.push_str(&format!(", the last {} in a row", of.refused_in_a_row));
-    }
+    let in_a_row = match of.refused_in_a_row {
+        0 | 1 => String::new(),
+        many => format!(", the last {many} in a row"),
+    };
+    let counts = format!("{:<12} {} used, {} refused{in_a_row}", of.input, of.used, of.refused);
     let reason = |why: &RefusalReason| {
         let RefusalReason { code, field, detail, advice, count, .. } = why;
         let what = format!("  {count} times {code}: {field}: {detail}");

@@ -53,7 +53,7 @@ pub(super) fn is_known(rest: &str, settings: &BTreeSet<String>) -> bool {
 /// The settings and their groups.
 pub(super) fn names() -> BTreeSet<String> {
     let defaults = Serialized::defaults(RawConfig::default()).data().unwrap_or_default();
-    defaults.into_values().flat_map(|settings| settings.into_keys()).collect()
+    defaults.into_values().flat_map(std::collections::BTreeMap::into_keys).collect()
 }
 
 #[cfg(test)]

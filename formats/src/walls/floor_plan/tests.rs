@@ -124,15 +124,15 @@ fn the_page_and_what_nobody_sees_are_no_walls() {
         r#"<rect width="100%" height="100%" fill="white" stroke="none"/>"#,
         r#"<rect width="100%" height="100%" fill="black" stroke="none"/>"#,
         // matplotlib: the figure and its axes; draw.io: two.
-        r##"<path d="M0 40H40V0H0z" style="fill:#ffffff;stroke:none"/><path d="M5 35H35V5H5z" style="fill:#fff;stroke:none"/>"##,
+        r#"<path d="M0 40H40V0H0z" style="fill:#ffffff;stroke:none"/><path d="M5 35H35V5H5z" style="fill:#fff;stroke:none"/>"#,
         r#"<rect x="2" y="2" width="9" height="9" opacity="0"/>"#,
         r#"<g opacity="0"><rect x="2" y="2" width="9" height="9"/></g>"#,
         r#"<rect x="2" y="2" width="9" height="9" stroke-opacity="0"/>"#,
         r#"<rect x="2" y="2" width="9" height="9" stroke="none" fill="red" fill-opacity="0"/>"#,
-        r##"<pattern id="p" width="1" height="1"><path d="M0 0H1"/></pattern>
-            <rect width="40" height="40" stroke="none" fill="url(#p)"/>"##,
-        r##"<pattern id="p" width="1" height="1" patternUnits="userSpaceOnUse"><path d="M0 0H1"/></pattern>
-            <rect x="2" y="2" width="9" height="9" stroke="none" fill="url(#p)"/>"##,
+        r#"<pattern id="p" width="1" height="1"><path d="M0 0H1"/></pattern>
+            <rect width="40" height="40" stroke="none" fill="url(#p)"/>"#,
+        r#"<pattern id="p" width="1" height="1" patternUnits="userSpaceOnUse"><path d="M0 0H1"/></pattern>
+            <rect x="2" y="2" width="9" height="9" stroke="none" fill="url(#p)"/>"#,
     ] {
         assert_eq!(
             ends(&page(r#"viewBox="0 0 40 40""#, &format!("{around}{room}")), Some(0.1)),
@@ -151,7 +151,7 @@ fn the_page_and_what_nobody_sees_are_no_walls() {
 #[test]
 fn what_a_clip_path_cuts_off_is_no_wall() {
     let clip = |inside: &str, body: &str| {
-        let body = format!(r##"<clipPath id="c">{inside}</clipPath><g clip-path="url(#c)">{body}</g>"##);
+        let body = format!(r#"<clipPath id="c">{inside}</clipPath><g clip-path="url(#c)">{body}</g>"#);
         ends(&page(r#"viewBox="0 0 40 40""#, &body), Some(0.1))
     };
     let line = r#"<path d="M0 20H40"/>"#;
@@ -162,8 +162,8 @@ fn what_a_clip_path_cuts_off_is_no_wall() {
     assert_eq!(clip(two, line), [[0, 2000, 1000, 2000], [3000, 2000, 4000, 2000]]);
     let moved = r#"<g transform="translate(10 0)"><path d="M-10 20H30"/></g>"#;
     assert_eq!(clip(middle, moved), [[1000, 2000, 3000, 2000]]);
-    let turned = r##"<clipPath id="c"><rect x="10" y="10" width="20" height="20"/></clipPath>
-        <g transform="translate(5 0)"><path clip-path="url(#c)" d="M0 20H40"/></g>"##;
+    let turned = r#"<clipPath id="c"><rect x="10" y="10" width="20" height="20"/></clipPath>
+        <g transform="translate(5 0)"><path clip-path="url(#c)" d="M0 20H40"/></g>"#;
     assert_eq!(ends(&page(r#"viewBox="0 0 40 40""#, turned), Some(0.1)), [[1500, 2000, 3500, 2000]]);
 }
 

@@ -317,8 +317,7 @@ impl Inspection {
             return Err(Violation::LongKey);
         }
         let whole = [prefix, &key.suffix].concat();
-        keyexpr::new(&whole).map_err(|_| Violation::BadKey)?;
-        Ok(Some(whole))
+        if keyexpr::new(&whole).is_ok() { Ok(Some(whole)) } else { Err(Violation::BadKey) }
     }
 }
 
