@@ -23,7 +23,7 @@ pub fn kind(bytes: &[u8]) -> Option<&'static str> {
     }
 }
 
-/// Width and height of a picture file as [`decode`] turns it, px; `None` if its header says none.
+/// Width and height of a picture file as [`decode()`] turns it, px; `None` if its header says none.
 pub fn upright_size(bytes: &[u8]) -> Option<[usize; 2]> {
     let (_, width, height) = image_header(bytes)?;
     let (width, height) = (width as usize, height as usize);

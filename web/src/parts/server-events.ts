@@ -16,7 +16,8 @@ export function whenChanged(kinds: readonly Kind[], then: () => void, map?: stri
     then();
   }, TOGETHER_MS));
   const on = Object.fromEntries([...kinds, "reset"].map((kind) => [kind, tell]));
-  const stream = new Stream(address("/events", { map }), { on, onopen: (again) => again && tell() });
+  // What changed between the reading and the opening of the stream is not told: it is read again.
+  const stream = new Stream(address("/events", { map }), { on, onopen: tell });
   onDestroy(() => {
     stream.close();
     clearTimeout(timer);

@@ -44,7 +44,7 @@ class EpochConflictBody:
 
 @dataclass(frozen=True, slots=True)
 class RefusalReason:
-    """Why messages of a robot were refused: a stable word, the field at fault and a sentence of the last one, what to do."""
+    """Why messages of a robot were refused: a stable word, the field and sentence of the last one, what to do."""
 
     code: str
     field: str
@@ -56,8 +56,8 @@ class RefusalReason:
 
 @dataclass(frozen=True, slots=True)
 class RobotInput:
-    """What became of one kind of a robot's messages: `frame`, `odometry`, `scan`, `camera_info`, `transform`, `connection`.
-    Where `refused_in_a_row` rises, none is used any more."""
+    """What became of one kind of a robot's messages: `frame`, `odometry`, `scan`, `camera_info`, `transform` or
+    `connection`. Where `refused_in_a_row` rises, none is used any more."""
 
     input: str
     used: int
@@ -256,8 +256,8 @@ class CalibrationViewReport:
 
 @dataclass(frozen=True, slots=True)
 class CalibrationReport:
-    """A calibrated camera, for pictures of `width_px` x `height_px`. Standard deviations are infinite where the views do
-    not determine them."""
+    """A calibrated camera, for pictures of `width_px` x `height_px`. Standard deviations are infinite where the views
+    do not determine them."""
 
     intrinsics: Intrinsics
     fx_sigma_px: float = field(metadata={NULL: math.inf})

@@ -1,1 +1,0 @@
-import{d as i,g as s,c as d}from"./index-CVcaKcrK.js";import{s as e}from"./snippet-BpygmCCv.js";var p=s('<div class="scroll" role="group" tabindex="0" aria-label="Table"><!></div>');function n(a,o){var r=p(),l=d(r);e(l,()=>o.children),i(a,r)}export{n as S};

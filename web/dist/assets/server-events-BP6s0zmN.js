@@ -1,1 +1,0 @@
-import{o as i}from"./index-client-CWke1qQb.js";import{j as c}from"./index-CVcaKcrK.js";import{S as p}from"./stream-pRTaKhK1.js";const f=250;function u(s,r,n){let e;const t=()=>e??=setTimeout(()=>{e=void 0,r()},f),m=Object.fromEntries([...s,"reset"].map(o=>[o,t])),a=new p(c("/events",{map:n}),{on:m,onopen:o=>o&&t()});i(()=>{a.close(),clearTimeout(e)})}export{u as w};
