@@ -209,8 +209,12 @@ def test_refused_photographs_say_what_to_do(server: Server) -> None:
             maps.upload_view("refusals", "poster", plain)
         assert refused.value.code == "quad_not_found" and "whole_image" in str(refused.value)
         assert "quads" in refused.value.more
-        answer = maps.recognise("refusals", plain, pictures.CAMERA)
+        answer = maps.recognise("refusals", plain)
         assert (answer.status, answer.quads) == ("no_match", ())
+        # The camera is that of larger pictures.
+        with pytest.raises(Refused) as refused:
+            maps.recognise("refusals", plain, pictures.CAMERA)
+        assert refused.value.field.startswith("intrinsics") and "middle" in str(refused.value)
 
 
 def test_jobs_that_do_not_end_well_are_errors(server: Server) -> None:
