@@ -25,7 +25,7 @@ part() {
 
 say "# Long forms of the tests, $(date -u +%Y-%m-%d)" '' \
     "Commit $(git rev-parse --short HEAD), $(nproc) processors, $(sed -n 's/^model name.*: //p' /proc/cpuinfo | head -1)."
-part fuzz 'Fuzz targets' 'fuzz/long.sh; WAYMARK_RUNS=100000 cargo test --workspace --lib -- any_bytes_as_a_bundle; WAYMARK_RUNS=1000000 cargo test -p server --lib any_frames'
+part fuzz 'Fuzz targets' 'fuzz/long.sh; WAYMARK_RUNS=100000 cargo test --workspace --lib -- any_bytes_as_a_bundle; WAYMARK_RUNS=100000 cargo test -p server --lib any_frames'
 part simulation 'Simulation, 20 000 seeds of frames and 1 000 of the store' \
     'WAYMARK_SEEDS=20000 cargo test --release -p engine --test simulation;
      WAYMARK_SEEDS=1000 cargo test --workspace --lib -- publication::tests::simulation'
