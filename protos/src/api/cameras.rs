@@ -157,12 +157,10 @@ pub struct CalibrationReport {
     /// As frames carry it, with the standard deviations below: what is not known of the camera is then in the poses.
     #[cfg_attr(feature = "openapi", schema(value_type = Object))]
     pub intrinsics: v1::Intrinsics,
-    /// Width of the pictures that it was calibrated with; absent in older reports.
-    #[serde(default)]
-    pub width_px: Option<u32>,
+    /// Width of the pictures that it was calibrated with.
+    pub width_px: u32,
     /// Height of these pictures.
-    #[serde(default)]
-    pub height_px: Option<u32>,
+    pub height_px: u32,
     /// Standard deviation of the focal length.
     #[serde(deserialize_with = "null_is_infinite")]
     pub fx_sigma_px: f64,
@@ -196,8 +194,8 @@ mod tests {
     fn a_camera_that_nothing_is_known_of_comes_back() {
         let report = CalibrationReport {
             intrinsics: v1::Intrinsics::default(),
-            width_px: Some(640),
-            height_px: Some(480),
+            width_px: 640,
+            height_px: 480,
             fx_sigma_px: f64::INFINITY,
             cx_sigma_px: 1.0,
             cy_sigma_px: f64::INFINITY,

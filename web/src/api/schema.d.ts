@@ -2046,7 +2046,7 @@ export interface components {
              * Format: int32
              * @description Height of these pictures.
              */
-            height_px?: number | null;
+            height_px: number;
             /** @description As frames carry it, with the standard deviations below: what is not known of the camera is then in the poses. */
             intrinsics: Record<string, never>;
             /**
@@ -2072,9 +2072,9 @@ export interface components {
             warnings: string[];
             /**
              * Format: int32
-             * @description Width of the pictures that it was calibrated with; absent in older reports.
+             * @description Width of the pictures that it was calibrated with.
              */
-            width_px?: number | null;
+            width_px: number;
         };
         /** @description What to calibrate from. */
         CalibrationRequest: {

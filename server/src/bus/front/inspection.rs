@@ -27,6 +27,8 @@ pub(crate) const MAX_KEY_BYTES: usize = 4096;
 pub(crate) const MAX_DECLARED: usize = 4096;
 /// Most bytes of the keys of all these.
 pub(crate) const MAX_DECLARED_BYTES: usize = 1 << 20;
+/// Most bytes of the keys of a router that are kept. What rests on a further one ends the connection.
+pub(crate) const MAX_ROUTER_KEY_BYTES: usize = 4 << 20;
 /// Largest sequence number that a router agrees to.
 const MAX_SN: u64 = u32::MAX as u64;
 
@@ -81,8 +83,8 @@ struct Agreed {
     sn_mask: u64,
 }
 
-/// What is known of a connection. At most [`MAX_DECLARED`] entries of the robot, as many keys as the router declares (65 536 at
-/// most), and one message in fragments of each priority.
+/// What is known of a connection. At most [`MAX_DECLARED`] entries of the robot, [`MAX_ROUTER_KEY_BYTES`] of keys of the router,
+/// and one message in fragments of each priority.
 #[derive(Debug, Default)]
 pub(super) struct Inspection {
     agreed: Option<Agreed>,
@@ -90,6 +92,7 @@ pub(super) struct Inspection {
     keys: BTreeMap<u16, Box<str>>,
     /// Those of the router. One that ends is kept: the robot may have used it before it knew.
     router_keys: BTreeMap<u16, Box<str>>,
+    router_key_bytes: usize,
     /// What the robot has declared, and the length of its key in bytes.
     declared: BTreeMap<(Kind, u32), usize>,
     /// Bytes of the keys of both.
@@ -110,9 +113,19 @@ impl Inspection {
                     && let DeclareBody::DeclareKeyExpr(it) = &declare.body
                 {
                     let prefix = self.keys.get(&it.wire_expr.scope).map_or("", |key| key);
-                    self.router_keys.insert(it.id, [prefix, &it.wire_expr.suffix].concat().into());
+                    self.router_declares(it.id, [prefix, &it.wire_expr.suffix].concat());
                 }
             }
+        }
+    }
+
+    fn router_declares(&mut self, id: u16, key: String) {
+        self.router_key_bytes += key.len();
+        self.router_key_bytes -= self.router_keys.remove(&id).map_or(0, |before| before.len());
+        if self.router_key_bytes > MAX_ROUTER_KEY_BYTES {
+            self.router_key_bytes -= key.len();
+        } else {
+            self.router_keys.insert(id, key.into());
         }
     }
 

@@ -4,7 +4,9 @@ mod any_frames;
 mod keys;
 
 use super::{
-    inspection::{Cost, Inspection, MAX_DECLARED, MAX_DECLARED_BYTES, MAX_KEY_BYTES, Violation},
+    inspection::{
+        Cost, Inspection, MAX_DECLARED, MAX_DECLARED_BYTES, MAX_KEY_BYTES, MAX_ROUTER_KEY_BYTES, Violation,
+    },
     *,
 };
 use crate::{

@@ -260,6 +260,8 @@ class CalibrationReport:
     do not determine them."""
 
     intrinsics: Intrinsics
+    width_px: int
+    height_px: int
     fx_sigma_px: float = field(metadata={NULL: math.inf})
     cx_sigma_px: float = field(metadata={NULL: math.inf})
     cy_sigma_px: float = field(metadata={NULL: math.inf})
@@ -270,8 +272,6 @@ class CalibrationReport:
     warnings: tuple[str, ...]
     views: tuple[CalibrationViewReport, ...]
     linear_fx_px: float | None = None
-    width_px: int | None = None
-    height_px: int | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -126,3 +126,18 @@ fn what_is_declared_is_counted_at_its_bound_and_what_ends_is_not() {
     assert!(inspection.batch(&all(most, most + 1)).is_ok());
     assert_eq!(inspection.batch(&all(most + 1, most + 2)), Err(Violation::ManyDeclared));
 }
+
+#[test]
+fn the_bytes_of_the_routers_keys_are_bounded_and_one_that_is_declared_again_counts_once() {
+    let mut inspection = opened();
+    let most = (MAX_ROUTER_KEY_BYTES / MAX_KEY_BYTES) as u16;
+    for id in 1..=most {
+        for _ in 0..2 {
+            inspection.of_router(&frame([declared_key(id, key(0, MAX_KEY_BYTES))]));
+        }
+    }
+    inspection.of_router(&frame([declared_key(most + 1, key(0, 1))]));
+    let on = |id| frame([put(WireExpr { mapping: Mapping::Receiver, ..key(id, 0) }, 1)]);
+    assert!(inspection.batch(&on(most)).is_ok());
+    assert_eq!(inspection.batch(&on(most + 1)), Err(Violation::Protocol));
+}
