@@ -135,7 +135,15 @@ def test_json_is_read_by_name_and_says_what_is_wrong() -> None:
         "cy_sigma_px": None,
         "rms_px": 0.5,
     }
-    report |= {"reduced_chi2": 1, "orientations": 1, "aspect_ratio": 1, "warnings": [], "views": []}
+    report |= {
+        "width_px": 640,
+        "height_px": 480,
+        "reduced_chi2": 1,
+        "orientations": 1,
+        "aspect_ratio": 1,
+        "warnings": [],
+        "views": [],
+    }
     calibrated = from_json(api.CalibrationReport, report)
     assert (calibrated.fx_sigma_px, calibrated.cx_sigma_px) == (math.inf, 1.0), "null: nothing is known of it"
     counted = {"configured": True, "received": {"scan": 7}, "sent": {}, "reasons": {"scan": {"no_transform": 2}}}
