@@ -3,7 +3,7 @@
 
 use super::{
     BusError, Receivers, close,
-    front::{self, Admission, Front, ToGate, Way},
+    front::{self, Admission, Front, Lasting, ToGate, Way},
     gate::{Gate, GateSettings},
     router::{self, RouterSettings},
 };
@@ -113,7 +113,9 @@ impl OwnRouter {
     /// Robots may connect from now on.
     pub(super) async fn admit(self, config: &Config, keys: Keys, to: &Receivers) -> Result<Doors, BusError> {
         let (robots, path) = (config.limits.robots, self.socket.path());
-        let plain = |listener| Front::open(listener, Way::Plain(path.clone()), robots, to.live.clone());
+        let lasting = Arc::new(Lasting::default());
+        let way = || Way::Plain(path.clone(), lasting.clone());
+        let plain = |listener| Front::open(listener, way(), robots, to.live.clone());
         let Some(certificates) = self.certificates else {
             return Ok(Doors { fronts: vec![plain(self.listener)], gate: None, _socket: self.socket });
         };

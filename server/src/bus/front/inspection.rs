@@ -7,7 +7,11 @@
 //! in fragments, the first one names its key. What follows it is a fragment of the same message for the router only if it goes
 //! on without a gap, so each gap ends the connection.
 
-use std::collections::{BTreeMap, btree_map::Entry};
+use super::lasting::{InterestKeys, MAX_INTEREST_BYTES};
+use std::{
+    collections::{BTreeMap, btree_map::Entry},
+    sync::Arc,
+};
 use zenoh::key_expr::keyexpr;
 use zenoh_buffers::reader::DidntRead;
 use zenoh_codec::{RCodec, Zenoh080, Zenoh080Bounded, Zenoh080Condition, transport::frame::FrameReader};
@@ -44,6 +48,10 @@ pub(crate) enum Violation {
          bytes of them"
     )]
     ManyDeclared,
+    #[error(
+        "it has been interested in so many different keys that a router would keep more than {MAX_INTEREST_BYTES} bytes of them"
+    )]
+    ManyInterests,
     #[error("what it sends is not zenoh's protocol, or in an order that no client of zenoh sends")]
     Protocol,
     #[error(
@@ -93,15 +101,20 @@ pub(super) struct Inspection {
     /// Those of the router. One that ends is kept: the robot may have used it before it knew.
     router_keys: BTreeMap<u16, Box<str>>,
     router_key_bytes: usize,
-    /// What the robot has declared, and the length of its key in bytes.
-    declared: BTreeMap<(Kind, u32), usize>,
+    /// What the robot has declared, and its key.
+    declared: BTreeMap<(Kind, u32), Box<str>>,
     /// Bytes of the keys of both.
     declared_bytes: usize,
+    interests: Arc<InterestKeys>,
     /// Sequence number of the next fragment, by reliability and priority.
     fragmented: BTreeMap<(bool, u8), u64>,
 }
 
 impl Inspection {
+    pub(super) fn new(interests: Arc<InterestKeys>) -> Self {
+        Self { interests, ..Self::default() }
+    }
+
     /// Reads a batch of the router for the keys that it declares, on which those of the robot may rest.
     pub(super) fn of_router(&mut self, mut batch: &[u8]) {
         while let Some(first) = batch.first()
@@ -218,10 +231,13 @@ impl Inspection {
             NetworkBody::ResponseFinal(_) | NetworkBody::OAM(_) => Ok(()),
             NetworkBody::Interest(interest) => {
                 cost.declarations += 1;
-                let bytes = interest.wire_expr.as_ref().map_or(Ok(0), |key| self.named(key))?;
+                let key = interest.wire_expr.as_ref().map_or(Ok(String::new()), |key| self.named(key))?;
+                if interest.mode != InterestMode::Final && !self.interests.may_name(&key) {
+                    return Err(Violation::ManyInterests);
+                }
                 match interest.mode {
                     InterestMode::Future | InterestMode::CurrentFuture => {
-                        self.begins(Kind::Interest, interest.id, bytes)
+                        self.begins(Kind::Interest, interest.id, key)
                     }
                     InterestMode::Final => {
                         self.ends(Kind::Interest, interest.id);
@@ -283,14 +299,22 @@ impl Inspection {
         self.is_within_bounds()
     }
 
-    fn begins(&mut self, kind: Kind, id: u32, bytes: usize) -> Result<(), Violation> {
-        self.declared_bytes += bytes;
-        self.declared_bytes -= self.declared.insert((kind, id), bytes).unwrap_or_default();
+    /// A router keeps for ever what was declared before with the same number, if that had another key. No client of zenoh uses a
+    /// number again before its end.
+    fn begins(&mut self, kind: Kind, id: u32, key: String) -> Result<(), Violation> {
+        match self.declared.entry((kind, id)) {
+            Entry::Occupied(before) if **before.get() != *key => return Err(Violation::Protocol),
+            Entry::Occupied(_) => {}
+            Entry::Vacant(place) => {
+                self.declared_bytes += key.len();
+                place.insert(key.into());
+            }
+        }
         self.is_within_bounds()
     }
 
     fn ends(&mut self, kind: Kind, id: u32) {
-        self.declared_bytes -= self.declared.remove(&(kind, id)).unwrap_or_default();
+        self.declared_bytes -= self.declared.remove(&(kind, id)).map_or(0, |key| key.len());
     }
 
     /// The end of a declaration may name its key, and need not.
@@ -310,9 +334,9 @@ impl Inspection {
         Ok(())
     }
 
-    /// Length of a key that is named, in bytes; 0 of one that rests on what has ended.
-    fn named(&self, key: &WireExpr<'_>) -> Result<usize, Violation> {
-        self.whole(key).map(|whole| whole.map_or(0, |whole| whole.len()))
+    /// A key that is named; empty if it rests on what has ended.
+    fn named(&self, key: &WireExpr<'_>) -> Result<String, Violation> {
+        self.whole(key).map(Option::unwrap_or_default)
     }
 
     /// The whole of a key, with its prefix; `None` if that has ended, which the end may have overtaken. The prefix of one that

@@ -3,10 +3,12 @@
 //!
 //! zenoh's own listener of TLS reads and writes one stream from two threads at once (eclipse-zenoh/zenoh#2557); this one does
 //! not. Handshakes have a deadline and places of their own, a robot has [`LINKS_OF_ROBOT`] connections, and what a connection
-//! sends is read before a router gets it ([`inspection`]), at a bounded pace ([`pace`]).
+//! sends is read before a router gets it ([`inspection`]), at a bounded pace ([`pace`]). What a router would keep for ever is bounded
+//! ([`lasting`]).
 
 mod admission;
 mod inspection;
+mod lasting;
 mod pace;
 mod refusal;
 mod relay;
@@ -15,6 +17,7 @@ mod tests;
 mod to_gate;
 
 pub(super) use admission::Admission;
+pub(super) use lasting::Lasting;
 pub(crate) use refusal::advice;
 pub(super) use to_gate::ToGate;
 
@@ -24,6 +27,7 @@ use engine::{
     live::LiveHub,
     robot_activity::{Input, Refused},
 };
+use lasting::{InterestKeys, Peer};
 use protos::Name;
 use refusal::Refusal;
 use relay::{End, ToRouter, relay};
@@ -58,7 +62,7 @@ const STOP_GRACE: Duration = Duration::from_secs(3);
 /// Where connections lead.
 pub(super) enum Way {
     /// To the server's own router, whoever it is.
-    Plain(PathBuf),
+    Plain(PathBuf, Arc<Lasting>),
     /// To the gate, where the client's certificate is a robot's.
     Certified(Arc<Admission>, ToGate),
 }
@@ -145,7 +149,7 @@ async fn end_in_order(mut stream: impl AsyncRead + AsyncWrite + Unpin) {
 impl Connections {
     async fn connection(self: Arc<Self>, stream: TcpStream, peer: SocketAddr, place: Place) {
         match &self.way {
-            Way::Plain(router) => {
+            Way::Plain(router, lasting) => {
                 // One that sends nothing takes no place of a robot.
                 match timeout(HANDSHAKE, stream.peek(&mut [0])).await {
                     Ok(Ok(1)) => {}
@@ -158,7 +162,8 @@ impl Connections {
                 };
                 drop(place);
                 let (read, write) = router.into_split();
-                self.relayed(None, peer, stream, ToRouter { read, write }).await;
+                let interests = lasting.of(Peer::Address(peer.ip()));
+                self.relayed(None, peer, stream, ToRouter { read, write }, interests).await;
             }
             Way::Certified(admission, gate) => {
                 let handshake = admission.acceptor().accept(stream);
@@ -190,9 +195,10 @@ impl Connections {
                     Ok(at_gate) => at_gate,
                     Err(error) => return tracing::error!(%error, %robot, "gate_not_reached"),
                 };
+                let interests = at_gate.lasting.of(Peer::Robot(robot.clone()));
                 let ToRouter { read, write } = &mut at_gate.ends;
                 tokio::select! {
-                    () = self.relayed(Some(robot), peer, stream, ToRouter { read, write }) => {}
+                    () = self.relayed(Some(robot), peer, stream, ToRouter { read, write }, interests) => {}
                     why = admission.lapse(&admitted) => {
                         self.refused(Some(robot), peer, &Refusal::CertificateEnded(why));
                     }
@@ -208,11 +214,12 @@ impl Connections {
         peer: SocketAddr,
         stream: impl AsyncRead + AsyncWrite + Unpin,
         router: ToRouter<R, W>,
+        interests: Arc<InterestKeys>,
     ) {
         let Ok(_place) = self.places.clone().try_acquire_owned() else {
             return self.refused(robot, peer, &Refusal::NoPlace);
         };
-        match relay(stream, router).await {
+        match relay(stream, router, interests).await {
             End::Closed(error) => {
                 let robot = robot.map(Name::as_str);
                 tracing::debug!(%error, robot, %peer, "robot_connection_closed");

@@ -33,6 +33,7 @@ impl Refusal {
             Self::Violation(Violation::LongKey) => "long_key",
             Self::Violation(Violation::BadKey) => "no_key_expression",
             Self::Violation(Violation::ManyDeclared) => "too_many_declared",
+            Self::Violation(Violation::ManyInterests) => "too_many_interests",
             Self::Violation(Violation::Protocol) => "not_zenoh",
             Self::Violation(Violation::UnmarkedFragments) => "old_zenoh",
         }
@@ -49,6 +50,9 @@ pub(crate) fn advice(word: &str) -> &'static str {
             "Look at the program that connects by this robot's certificate: no client of zenoh sends that."
         }
         "too_many_declared" => "Declare subscribers and queryables once, not for each message.",
+        "too_many_interests" => {
+            "Publish and ask under fixed keys. A restart of the server, or of the gate when robots change, forgets them."
+        }
         "old_zenoh" => "Use zenoh 1.1 or later on the robot.",
         _ => "",
     }

@@ -3,11 +3,12 @@
 
 use super::{
     inspection::{Cost, Inspection, Violation},
+    lasting::InterestKeys,
     pace::Pace,
 };
 use std::{
     io,
-    sync::{Mutex, MutexGuard, PoisonError},
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
     time::Duration,
 };
 use tokio::{
@@ -40,14 +41,18 @@ pub(super) struct ToRouter<R, W> {
 }
 
 /// Relays until an end closes or a batch may not pass.
-pub(super) async fn relay<R, W>(robot: impl AsyncRead + AsyncWrite + Unpin, mut router: ToRouter<R, W>) -> End
+pub(super) async fn relay<R, W>(
+    robot: impl AsyncRead + AsyncWrite + Unpin,
+    mut router: ToRouter<R, W>,
+    interests: Arc<InterestKeys>,
+) -> End
 where
     R: AsyncRead + Unpin,
     W: AsyncWrite + Unpin,
 {
     let (mut from_robot, mut to_robot) = tokio::io::split(robot);
     let (tell, mut told) = oneshot::channel::<()>();
-    let inspection = Mutex::<Inspection>::default();
+    let inspection = Mutex::new(Inspection::new(interests));
     let ended = {
         let inward = inward(&mut from_robot, &mut router.write, &inspection);
         let outward = outward(&mut router.read, &mut to_robot, &mut told, &inspection);

@@ -7,6 +7,7 @@ use super::{
     inspection::{
         Cost, Inspection, MAX_DECLARED, MAX_DECLARED_BYTES, MAX_KEY_BYTES, MAX_ROUTER_KEY_BYTES, Violation,
     },
+    lasting::MAX_INTEREST_BYTES,
     *,
 };
 use crate::{
@@ -268,7 +269,7 @@ async fn a_gate_of_zenoh_takes_a_stream_of_quic_for_the_robot_that_its_certifica
             let (stream, _) = listener.accept().await.unwrap();
             let mut at_gate = to_gate.connect(&Name::new(name).unwrap()).await.unwrap();
             let ToRouter { read, write } = &mut at_gate.ends;
-            relay(stream, ToRouter { read, write }).await
+            relay(stream, ToRouter { read, write }, Arc::default()).await
         });
         let robot = router::open_client(&endpoint).await.unwrap();
         let publisher = robot.declare_publisher("r1/frame").await.unwrap();

@@ -3,7 +3,7 @@
 //!
 //! Of zenoh's QUIC links this uses that the protocol `zenoh` has one stream, which the client opens, framed as TLS is.
 
-use super::relay::ToRouter;
+use super::{lasting::Lasting, relay::ToRouter};
 use crate::identity::certificates::LinkCertificates;
 use protos::Name;
 use quinn::{
@@ -13,7 +13,7 @@ use quinn::{
 use std::{
     io,
     net::{Ipv4Addr, SocketAddr},
-    sync::Arc,
+    sync::{Arc, Mutex, PoisonError},
     time::Duration,
 };
 use tokio::sync::watch;
@@ -30,12 +30,15 @@ pub(in crate::bus) struct ToGate {
     endpoint: Endpoint,
     link: Arc<LinkCertificates>,
     gate: watch::Receiver<Option<SocketAddr>>,
+    /// What the gate keeps that listens there. Each one has an address of its own.
+    lasting: Mutex<(Option<SocketAddr>, Arc<Lasting>)>,
 }
 
 /// A connection to the gate. Dropping it closes it.
 pub(super) struct AtGate {
     connection: Connection,
     pub(super) ends: ToRouter<RecvStream, SendStream>,
+    pub(super) lasting: Arc<Lasting>,
 }
 
 impl Drop for AtGate {
@@ -50,7 +53,12 @@ impl ToGate {
         link: Arc<LinkCertificates>,
         gate: watch::Receiver<Option<SocketAddr>>,
     ) -> io::Result<Self> {
-        Ok(Self { endpoint: Endpoint::client((Ipv4Addr::LOCALHOST, 0).into())?, link, gate })
+        Ok(Self {
+            endpoint: Endpoint::client((Ipv4Addr::LOCALHOST, 0).into())?,
+            link,
+            gate,
+            lasting: Mutex::default(),
+        })
     }
 
     /// A connection that the gate takes for the robot's.
@@ -62,9 +70,17 @@ impl ToGate {
             let connecting = self.endpoint.connect_with(self.config(robot)?, at, LinkCertificates::HOST);
             let connection = connecting.map_err(io::Error::other)?.await?;
             let (write, read) = connection.open_bi().await?;
-            Ok(AtGate { connection, ends: ToRouter { read, write } })
+            Ok(AtGate { connection, ends: ToRouter { read, write }, lasting: self.lasting_of(at) })
         };
         tokio::time::timeout(LONGEST, connected).await?
+    }
+
+    fn lasting_of(&self, gate: SocketAddr) -> Arc<Lasting> {
+        let mut lasting = self.lasting.lock().unwrap_or_else(PoisonError::into_inner);
+        if lasting.0 != Some(gate) {
+            *lasting = (Some(gate), Arc::default());
+        }
+        lasting.1.clone()
     }
 
     fn config(&self, robot: &Name) -> io::Result<ClientConfig> {

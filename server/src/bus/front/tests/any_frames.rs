@@ -43,6 +43,8 @@ struct Random {
     state: u64,
     temper: Temper,
     next_key: u16,
+    /// Next number of what a good client declares, which uses none twice.
+    next_id: u32,
 }
 
 impl Random {
@@ -73,7 +75,32 @@ impl Random {
     }
 
     fn body(&mut self) -> NetworkBody {
-        let (id, wire_expr) = (self.below(6) as u32, self.key());
+        let mut body = self.any_body();
+        if self.temper == Temper::Good {
+            self.number(&mut body);
+        }
+        body
+    }
+
+    /// What begins gets the next number.
+    fn number(&mut self, body: &mut NetworkBody) {
+        let id = match body {
+            NetworkBody::Interest(interest) if interest.mode != InterestMode::Final => &mut interest.id,
+            NetworkBody::Declare(declare) => match &mut declare.body {
+                DeclareBody::DeclareSubscriber(it) => &mut it.id,
+                DeclareBody::DeclareQueryable(it) => &mut it.id,
+                DeclareBody::DeclareToken(it) => &mut it.id,
+                _ => return,
+            },
+            _ => return,
+        };
+        *id = self.next_id;
+        self.next_id += 1;
+    }
+
+    fn any_body(&mut self) -> NetworkBody {
+        let begun = if self.temper == Temper::Good { u64::from(self.next_id) } else { 6 };
+        let (id, wire_expr) = (self.below(begun) as u32, self.key());
         let ended = || declare::common::ext::WireExprType { wire_expr: wire_expr.clone() };
         match self.below(14) {
             0 => put(wire_expr, self.below(200) as usize),
@@ -188,12 +215,14 @@ async fn received(from: &mut ReadHalf<DuplexStream>) -> TransportBody {
 }
 
 /// Opens a session, and sends frames until there are enough or the connection ends; how many went, and how it ended.
-async fn connection(router: &std::path::Path, random: &mut Random) -> (u64, End) {
+async fn connection(router: &std::path::Path, random: &mut Random, lasting: &Lasting) -> (u64, End) {
     random.temper = [Temper::Good, Temper::Wild, Temper::Broken][random.below(3) as usize];
-    random.next_key = 1;
+    (random.next_key, random.next_id) = (1, 1);
     let (robot, front) = tokio::io::duplex(1 << 12);
     let (read, write) = UnixStream::connect(router).await.expect("a router").into_split();
-    let relayed = tokio::spawn(relay(front, ToRouter { read, write }));
+    // One who connects again and again, and another one.
+    let peer = Name::new(if random.temper == Temper::Good { "good" } else { "wild" }).expect("a name");
+    let relayed = tokio::spawn(relay(front, ToRouter { read, write }, lasting.of(Peer::Robot(peer))));
     let (mut from, mut to) = tokio::io::split(robot);
     send(&mut to, &init(1)).await.expect("sent");
     let TransportBody::InitAck(ack) = received(&mut from).await else { panic!("no InitAck") };
@@ -252,10 +281,11 @@ async fn any_frames_of_a_robot_leave_the_router_and_others_whole() {
     };
     let _numbers = router.declare_subscriber("other/number").callback(hear).await.expect("declared");
     let runs = std::env::var("WAYMARK_RUNS").ok().and_then(|text| text.parse().ok()).unwrap_or(RUNS);
-    let mut random = Random { state: 35, temper: Temper::Good, next_key: 1 };
+    let mut random = Random { state: 35, temper: Temper::Good, next_key: 1, next_id: 1 };
+    let lasting = Lasting::default();
     let (mut sent, mut connections, mut violations) = (0, 0_u64, 0_u64);
     while sent < runs {
-        let (frames, ended) = connection(&at, &mut random).await;
+        let (frames, ended) = connection(&at, &mut random, &lasting).await;
         sent += frames;
         let is_violation = matches!(ended, End::Violation(_));
         assert!(random.temper != Temper::Good || !is_violation, "{ended:?}");

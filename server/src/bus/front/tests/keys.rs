@@ -85,6 +85,41 @@ fn the_whole_of_a_key_is_a_key_expression() {
 }
 
 #[test]
+fn a_number_is_declared_again_with_the_same_key_alone() {
+    for of in [
+        |wire_expr| declare(DeclareBody::DeclareSubscriber(DeclareSubscriber { id: 4, wire_expr })),
+        |wire_expr| declare(DeclareBody::DeclareToken(DeclareToken { id: 4, wire_expr })),
+        |wire_expr: WireExpr<'static>| named(&wire_expr).swap_remove(2),
+    ] {
+        let mut inspection = opened();
+        for _ in 0..2 {
+            assert!(inspection.batch(&frame([of(key(0, 5))])).is_ok());
+        }
+        assert_eq!(inspection.batch(&frame([of(key(0, 6))])), Err(Violation::Protocol));
+    }
+}
+
+#[test]
+fn interests_in_ever_new_keys_end_the_connection_and_the_same_ones_do_not() {
+    let interest = |i: usize| {
+        let wire_expr = WireExpr::from(format!("r1/{i:04}"));
+        let NetworkBody::Interest(it) = named(&wire_expr.to_owned()).swap_remove(2) else {
+            panic!("no interest")
+        };
+        // Begun, and ended.
+        let ends = Interest { mode: InterestMode::Final, ..it.clone() };
+        frame([NetworkBody::Interest(it), NetworkBody::Interest(ends)])
+    };
+    let mut inspection = opened();
+    let last = (0..MAX_INTEREST_BYTES).find(|i| inspection.batch(&interest(*i)).is_err()).expect("a bound");
+    assert_eq!(inspection.batch(&interest(last)), Err(Violation::ManyInterests));
+    assert!((1000..4000).contains(&last), "{last}");
+    for i in 0..last {
+        assert!(inspection.batch(&interest(i)).is_ok(), "{i}");
+    }
+}
+
+#[test]
 fn the_bytes_of_declared_keys_are_bounded() {
     let of = |id, bytes| declare(DeclareBody::DeclareToken(DeclareToken { id, wire_expr: key(0, bytes) }));
     let mut inspection = opened();
