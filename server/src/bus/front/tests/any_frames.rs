@@ -103,38 +103,7 @@ impl Random {
         let (id, wire_expr) = (self.below(begun) as u32, self.key());
         let ended = || declare::common::ext::WireExprType { wire_expr: wire_expr.clone() };
         match self.below(14) {
-            0 => put(wire_expr, self.below(200) as usize),
-            1 => match put(wire_expr, 0) {
-                NetworkBody::Push(push) => NetworkBody::Push(Push {
-                    payload: PushBody::Del(Del {
-                        timestamp: None,
-                        ext_sinfo: None,
-                        ext_attachment: None,
-                        ext_unknown: Vec::new(),
-                    }),
-                    ..push
-                }),
-                other => other,
-            },
-            2 => NetworkBody::Response(Response {
-                rid: id,
-                wire_expr,
-                payload: ResponseBody::Err(ErrorReply {
-                    encoding: zenoh_protocol::core::Encoding::default(),
-                    ext_sinfo: None,
-                    ext_unknown: Vec::new(),
-                    payload: vec![0_u8; 20].into(),
-                }),
-                ext_qos: response::ext::QoSType::DEFAULT,
-                ext_tstamp: None,
-                ext_respid: None,
-                ext_ts_stack: None,
-            }),
-            3 => NetworkBody::ResponseFinal(ResponseFinal {
-                rid: id,
-                ext_qos: response::ext::QoSType::DEFAULT,
-                ext_tstamp: None,
-            }),
+            kind @ 0..4 => self.data(kind, id, wire_expr),
             4 if self.temper == Temper::Good => declare(DeclareBody::DeclareFinal(DeclareFinal)),
             4 => declare(DeclareBody::UndeclareKeyExpr(UndeclareKeyExpr { id: id as u16 })),
             5 => declare(DeclareBody::UndeclareQueryable(UndeclareQueryable { id, ext_wire_expr: ended() })),
@@ -170,6 +139,44 @@ impl Random {
                 }
                 all.swap_remove(self.below(all.len() as u64) as usize)
             }
+        }
+    }
+
+    /// Data, replies and their ends.
+    fn data(&mut self, kind: u64, id: u32, wire_expr: WireExpr<'static>) -> NetworkBody {
+        match kind {
+            0 => put(wire_expr, self.below(200) as usize),
+            1 => match put(wire_expr, 0) {
+                NetworkBody::Push(push) => NetworkBody::Push(Push {
+                    payload: PushBody::Del(Del {
+                        timestamp: None,
+                        ext_sinfo: None,
+                        ext_attachment: None,
+                        ext_unknown: Vec::new(),
+                    }),
+                    ..push
+                }),
+                other => other,
+            },
+            2 => NetworkBody::Response(Response {
+                rid: id,
+                wire_expr,
+                payload: ResponseBody::Err(ErrorReply {
+                    encoding: zenoh_protocol::core::Encoding::default(),
+                    ext_sinfo: None,
+                    ext_unknown: Vec::new(),
+                    payload: vec![0_u8; 20].into(),
+                }),
+                ext_qos: response::ext::QoSType::DEFAULT,
+                ext_tstamp: None,
+                ext_respid: None,
+                ext_ts_stack: None,
+            }),
+            _ => NetworkBody::ResponseFinal(ResponseFinal {
+                rid: id,
+                ext_qos: response::ext::QoSType::DEFAULT,
+                ext_tstamp: None,
+            }),
         }
     }
 
