@@ -1,6 +1,9 @@
 //! A camera on the command line: numbers, or a file, and its intrinsics for a photograph.
 
 mod file;
+pub(super) mod lens;
+
+pub(super) use lens::{Lens, LensDifference};
 
 use super::{
     arg_parsers::numbers,
@@ -11,18 +14,37 @@ use std::path::Path;
 use vision::frame::{Distortion, Intrinsics, IntrinsicsSigmas};
 
 /// A camera of the command line.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct CameraArg {
     /// For pictures of that size.
     intrinsics: Intrinsics,
     /// Width and height of the pictures that it was calibrated with, px; none: not stated.
     size_px: Option<[usize; 2]>,
+    /// The lens that it was calibrated with, where that is known.
+    lens: Option<Lens>,
 }
 
 impl CameraArg {
     /// The intrinsics, and the size of picture that they are stated to be of.
-    pub(super) fn stated(self) -> (Intrinsics, Option<[usize; 2]>) {
+    pub(super) fn stated(&self) -> (Intrinsics, Option<[usize; 2]>) {
         (self.intrinsics, self.size_px)
+    }
+
+    /// What to say of the lens of a photograph. Error: it has another focal length than that of the calibration.
+    pub(super) fn check_lens(&self, photograph: Option<&Lens>) -> Result<Option<String>, Failure> {
+        let Some((known, taken)) = self.lens.as_ref().zip(photograph) else { return Ok(None) };
+        match known.difference(taken) {
+            None => Ok(None),
+            Some(LensDifference::Camera) => Ok(Some(format!(
+                "caution: the camera was calibrated with {known}, and the photograph is of {taken}."
+            ))),
+            Some(LensDifference::Focal) => {
+                let sentence =
+                    format!("--camera: it was calibrated with {known}, and the photograph is of {taken}.");
+                let advice = "Each lens and each zoom has a calibration of its own: calibrate with photographs by this one.";
+                Err(Failure::new(Class::Usage, "camera_lens", sentence).advise(advice))
+            }
+        }
     }
 
     /// The intrinsics for a photograph, a file's bytes: those of another scale are scaled. Errors: the photograph has other
@@ -48,7 +70,7 @@ pub(super) fn camera(text: &str) -> Result<CameraArg, String> {
         _ => return file::camera(Path::new(text)),
     };
     let intrinsics = made.map_err(|error| error.to_string())?;
-    Ok(CameraArg { intrinsics, size_px: None })
+    Ok(CameraArg { intrinsics, size_px: None, lens: None })
 }
 
 #[cfg(test)]
@@ -65,10 +87,23 @@ mod tests {
     }
 
     #[test]
+    fn a_photograph_of_another_lens_is_refused_and_of_another_camera_told() {
+        let of = |model, focal| Lens::of_photograph(&lens::tests::photograph(model, focal));
+        let intrinsics = Intrinsics::new(50.0, 50.0, 31.5, 23.5, Distortion::None).unwrap();
+        let camera = CameraArg { intrinsics, size_px: None, lens: of("iPhone 13", 26) };
+        let said = |taken: Option<Lens>| camera.check_lens(taken.as_ref());
+        assert_eq!((said(of("iPhone 13", 26)), said(None)), (Ok(None), Ok(None)));
+        assert!(said(of("Pixel 7", 26)).unwrap().unwrap().contains("Pixel 7"));
+        let other = said(of("iPhone 13", 13)).unwrap_err();
+        assert_eq!((other.class, other.code.as_str()), (Class::Usage, "camera_lens"));
+        assert!(other.sentence.contains("26 mm") && other.sentence.contains("13 mm"), "{other:?}");
+    }
+
+    #[test]
     fn a_photograph_has_the_camera_of_its_size() {
         let photograph = |w, h| engine::picture::png(w, h, &vec![0; w * h]).unwrap();
         let intrinsics = Intrinsics::new(50.0, 50.0, 31.5, 23.5, Distortion::None).unwrap();
-        let stated = CameraArg { intrinsics, size_px: Some([64, 48]) };
+        let stated = CameraArg { intrinsics, size_px: Some([64, 48]), lens: None };
         let fx =
             |found: Result<Intrinsics, Failure>| found.map(|k| k.fx_px).map_err(|f| (f.class, f.sentence));
         assert_eq!(fx(stated.of_photograph(&photograph(64, 48))), Ok(50.0));
@@ -76,7 +111,7 @@ mod tests {
         let turned = fx(stated.of_photograph(&photograph(48, 64))).unwrap_err();
         assert!(turned.0 == Class::Usage && turned.1.contains("held the other way"), "{turned:?}");
         assert!(fx(stated.of_photograph(&photograph(64, 64))).unwrap_err().1.contains("no other scale"));
-        let bare = CameraArg { intrinsics, size_px: None };
+        let bare = CameraArg { intrinsics, size_px: None, lens: None };
         assert_eq!(fx(bare.of_photograph(&photograph(64, 48))), Ok(50.0));
         assert!(fx(bare.of_photograph(&photograph(128, 96))).unwrap_err().1.contains("principal point"));
         assert_eq!(fx(bare.of_photograph(b"no picture")), Ok(50.0));

@@ -1,5 +1,6 @@
 //! Picture files in, pictures out, and the other way round for the demo's robots.
 
+use crate::camera_arg::Lens;
 use anyhow::Context as _;
 use engine::{decode::ImageLimits, picture};
 use image::{ImageDecoder as _, ImageEncoder as _};
@@ -52,6 +53,8 @@ pub struct Sent {
     pub bytes: Vec<u8>,
     /// Width and height before and after it was made smaller.
     pub shrunk: Option<[[u32; 2]; 2]>,
+    /// What the file says of its lens.
+    pub(crate) lens: Option<Lens>,
 }
 
 /// Reads a photograph. One of more bytes or pixels than a server takes is made smaller, and a BMP file is made a JPEG, upright.
@@ -59,7 +62,9 @@ pub struct Sent {
 pub fn photograph(path: &Path) -> Result<Sent, PictureError> {
     let mut bytes = Vec::new();
     File::open(path)?.take(MAX_PHOTOGRAPH_BYTES).read_to_end(&mut bytes)?;
-    Ok(fitted(&bytes, ImageLimits::UPLOAD).unwrap_or(Sent { bytes, shrunk: None }))
+    let lens = Lens::of_photograph(&bytes);
+    let sent = fitted(&bytes, ImageLimits::UPLOAD);
+    Ok(Sent { lens, ..sent.unwrap_or(Sent { bytes, shrunk: None, lens: None }) })
 }
 
 /// The photograph within the limits; `None` if it is, or cannot be decoded.
@@ -85,7 +90,7 @@ fn fitted(bytes: &[u8], limits: ImageLimits) -> Option<Sent> {
     let mut sent = Vec::new();
     let encoder = image::codecs::jpeg::JpegEncoder::new_with_quality(&mut sent, PHOTOGRAPH_QUALITY);
     picture.into_rgb8().write_with_encoder(encoder).ok()?;
-    Some(Sent { bytes: sent, shrunk: (after != before).then_some([before, after]) })
+    Some(Sent { bytes: sent, shrunk: (after != before).then_some([before, after]), lens: None })
 }
 
 /// Whether a file's name ends like that of a picture that can be read.

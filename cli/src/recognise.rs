@@ -17,7 +17,7 @@ pub(crate) struct Args {
     photographs: Vec<PathBuf>,
     /// Camera for poses: the file that `waymark camera calibrate --json` wrote, ROS' ost.yaml, or fx,fy,cx,cy in pixels;
     /// and its standard deviations, where known: of the focal length, of the principal point. A photograph of another
-    /// scale than that of the file has scaled intrinsics.
+    /// scale than that of the file has scaled intrinsics; one by a lens of another focal length, by its EXIF, is refused.
     #[arg(long, value_name = "FILE|FX,FY,CX,CY", value_parser = camera)]
     camera: Option<CameraArg>,
     #[command(flatten)]
@@ -48,15 +48,20 @@ pub(crate) async fn run(args: &Args) -> anyhow::Result<()> {
 
 async fn photograph(session: &Session, map: &str, args: &Args, path: &Path) -> Result<(), Failure> {
     let name = path.display().to_string();
-    let Sent { bytes: image, shrunk } = pictures::photograph(path)
+    let Sent { bytes: image, shrunk, lens } = pictures::photograph(path)
         .map_err(|error| Failure::new(Class::Usage, "unreadable", format!("{name}: {error}")))?;
     if let Some([[w, h], [to_w, to_h]]) = shrunk {
         session.note(&format!("{name}: {w}x{h} px made {to_w}x{to_h}; corners are of that size."));
     }
-    let checked = args.camera.map(|camera| camera.of_photograph(&image)).transpose();
-    checked.map_err(|failure| Failure { sentence: format!("{name}: {}", failure.sentence), ..failure })?;
+    let named = |failure: Failure| Failure { sentence: format!("{name}: {}", failure.sentence), ..failure };
+    if let Some(camera) = &args.camera {
+        if let Some(caution) = camera.check_lens(lens.as_ref()).map_err(named)? {
+            session.note(&format!("{name}: {caution}"));
+        }
+        camera.of_photograph(&image).map_err(named)?;
+    }
     let maps = session.maps();
-    let answer = match args.camera.map(CameraArg::stated) {
+    let answer = match args.camera.as_ref().map(CameraArg::stated) {
         Some((camera, Some(size_px))) => maps.recognise_of_size(map, image, (&camera, size_px)).await,
         Some((camera, None)) => maps.recognise(map, image, Some(&camera)).await,
         None => maps.recognise(map, image, None).await,

@@ -32,6 +32,8 @@ pub struct Capture {
 /// What is sent around a quad, as a share of its width and height on each side: the learnt border may lie outside of the found
 /// one.
 const PATCH_MARGIN: f64 = 0.4;
+/// What a message has beside its pixels, in bytes: numbers of the camera, its place, a covariance, the name of a map.
+pub(crate) const MESSAGE_HEAD_BYTES: usize = 1024;
 
 impl Capture {
     /// An encoded photograph; its size is read from its header. The capture time is now.
@@ -173,6 +175,23 @@ impl Capture {
         self.frame
     }
 
+    /// About the bytes of the message: those of its pixels.
+    pub(crate) fn pixel_bytes(&self) -> usize {
+        let patches = self.quads.iter().flatten().filter_map(|quad| quad.patch.as_ref());
+        self.frame.image.len() + patches.map(|patch| patch.image.len()).sum::<usize>()
+    }
+
+    /// The same, or without the image if the message would have more than `most` bytes: what is larger is dropped on the way
+    /// without a word, and this is refused with its code.
+    pub(crate) fn withheld(mut self, most: usize) -> Self {
+        if self.pixel_bytes() + MESSAGE_HEAD_BYTES > most {
+            self.frame.withheld_bytes = self.pixel_bytes() as u64;
+            self.frame.image = Bytes::new();
+            self.quads = None;
+        }
+        self
+    }
+
     /// The message with epoch and sequence number; on `map` unless it names one.
     pub(crate) fn numbered(self, epoch: u64, seq: u64, map: String) -> Vec<u8> {
         let map = if self.frame.map.is_empty() { map } else { self.frame.map };
@@ -276,6 +295,17 @@ mod tests {
         assert!(Capture::raw(Rgb8, (0, 3), Vec::new()).is_err());
         assert!(Capture::raw(Jpeg, (4, 3), vec![0; 12]).is_err());
         assert!(Capture::raw(Rgb8, (u32::MAX, u32::MAX), vec![0; 12]).is_err());
+    }
+
+    #[test]
+    fn what_the_server_does_not_take_is_said_in_place_of_the_image() {
+        let capture = || Capture::raw(v1::ImageEncoding::Bgr8, (640, 480), vec![7; 921_600]).unwrap();
+        let sent =
+            |most| v1::Frame::decode(&*capture().withheld(most).numbered(1, 2, String::new())).unwrap();
+        let whole = sent(921_600 + MESSAGE_HEAD_BYTES);
+        assert_eq!((whole.image.len(), whole.withheld_bytes), (921_600, 0));
+        let withheld = sent(921_599 + MESSAGE_HEAD_BYTES);
+        assert_eq!((withheld.image.len(), withheld.withheld_bytes, withheld.seq), (0, 921_600, 2));
     }
 
     fn quad(corners: [[f64; 2]; 4], kind: QuadKind) -> Quad {

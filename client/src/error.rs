@@ -200,5 +200,33 @@ pub enum ClientError {
 
 /// What zenoh says when it cannot do something.
 pub(crate) fn fault(action: &'static str) -> impl Fn(zenoh::Error) -> ClientError + Copy {
-    move |error| ClientError::Transport { action, detail: error.to_string() }
+    move |error| ClientError::Transport { action, detail: in_words(&error) }
+}
+
+/// What zenoh says, without the places in its source: those are paths of the machine that built it.
+pub(crate) fn in_words(error: &zenoh::Error) -> String {
+    let text = error.to_string();
+    let mut words: Vec<&str> = Vec::new();
+    for word in text.split_whitespace() {
+        if word.contains(".rs:") && words.last() == Some(&"at") {
+            words.pop();
+        } else {
+            words.push(word);
+        }
+    }
+    words.join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_path_of_a_builder_is_told() {
+        let error: zenoh::Error =
+            "Unable to connect to any of [tcp/h:1] at /root/.cargo/zenoh/src/orchestrator.rs:480. \
+            Stay at home"
+                .into();
+        assert_eq!(in_words(&error), "Unable to connect to any of [tcp/h:1] Stay at home");
+    }
 }

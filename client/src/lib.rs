@@ -7,8 +7,10 @@
 
 pub mod capture;
 pub mod error;
+mod greeting;
 pub mod http;
 pub mod listener;
+mod message_limit;
 pub mod questions;
 pub mod robot;
 pub mod robot_file;

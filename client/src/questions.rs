@@ -24,16 +24,15 @@ impl MapVersions {
 /// What a robot senses at one place: a frame, a scan, or both.
 #[derive(Debug, Clone, Default)]
 pub struct LocaliseQuery {
+    frame: Option<Capture>,
     request: v1::LocaliseRequest,
-    is_quads: bool,
 }
 
 impl LocaliseQuery {
     /// With a frame, which needs intrinsics and mounting; its odometry, prior and deadline are not used.
     #[must_use]
     pub fn with_frame(mut self, frame: Capture) -> Self {
-        self.is_quads = frame.is_quads();
-        self.request.frame = Some(frame.into_frame());
+        self.frame = Some(frame);
         self
     }
 
@@ -62,12 +61,16 @@ impl RobotClient {
         wait: Duration,
     ) -> Result<LocaliseResult, ClientError> {
         const HEAR: &str = "receive a localisation";
-        if query.is_quads {
+        if query.frame.as_ref().is_some_and(Capture::is_quads) {
             return Err(ClientError::Image("a localisation needs the whole image".to_owned()));
         }
+        let frame = match query.frame {
+            Some(frame) => Some(self.message_limit.within(self, frame).await?.into_frame()),
+            None => None,
+        };
         let deadline_ms = u32::try_from(wait.as_millis()).unwrap_or(u32::MAX).max(1);
         let map = if query.request.map.is_empty() { self.servers.map() } else { query.request.map };
-        let request = v1::LocaliseRequest { deadline_ms, map, ..query.request };
+        let request = v1::LocaliseRequest { frame, deadline_ms, map, ..query.request };
         let key = self.keys.build(&Key::Localise(self.robot.clone()));
         let asked = self.session.get(key).payload(request.encode_to_vec()).timeout(wait);
         let replies = asked.await.map_err(fault("ask for a localisation"))?;

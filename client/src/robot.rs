@@ -4,6 +4,8 @@
 use crate::{
     Capture, ClientError, RobotTls,
     error::fault,
+    greeting::admitted,
+    message_limit::MessageLimit,
     servers::{ServerEvent, Servers},
     transport::{self, Opened},
 };
@@ -25,14 +27,6 @@ use zenoh::{
 
 /// Answers and poses buffered for a slow reader; beyond, it misses the oldest.
 pub const INBOX: usize = 64;
-/// Longest wait for one hello of the server.
-const HELLO_WAIT: Duration = Duration::from_millis(500);
-/// Time between two questions for it.
-const HELLO_EVERY: Duration = Duration::from_millis(50);
-/// A session that was not greeted for so long is opened anew; each later one is given twice the time of the one before.
-const FIRST_GREETED: Duration = Duration::from_millis(500);
-/// The most that is given to one session.
-const GREETED: Duration = Duration::from_secs(2);
 
 /// Behaviour when the link is full.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -80,56 +74,6 @@ impl RobotOptions {
     }
 }
 
-/// Opens an encrypted session and waits for the answer to a hello: without access, everything is dropped without a word.
-///
-/// A session that is not greeted is opened anew: one that meets the server's gate as that closes, to open again with other
-/// rights, may keep a link to what was closed, for ever. The first sessions are given up early, so that there is time for
-/// several. That the robot is not admitted is said only if the last session was linked or something still listens.
-async fn admitted(keys: &Keys, robot: &Name, options: &RobotOptions) -> Result<Opened, ClientError> {
-    let (key, until) = (keys.build(&Key::Hello(robot.clone())), Instant::now() + options.timeout);
-    let endpoint = || options.endpoint.clone();
-    let silent = || ClientError::NotAdmitted { robot: robot.to_string(), endpoint: endpoint() };
-    let (mut left, mut was_linked, mut patience) = (options.timeout, false, FIRST_GREETED);
-    loop {
-        let opened = match transport::open(&RobotOptions { timeout: left, ..options.clone() }).await {
-            Ok(opened) => opened,
-            // The server was there and silent: that says more than that the rest of the time was too short for one more link.
-            Err(ClientError::TlsRefused { .. }) if was_linked => return Err(silent()),
-            Err(error) => return Err(error),
-        };
-        let session = opened.session.clone();
-        if is_greeted(&session, &key, until.min(Instant::now() + patience)).await? {
-            return Ok(opened);
-        }
-        let is_linked = session.info().routers_zid().await.next().is_some();
-        was_linked |= is_linked;
-        opened.close().await.map_err(fault("close the session"))?;
-        patience = GREETED.min(2 * patience);
-        left = until.saturating_duration_since(Instant::now());
-        if left < HELLO_WAIT {
-            let detail = "the connection was closed, and there is no other".to_owned();
-            let lost = ClientError::Unreachable { endpoint: endpoint(), detail };
-            return Err(if is_linked { silent() } else { lost });
-        }
-    }
-}
-
-/// Whether the server answers a hello before `until`.
-async fn is_greeted(session: &zenoh::Session, key: &str, until: Instant) -> Result<bool, ClientError> {
-    while Instant::now() < until {
-        let replies = session.get(key).timeout(HELLO_WAIT).await.map_err(fault("ask for the server"))?;
-        if replies.recv_async().await.is_ok_and(|reply| reply.result().is_ok()) {
-            return Ok(true);
-        }
-        tokio::time::sleep(HELLO_EVERY).await;
-        if session.info().routers_zid().await.next().is_none() {
-            // Closed, to open again: another session finds it sooner.
-            return Ok(false);
-        }
-    }
-    Ok(false)
-}
-
 /// An answer and the camera it is for.
 #[derive(Debug, Clone)]
 pub struct CameraAnswer {
@@ -152,6 +96,7 @@ pub struct RobotClient {
     answers: broadcast::Sender<CameraAnswer>,
     poses: broadcast::Sender<v1::RobotPose>,
     pub(crate) servers: Servers,
+    pub(crate) message_limit: MessageLimit,
     // Held: dropping them ends subscription and token.
     _subscribers: Vec<Subscriber<()>>,
     _alive: LivelinessToken,
@@ -225,6 +170,7 @@ impl RobotClient {
             answers,
             poses,
             servers,
+            message_limit: MessageLimit::default(),
             _subscribers: subscribers,
             _alive: alive,
         })
@@ -249,10 +195,12 @@ impl RobotClient {
         self.servers.events()
     }
 
-    /// Sends a frame, or the quads of one, and returns its number, at once.
+    /// Sends a frame, or the quads of one, and returns its number, at once. One that is larger than the server takes is sent
+    /// without its image, and its answer says `too_large`.
     pub async fn publish_frame(&self, camera: &str, capture: Capture) -> Result<u64, ClientError> {
         let seq = self.next_seq.fetch_add(1, Ordering::Relaxed);
         let (robot, camera) = (self.robot.clone(), name("camera", camera)?);
+        let capture = self.message_limit.within(self, capture).await?;
         let key = if capture.is_quads() { Key::Quads(robot, camera) } else { Key::Frame(robot, camera) };
         self.put(&key, capture.numbered(self.epoch, seq, self.servers.map()), Priority::DataLow).await?;
         Ok(seq)

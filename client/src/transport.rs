@@ -1,6 +1,6 @@
 //! The zenoh session of a robot: client of one router, no discovery, bounded memory.
 
-use crate::{ClientError, Delivery, RobotOptions, RobotTls};
+use crate::{ClientError, Delivery, RobotOptions, RobotTls, error::in_words};
 use link::{Credentials, EncryptedLink};
 use protos::{Key, Keys, keys::KeyError};
 use serde_json::json;
@@ -98,10 +98,10 @@ pub(crate) async fn open_at(
         return Err(ClientError::Transport { action: "open a session", detail });
     }
     let unreachable = |detail: String| ClientError::Unreachable { endpoint: endpoint.to_owned(), detail };
-    let config = config(endpoint, delivery, timeout).map_err(|e| unreachable(e.to_string()))?;
+    let config = config(endpoint, delivery, timeout).map_err(|e| unreachable(in_words(&e)))?;
     // zenoh's own timeout is per endpoint; a silent listener (not zenoh) can hold a handshake longer.
     match tokio::time::timeout(timeout + Duration::from_secs(1), zenoh::open(config)).await {
-        Ok(session) => session.map_err(|e| unreachable(e.to_string())),
+        Ok(session) => session.map_err(|e| unreachable(in_words(&e))),
         Err(_) => Err(unreachable(format!("no session within {timeout:?}"))),
     }
 }
@@ -174,5 +174,6 @@ mod tests {
         let error = open_at(&endpoint, Delivery::Latest, Duration::from_millis(300)).await.unwrap_err();
         let text = error.to_string();
         assert!(text.contains("timeout, or no server reachable at") && text.contains(&endpoint), "{text}");
+        assert!(!text.contains(".rs"), "no path of a builder: {text}");
     }
 }

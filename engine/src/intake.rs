@@ -124,7 +124,12 @@ impl Intake {
         echo: &mut v1::Answer,
     ) -> Result<FrameJob, Rejection> {
         if message.len() > self.frame_bytes {
-            let detail = format!("{} bytes are more than {}", message.len(), self.frame_bytes);
+            let detail =
+                format!("{} bytes are more than {} (limits.frame_bytes)", message.len(), self.frame_bytes);
+            // By these numbers the sender knows which of its frames it is.
+            if let Ok(frame) = M::decode(message) {
+                (echo.epoch, echo.seq, echo.captured_ns) = frame.numbers();
+            }
             return Err(Rejection::new(Code::TooLarge, M::FIELD, detail));
         }
         let message_bytes = message.len();

@@ -70,6 +70,12 @@ pub struct Intrinsics {
     /// Of each coordinate of the principal point. Absent: 0.003 of fx_px.
     #[prost(double, optional, tag = "9")]
     pub center_sigma_px: ::core::option::Option<f64>,
+    /// Width and height of the pictures that the camera was calibrated with: both, or neither. An image of another scale has the
+    /// intrinsics scaled; one of other proportions is refused (size_mismatch).
+    #[prost(uint32, optional, tag = "10")]
+    pub width_px: ::core::option::Option<u32>,
+    #[prost(uint32, optional, tag = "11")]
+    pub height_px: ::core::option::Option<u32>,
 }
 /// robot/{robot}/frame, with the camera attached
 #[derive(Clone, PartialEq, ::prost::Message)]
@@ -112,6 +118,17 @@ pub struct Frame {
     /// robot's fused pose nor anything of that map.
     #[prost(string, tag = "13")]
     pub map: ::prost::alloc::string::String,
+    /// Bytes of an image that was not sent: with it the message would have more than Hello.frame_bytes, and be dropped on the way.
+    /// The frame is refused (too_large), so that robot and server know of it. `image` is empty then.
+    #[prost(uint64, tag = "14")]
+    pub withheld_bytes: u64,
+}
+/// The reply to robot/{robot}/rpc/hello: the robot's messages arrive. Earlier servers reply with nothing.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct Hello {
+    /// The largest message that the server takes of a robot, in bytes.
+    #[prost(uint64, tag = "1")]
+    pub frame_bytes: u64,
 }
 /// Why a message was refused: a stable code, the field at fault and a sentence for a person.
 #[derive(::serde::Serialize, ::serde::Deserialize)]

@@ -34,6 +34,20 @@ impl Restamp {
         self.between(recorded_ns)
     }
 
+    /// The recorded time of a present one that [`Self::stamp`] gave, or of one between; `None` before anything was stamped.
+    pub fn recorded(&self, now_ns: i64) -> Option<i64> {
+        let after = self.moments.partition_point(|[_, now]| *now < now_ns);
+        let Some(&[b, b_now]) = self.moments.get(after) else {
+            let &[last, last_now] = self.moments.back()?;
+            return Some(last.saturating_add(now_ns.saturating_sub(last_now)));
+        };
+        let Some([a, a_now]) = after.checked_sub(1).map(|i| self.moments[i]) else {
+            return Some(b.saturating_sub(b_now.saturating_sub(now_ns)));
+        };
+        let share = (now_ns - a_now) as f64 / (b_now - a_now) as f64;
+        Some(a + ((b - a) as f64 * share).round() as i64)
+    }
+
     fn between(&self, recorded_ns: i64) -> i64 {
         let after = self.moments.partition_point(|[recorded, _]| *recorded < recorded_ns);
         let [b, b_now] = self.moments[after];
@@ -59,6 +73,21 @@ mod tests {
         assert_eq!(clock.stamp(2_000, 70), 60, "the same time gives the same time");
         assert_eq!(clock.stamp(900, 70), -50, "before the first, as much earlier");
         assert_eq!(clock.stamp(3_000, 60), 61, "never twice the same");
+    }
+
+    #[test]
+    fn the_recorded_time_of_what_was_stamped_comes_back() {
+        let mut clock = Restamp::default();
+        assert_eq!(clock.recorded(5), None);
+        for (recorded, now) in [(1_000, 50), (2_000, 60), (4_000, 61), (5_000, 90)] {
+            clock.stamp(recorded, now);
+        }
+        for recorded in [900, 1_000, 2_000, 4_000, 5_000] {
+            let now = clock.stamp(recorded, 99);
+            assert_eq!(clock.recorded(now), Some(recorded));
+        }
+        assert_eq!(clock.recorded(55), Some(1_500));
+        assert_eq!(clock.recorded(100), Some(5_010), "after the last, as much later");
     }
 
     #[test]

@@ -2,6 +2,8 @@
 //! rosbags wrote gives the same answers as the same data by our own messages.
 
 mod bags;
+mod files;
+mod poses;
 mod readings;
 
 use client::{api::NewMap, v1};

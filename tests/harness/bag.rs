@@ -32,22 +32,39 @@ pub struct Stop {
     pub robot_from_camera: Isometry3<f64>,
 }
 
+/// How a laser is published.
+#[derive(Debug, Clone, Copy)]
+pub struct LaserTopic {
+    /// Where.
+    pub topic: &'static str,
+    /// Whether the first ray comes again after a turn, as that of a TurtleBot3 in Gazebo.
+    pub repeats_first: bool,
+}
+
+/// A laser of a fan.
+pub const LIDAR: LaserTopic = LaserTopic { topic: "/lidar", repeats_first: false };
+
 /// Writes a bag: topics `/camera/color/image_raw`, `/camera/color/camera_info`, `/lidar` and `/tf`.
 pub fn write(path: &Path, camera: &Camera, stops: &[Stop]) {
+    write_with(path, camera, stops, LIDAR);
+}
+
+/// Writes the same bag with another laser.
+pub fn write_with(path: &Path, camera: &Camera, stops: &[Stop], laser: LaserTopic) {
     let mut bag = Bag {
         writer: Writer::new(BufWriter::new(File::create_new(path).expect("a file"))).expect("begun"),
         channels: BTreeMap::new(),
     };
     for (i, stop) in (0..).zip(stops) {
         let at_ns = START_NS + i * STEP_NS;
-        let laser = stop.scan.robot_from_laser();
+        let robot_from_laser = stop.scan.robot_from_laser();
         let transforms = vec![
             transform(at_ns, "odom", "base_link", &in_space(&stop.odom_from_robot)),
             transform(at_ns, "base_link", "camera", &stop.robot_from_camera),
-            transform(at_ns, "base_link", "laser", &in_space(laser)),
+            transform(at_ns, "base_link", "laser", &in_space(robot_from_laser)),
         ];
         bag.put("/tf", &TFMessage { transforms }, at_ns);
-        bag.put("/lidar", &laser_scan(at_ns, &stop.scan), at_ns + 1);
+        bag.put(laser.topic, &laser_scan(at_ns, &stop.scan, laser.repeats_first), at_ns + 1);
         bag.put("/camera/color/camera_info", &camera_info(at_ns, camera), at_ns + 2);
         let (width, height) = (stop.picture.width() as u32, stop.picture.height() as u32);
         let (header, data) = (header(at_ns, "camera"), stop.picture.data());
@@ -55,6 +72,19 @@ pub fn write(path: &Path, camera: &Camera, stops: &[Stop]) {
         bag.put("/camera/color/image_raw", &image, at_ns + 3);
     }
     bag.writer.finish().expect("finished");
+}
+
+/// Writes a file of messages whose content nobody looks into: encoding of the messages, and topic, type and bytes of each.
+pub fn write_raw(path: &Path, encoding: &str, messages: &[(&str, &str, &[u8])]) {
+    let mut writer = Writer::new(BufWriter::new(File::create_new(path).expect("a file"))).expect("begun");
+    for (sequence, (topic, kind, bytes)) in (0..).zip(messages) {
+        let schema = writer.add_schema(kind, "ros2msg", b"").expect("a schema");
+        let channel_id = writer.add_channel(schema, topic, encoding, &BTreeMap::new()).expect("a channel");
+        let at_ns = START_NS.unsigned_abs() + u64::from(sequence);
+        let header = MessageHeader { channel_id, sequence, log_time: at_ns, publish_time: at_ns };
+        writer.write_to_known_channel(&header, bytes).expect("written");
+    }
+    writer.finish().expect("finished");
 }
 
 struct Bag {
@@ -113,8 +143,10 @@ fn camera_info(at_ns: i64, camera: &Camera) -> CameraInfo<'static> {
     }
 }
 
-fn laser_scan(at_ns: i64, scan: &Scan) -> LaserScan<'static> {
-    let beams = scan.ranges_m().len();
+fn laser_scan(at_ns: i64, scan: &Scan, repeats_first: bool) -> LaserScan<'static> {
+    let mut ranges = scan.ranges_m().to_vec();
+    ranges.extend(ranges.first().copied().filter(|_| repeats_first));
+    let beams = ranges.len();
     LaserScan {
         header: header(at_ns, "laser"),
         angle_min: scan.bearing_rad(0) as f32,
@@ -124,7 +156,7 @@ fn laser_scan(at_ns: i64, scan: &Scan) -> LaserScan<'static> {
         scan_time: 0.0,
         range_min: 0.05,
         range_max: scan.max_range_m() as f32,
-        ranges: scan.ranges_m().to_vec(),
+        ranges,
         intensities: Vec::new(),
     }
 }

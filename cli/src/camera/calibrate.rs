@@ -1,9 +1,12 @@
 //! `waymark camera calibrate`: a camera's intrinsics from pictures of one flat object of known shape, no server needed.
 
-use crate::{detect, pictures, screen};
+use crate::{
+    camera_arg::{Lens, LensDifference},
+    detect, pictures, screen,
+};
 use anyhow::Context as _;
 use protos::api::CalibrationReport;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use server::calibrating::{
     CORNER_SIGMA_PX, CalibratedPictures, CalibrationConstraints, calibrated, calibrated_from_pictures,
 };
@@ -19,7 +22,7 @@ use vision::{
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     /// Pictures by one camera (PNG, JPEG, or folders of them) of one flat, textured rectangle: 2 to 32, better 3 or more,
-    /// from sides that differ by more than 15 degrees.
+    /// from sides that differ by more than 15 degrees. The report has their lens, where their EXIF says it.
     #[arg(required_unless_present = "corners")]
     images: Vec<PathBuf>,
     /// Width and height of the object in metres, such as 0.60x0.84. With corners only their ratio matters for the camera;
@@ -61,6 +64,15 @@ impl Constraints {
     }
 }
 
+/// A report with the lens of its pictures: photographs by another one are told, or refused.
+#[derive(Serialize)]
+struct WithLens<'a> {
+    #[serde(flatten)]
+    report: &'a CalibrationReport,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    lens: Option<&'a Lens>,
+}
+
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct CornersFile {
@@ -79,16 +91,21 @@ fn size(text: &str) -> Result<LandmarkSize, String> {
 
 pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let known = args.constraints.given();
-    let (names, report, evidence) = if let Some(file) = &args.corners {
+    let (names, report, mut evidence, lens) = if let Some(file) = &args.corners {
         let (names, views, image_px) = views_of_file(file, args.size)?;
-        (names, calibrated(&views, image_px, &known)?, vec![])
+        (names, calibrated(&views, image_px, &known)?, vec![], None)
     } else {
-        let (names, images) = read(&args.images)?;
+        let (names, images, lens) = read(&args.images)?;
         let found = calibrated_from_pictures(&images, args.size, &known)?;
         let evidence = evidence(&found);
-        (names, found.report, evidence)
+        (names, found.report, evidence, lens)
     };
-    screen::say(&if args.json { serde_json::to_string(&report)? } else { table(&report, &names, &evidence) });
+    evidence.extend(lens.as_ref().map(|lens| format!("lens: {lens}")));
+    screen::say(&if args.json {
+        serde_json::to_string(&WithLens { report: &report, lens: lens.as_ref() })?
+    } else {
+        table(&report, &names, &evidence)
+    });
     Ok(())
 }
 
@@ -118,8 +135,9 @@ fn views_of_file(file: &Path, size: LandmarkSize) -> anyhow::Result<Views> {
     Ok(((0..views.len()).map(|i| format!("view {i}")).collect(), views, [given.width, given.height]))
 }
 
-fn read(images: &[PathBuf]) -> anyhow::Result<(Vec<String>, Vec<GrayImage>)> {
-    let (mut names, mut read) = (vec![], vec![]);
+/// Names and pictures, and the lens that they are by, where their files say it. Error: they are by several.
+fn read(images: &[PathBuf]) -> anyhow::Result<(Vec<String>, Vec<GrayImage>, Option<Lens>)> {
+    let (mut names, mut read, mut lens) = (vec![], vec![], None);
     let files = detect::files(images)?;
     anyhow::ensure!(
         (2..=MAX_PICTURES).contains(&files.len()),
@@ -134,10 +152,17 @@ fn read(images: &[PathBuf]) -> anyhow::Result<(Vec<String>, Vec<GrayImage>)> {
             [image.width(), image.height()] == [first.width(), first.height()],
             "{name}: not as large as the first picture"
         );
+        if let Some(taken) = pictures::photograph(&path).with_context(|| name.clone())?.lens {
+            let first = lens.get_or_insert_with(|| taken.clone());
+            anyhow::ensure!(
+                first.difference(&taken) != Some(LensDifference::Focal),
+                "{name}: it is by {taken}, and the pictures before by {first}: a calibration is of one lens"
+            );
+        }
         names.push(name);
         read.push(image);
     }
-    Ok((names, read))
+    Ok((names, read, lens))
 }
 
 fn table(r: &CalibrationReport, names: &[String], evidence: &[String]) -> String {
@@ -170,4 +195,31 @@ fn table(r: &CalibrationReport, names: &[String], evidence: &[String]) -> String
         });
     }
     lines.join("\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera_arg::lens::tests::photograph;
+
+    #[test]
+    fn a_calibration_is_of_one_lens() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = |name: &str, focal_35mm| {
+            let path = folder.path().join(name);
+            std::fs::write(&path, photograph("iPhone 13", focal_35mm)).unwrap();
+            path
+        };
+        let (first, same, other) = (file("a.jpg", 26), file("b.jpg", 26), file("c.jpg", 13));
+        let (_, images, lens) = read(&[first.clone(), same]).unwrap();
+        assert_eq!(
+            (images.len(), lens.unwrap().to_string()),
+            (2, "iPhone 13, 26 mm (35 mm equivalent)".to_owned())
+        );
+        let refused = read(&[first, other]).unwrap_err().to_string();
+        assert!(
+            refused.contains("c.jpg") && refused.contains("13 mm") && refused.contains("26 mm"),
+            "{refused}"
+        );
+    }
 }

@@ -1,7 +1,7 @@
 //! Files of cameras. In: the report of `waymark camera calibrate --json`, `Intrinsics` as JSON, or the YAML file of ROS'
 //! `camera_calibration` (`ost.yaml`) and of OpenCV. Out: intrinsics, and the size of picture that they are of.
 
-use super::CameraArg;
+use super::{CameraArg, lens::Lens};
 use client::{api::CalibrationReport, v1};
 use protos::convert::geometry::intrinsics;
 use ros2::{
@@ -25,18 +25,26 @@ pub(super) fn camera(path: &Path) -> Result<CameraArg, String> {
         Some(text) if text.starts_with('{') => of_json(text),
         Some(text) => of_yaml(text),
     };
-    let (wire, size_px) = read.map_err(|error| format!("{}: {error}; {EXPECTED}", path.display()))?;
+    let (wire, size_px, lens) = read.map_err(|error| format!("{}: {error}; {EXPECTED}", path.display()))?;
     let intrinsics = intrinsics(&wire)
         .map_err(|refused| format!("{}: {}: {}", path.display(), refused.field, refused.detail))?;
-    Ok(CameraArg { intrinsics, size_px })
+    Ok(CameraArg { intrinsics, size_px, lens })
 }
 
-type Read = Result<(v1::Intrinsics, Option<[usize; 2]>), String>;
+type Read = Result<(v1::Intrinsics, Option<[usize; 2]>, Option<Lens>), String>;
+
+/// What `waymark camera calibrate` adds to a report.
+#[derive(Deserialize)]
+struct WithLens {
+    #[serde(default)]
+    lens: Option<Lens>,
+}
 
 fn of_json(text: &str) -> Read {
     if let Ok(report) = serde_json::from_str::<CalibrationReport>(text) {
         let size_px = [report.width_px as usize, report.height_px as usize];
-        return Ok((with_sigmas(&report), Some(size_px)));
+        let lens = serde_json::from_str::<WithLens>(text).ok().and_then(|with| with.lens);
+        return Ok((with_sigmas(&report), Some(size_px), lens));
     }
     let value: serde_json::Value = serde_json::from_str(text).map_err(|error| error.to_string())?;
     // All four numbers are needed: on the wire one that is left out is 0.
@@ -47,7 +55,7 @@ fn of_json(text: &str) -> Read {
     let side = |key: &str| value.get(key).and_then(serde_json::Value::as_u64).filter(|side| *side > 0);
     let size_px = side("width_px").zip(side("height_px")).map(|(w, h)| [w as usize, h as usize]);
     let wire: v1::Intrinsics = serde_json::from_value(value).map_err(|error| error.to_string())?;
-    Ok((with_lens(wire)?, size_px))
+    Ok((with_lens(wire)?, size_px, None))
 }
 
 /// The lens by what is in the lists, as in messages of ROS: fewer coefficients, or more that are 0.
@@ -112,7 +120,7 @@ fn of_yaml(text: &str) -> Read {
         ..CameraInfo::default()
     };
     let model = CameraModel::of_raw(&info).map_err(|error| error.to_string())?;
-    Ok((model.to_wire(), Some([model.width_px as usize, model.height_px as usize])))
+    Ok((model.to_wire(), Some([model.width_px as usize, model.height_px as usize]), None))
 }
 
 #[cfg(test)]
@@ -149,6 +157,10 @@ mod tests {
         let read = of(report).unwrap();
         assert_eq!(read.size_px, Some([640, 480]));
         assert_eq!(read.intrinsics.sigmas, Some(IntrinsicsSigmas { focal_px: 5.0, center_px: 4.0 }));
+        assert_eq!(read.lens, None);
+        let with_lens =
+            report.replace(r#""views": []"#, r#""views": [], "lens": {"model": "X1", "focal_35mm": 26}"#);
+        assert_eq!(of(&with_lens).unwrap().lens.unwrap().to_string(), "X1, 26 mm (35 mm equivalent)");
     }
 
     #[test]

@@ -4,11 +4,13 @@ use super::{Args, MAP};
 use crate::{pictures, screen};
 use anyhow::Context as _;
 use client::{
-    Capture, MapClient, RobotClient, RobotOptions, api::LandmarkStatus, named_landmarks, quad_corners,
-    v1::Answer,
+    Capture, MapClient, RobotClient, RobotOptions,
+    api::LandmarkStatus,
+    named_landmarks, quad_corners,
+    v1::{Answer, Scan},
 };
 use map::pose2::Pose2;
-use protos::Name;
+use protos::{Name, convert::geometry::pose2_wire};
 use server::RunningServer;
 use sim::{
     building::Building,
@@ -16,7 +18,10 @@ use sim::{
     robot::{Robot, RobotParams, SensorReadings},
     truth::{FrameTruth, ViewState},
 };
-use std::{sync::Arc, time::Duration};
+use std::{
+    sync::Arc,
+    time::{Duration, SystemTime, UNIX_EPOCH},
+};
 use tokio::time::Instant;
 
 const CAMERA: &str = "front";
@@ -92,6 +97,7 @@ pub(super) async fn drive(
             period: Duration::from_secs_f64(1.0 / args.rate_hz),
             record: Record { robots: 1, ..Record::default() },
             fixed: false,
+            has_laser: args.record.is_some(),
         };
         tasks.push(tokio::spawn(journey.run(robot)));
     }
@@ -111,6 +117,8 @@ struct Journey {
     period: Duration,
     record: Record,
     fixed: bool,
+    /// Whether scans are sent, too: for recordings.
+    has_laser: bool,
 }
 
 impl Journey {
@@ -132,6 +140,9 @@ impl Journey {
             let step = &readings.step;
             self.live.truth(&self.robot, MAP, step.map_from_robot);
             self.client.publish_odometry(&step.odom_from_robot).await?;
+            if self.has_laser {
+                self.client.publish_scan(scan_of(&readings)).await?;
+            }
             let capture = Capture::encoded(pictures::jpeg(&readings.frame.image)?)?
                 .with_intrinsics(&camera)
                 .with_mounting(&step.robot_from_camera)
@@ -205,6 +216,22 @@ impl Journey {
                 self.name, r.frames, r.recognitions, r.false_matches, r.guided, r.false_guided
             ));
         }
+    }
+}
+
+/// The laser scan of a moment, stamped now.
+fn scan_of(readings: &SensorReadings) -> Scan {
+    let scan = &readings.scan;
+    let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    Scan {
+        captured_ns: i64::try_from(now.as_nanos()).unwrap_or(i64::MAX),
+        odom_from_robot: Some(pose2_wire(&readings.step.odom_from_robot)),
+        robot_from_laser: Some(pose2_wire(scan.robot_from_laser())),
+        first_bearing_rad: scan.bearing_rad(0),
+        bearing_step_rad: scan.bearing_step_rad(),
+        max_range_m: scan.max_range_m(),
+        ranges_m: scan.ranges_m().to_vec(),
+        ..Scan::default()
     }
 }
 

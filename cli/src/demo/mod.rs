@@ -56,7 +56,7 @@ pub(crate) struct Args {
     /// Keep serving the page after the summary, until Ctrl-C.
     #[arg(long)]
     stay: bool,
-    /// Record the robots' drives to this MCAP file; it must not exist.
+    /// Record the robots' drives to this MCAP file, which must not exist; they send the scans of their lasers, too.
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
     /// End with the summary as one JSON object.

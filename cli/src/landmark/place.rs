@@ -160,6 +160,9 @@ async fn by_photograph(session: &Session, map: &str, args: &PlaceArgs) -> anyhow
     let photograph = Photograph { path, region: LandmarkRegion::Detect, pick: args.pick };
     let sent = pictures::photograph(path)
         .map_err(|error| Failure::new(Class::Usage, "unreadable", format!("{}: {error}", path.display())))?;
+    if let Some(caution) = camera.check_lens(sent.lens.as_ref())? {
+        session.note(&caution);
+    }
     let capture =
         capture(&camera.of_photograph(&sent.bytes)?, from, args.from_sigma, height_m, args.camera_tilt);
     let view = |view| NewView { capture: Some(capture.clone()), keep_near_duplicate: true, ..view };

@@ -3,13 +3,15 @@
 use super::{LaserArgs, import};
 use crate::{
     clock::Clock,
+    failure::{Class, Failure},
+    recording::scans::{self, FileScans, ScanArgs},
     screen,
     session::{Consent, ServerArgs},
 };
 use anyhow::Context as _;
 use formats::{
     map_svg,
-    scan_log::{self, LogEntry},
+    scan_log::{self, LogEntry, ScanLog},
     walls::MapFile,
 };
 use map::slam::{Slam, SlamMap, SlamParams};
@@ -32,11 +34,14 @@ struct Upload {
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     /// The scan log: a CARMEN log (FLASER or ROBOTLASER1 lines), numbered scans (`i dx dy dtheta r0 r1 ..`), or a
-    /// Waymark recording; `.gz` is unpacked.
+    /// Waymark scan log, `.gz` is unpacked. Or a file of messages: a recording (`waymark record`, `demo --record`), or a bag of
+    /// ROS 2 with laser scans and odometry (MCAP, or the bag's folder).
     #[arg(value_name = "LOG")]
     recording: PathBuf,
     #[command(flatten)]
     laser: LaserArgs,
+    #[command(flatten)]
+    scans: ScanArgs,
     /// Write the map (walls with covariance, path, loops) as JSON.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -87,19 +92,42 @@ pub fn params(path: Option<&PathBuf>) -> anyhow::Result<SlamParams> {
     serde_path_to_error::deserialize(&mut json).with_context(name)
 }
 
+/// Reads the scans of a log, or of a file of messages, and says what of them is not used.
+fn read(args: &Args) -> anyhow::Result<ScanLog> {
+    let path = &args.recording;
+    let said = |line: String| screen::complain(&format!("{}: {line}", path.display()));
+    if !scans::has_messages(path) {
+        let log = scan_log::read(path, &args.laser.defaults()).with_context(|| path.display().to_string())?;
+        if let Some(cut) = &log.cut {
+            said(format!("{cut}: the log ends there; {} scans before are used.", log.records.len()));
+        }
+        return Ok(log);
+    }
+    let FileScans { log, cut_off_at, problems } = scans::scans(path, &args.scans)?;
+    if let Some(at) = cut_off_at {
+        said(format!("it ends inside a record at byte {at}; {} scans before are used.", log.records.len()));
+    }
+    for (count, first) in problems.values() {
+        said(format!("{count} times {first}"));
+    }
+    Ok(log)
+}
+
+/// Scans without a wall: nothing is written, and no walls of a map are replaced by none.
+fn no_walls(args: &Args, scans: usize) -> Failure {
+    let sentence = format!("{}: {scans} scans give no wall; nothing is changed.", args.recording.display());
+    let advice = "Drive along the walls: a wall is where several scans from different places agree.";
+    Failure::new(Class::Refused, "no_walls", sentence).advise(advice)
+}
+
 /// Runs the command.
 pub(crate) async fn run(args: &Args) -> anyhow::Result<()> {
-    let recording = scan_log::read(&args.recording, &args.laser.defaults())
-        .with_context(|| args.recording.display().to_string())?;
-    if let Some(cut) = &recording.cut {
-        screen::complain(&format!(
-            "{}: {cut}: the log ends there; {} scans before are used.",
-            args.recording.display(),
-            recording.records.len()
-        ));
-    }
+    let recording = read(args)?;
     let Built { map, seconds } =
         build(&recording.records, |i| recording.records[i].odom, params(args.params.as_ref())?)?;
+    if map.walls.is_empty() {
+        return Err(no_walls(args, map.path.len()).into());
+    }
     let file = MapFile::of(&map);
     if let Some(out) = &args.out {
         file.write(out).with_context(|| out.display().to_string())?;

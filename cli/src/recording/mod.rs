@@ -3,9 +3,12 @@
 pub(crate) mod record;
 pub(crate) mod recorder;
 pub(crate) mod replay;
+mod bag_args;
 mod playable;
 mod player;
+mod poses;
 mod report;
+pub(crate) mod scans;
 
 use crate::{
     failure::{Class, Failure},

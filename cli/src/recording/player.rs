@@ -4,13 +4,14 @@
 //! One frame is in work at a time, so that none is replaced by a newer one. Capture times are moved to the present
 //! ([`recordings::restamp`]), because a server compares them with its own clock.
 
+use super::poses::PosesFile;
 use crate::screen;
 use client::{
     Capture, ClientError, Delivery, RobotClient, RobotOptions, named_landmarks,
     protos::{
         Key, Name,
         convert::geometry::pose2,
-        v1::{Answer, Frame, Status},
+        v1::{Answer, Frame, RobotPose, Status},
     },
 };
 use recordings::{Body, DriveReader, DriveWriter, Recorded, compare::Play, restamp::Restamp};
@@ -25,6 +26,8 @@ use tokio::{sync::broadcast, time::Instant};
 
 /// Longest wait for an answer; then the frame counts as not answered.
 const ANSWER_TIMEOUT: Duration = Duration::from_secs(30);
+/// The last fused poses have come when none came for so long.
+const POSES_QUIET: Duration = Duration::from_millis(500);
 /// The server may begin with a frame this late: it never expires while it is waited for.
 const DEADLINE_MS: u32 = 60_000;
 
@@ -58,6 +61,9 @@ pub(crate) struct Counts {
     pub(crate) poses: u64,
     /// Fused poses received.
     pub(crate) fused_poses: u64,
+    /// Lines of the file of poses; absent without one. Of one time there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) poses_written: Option<u64>,
     /// Odometry sent.
     pub(crate) odometry: u64,
     /// Scans sent.
@@ -66,6 +72,13 @@ pub(crate) struct Counts {
     pub(crate) problems: BTreeMap<&'static str, (u64, String)>,
     /// Where the file ends inside a record: its recorder was killed.
     pub(crate) cut_off_at: Option<u64>,
+}
+
+impl Counts {
+    /// Messages that were sent.
+    pub(crate) fn sent(&self) -> u64 {
+        self.frames + self.odometry + self.scans
+    }
 }
 
 /// What a replay gave.
@@ -82,8 +95,9 @@ pub(crate) struct Played {
 pub(crate) struct Player {
     options: PlayerOptions,
     client: RobotClient,
-    fused: broadcast::Receiver<client::v1::RobotPose>,
+    fused: broadcast::Receiver<RobotPose>,
     answers: Option<DriveWriter<BufWriter<File>>>,
+    poses: Option<PosesFile>,
     clock: Restamp,
     /// Log time of the first message, and when it was played.
     began: Option<(u64, Instant)>,
@@ -92,9 +106,10 @@ pub(crate) struct Player {
 
 impl Player {
     /// Connects as the robot.
-    pub(crate) async fn connect(
+    pub(super) async fn connect(
         options: PlayerOptions,
         answers: Option<DriveWriter<BufWriter<File>>>,
+        poses: Option<PosesFile>,
     ) -> anyhow::Result<Self> {
         let robot = RobotOptions {
             delivery: Delivery::Every,
@@ -103,7 +118,7 @@ impl Player {
         let client = RobotClient::connect(&robot).await?;
         let fused = client.poses();
         let played = Played { counts: Counts::default(), before: Play::default(), now: Play::default() };
-        Ok(Self { options, client, fused, answers, clock: Restamp::default(), began: None, played })
+        Ok(Self { options, client, fused, answers, poses, clock: Restamp::default(), began: None, played })
     }
 
     /// Plays to the end.
@@ -113,13 +128,19 @@ impl Player {
         while let Some(recorded) = tokio::task::block_in_place(|| drive.next_message())? {
             self.pace(recorded.log_time_ns).await;
             self.message(recorded).await?;
-            self.count_fused();
+            while let Some(fused) = self.next_fused() {
+                self.fused(&fused);
+            }
             progress.inc(1);
         }
         progress.finish_and_clear();
         if let Some(bag) = drive.bag() {
             let problems = bag.problems().map(|(word, count, first)| (word, (count, first.to_owned())));
             self.played.counts.problems.extend(problems);
+        }
+        self.last_fused().await;
+        if let Some(poses) = self.poses {
+            self.played.counts.poses_written = Some(poses.finish()?);
         }
         if let Some(answers) = self.answers {
             answers.finish()?;
@@ -218,14 +239,41 @@ impl Player {
         }
     }
 
-    fn count_fused(&mut self) {
+    /// A fused pose that is there.
+    fn next_fused(&mut self) -> Option<RobotPose> {
         loop {
             match self.fused.try_recv() {
-                Ok(_) => self.played.counts.fused_poses += 1,
-                Err(broadcast::error::TryRecvError::Lagged(missed)) => {
-                    self.played.counts.fused_poses += missed;
-                }
-                Err(_) => return,
+                Ok(pose) => return Some(pose),
+                Err(broadcast::error::TryRecvError::Lagged(missed)) => self.missed(missed),
+                Err(_) => return None,
+            }
+        }
+    }
+
+    fn missed(&mut self, missed: u64) {
+        self.played.counts.fused_poses += missed;
+        if self.poses.is_some() {
+            let first =
+                || (0, "fused poses came faster than they were read: play slower, --speed 1".to_owned());
+            self.played.counts.problems.entry("poses_missed").or_insert_with(first).0 += missed;
+        }
+    }
+
+    fn fused(&mut self, pose: &RobotPose) {
+        self.played.counts.fused_poses += 1;
+        let recorded_ns = self.clock.recorded(pose.captured_ns);
+        if let (Some(poses), Some(recorded_ns)) = (&mut self.poses, recorded_ns) {
+            poses.take(recorded_ns, pose);
+        }
+    }
+
+    /// The poses that are still on their way: until none comes.
+    async fn last_fused(&mut self) {
+        while self.poses.is_some() {
+            match tokio::time::timeout(POSES_QUIET, self.fused.recv()).await {
+                Ok(Ok(pose)) => self.fused(&pose),
+                Ok(Err(broadcast::error::RecvError::Lagged(missed))) => self.missed(missed),
+                Ok(Err(broadcast::error::RecvError::Closed)) | Err(_) => return,
             }
         }
     }

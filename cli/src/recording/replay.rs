@@ -1,9 +1,12 @@
 //! `waymark replay`: plays a recording or a bag of ROS 2 into a server, as a robot, and compares the answers.
 
 use super::{
-    Endpoints, PROGRAM, new_file,
+    Endpoints, PROGRAM,
+    bag_args::MotionArgs,
+    new_file,
     playable::playable,
-    player::{Player, PlayerOptions},
+    player::{Counts, Player, PlayerOptions},
+    poses::PosesFile,
     report::{ReplayReport, table},
 };
 use crate::{
@@ -34,6 +37,8 @@ use std::{
 
 /// Longest wait until the server has seen what was sent.
 const SETTLED: Duration = Duration::from_secs(2);
+/// First bytes of a message that rosbag2 packed with `compression_mode: message`. A message of ROS begins with 0.
+const ZSTD: &[u8] = b"\x28\xb5\x2f\xfd";
 
 /// `waymark replay`.
 #[derive(Debug, clap::Args)]
@@ -55,6 +60,11 @@ pub(crate) struct Args {
     /// Write the new answers to this file; it must not exist.
     #[arg(long, value_name = "OUT")]
     answers: Option<PathBuf>,
+    /// Write the fused poses to this file, which must not exist, as lines of the TUM benchmark: stamp x y z qx qy qz qw.
+    /// Stamps are those of the recording in seconds, positions metres in the frame of the map (z is 0), and the quaternion is
+    /// map from robot. Fused poses depend on the speed: `--speed 1` plays as it was recorded.
+    #[arg(long, value_name = "OUT")]
+    poses: Option<PathBuf>,
     /// Compare the answers with those of the recording, or of another file; exit status 1 if they differ.
     #[arg(long, value_name = "OTHER", num_args = 0..=1)]
     #[allow(clippy::option_option, reason = "clap's form of an option with an optional value")]
@@ -72,18 +82,8 @@ struct BagArgs {
     /// A topic of images, as `NAME=TOPIC` with the camera's name; may be given several times [default: all of the bag].
     #[arg(long, value_name = "NAME=TOPIC")]
     image: Vec<String>,
-    /// Topic of the laser [default: /scan].
-    #[arg(long, value_name = "TOPIC")]
-    scan: Option<String>,
-    /// Topic of the odometry; `tf` takes it from the transforms [default: /odom, or `tf` if the bag lacks that].
-    #[arg(long, value_name = "TOPIC")]
-    odometry: Option<String>,
-    /// The robot's frame [default: `base_link`].
-    #[arg(long, value_name = "FRAME")]
-    base_frame: Option<String>,
-    /// The odometry's frame [default: odom].
-    #[arg(long, value_name = "FRAME")]
-    odom_frame: Option<String>,
+    #[command(flatten)]
+    motion: MotionArgs,
 }
 
 fn speed(text: &str) -> Result<f64, String> {
@@ -113,6 +113,7 @@ async fn replay(session: &Session, args: &Args) -> anyhow::Result<ExitCode> {
         let file = BufWriter::new(new_file(path)?);
         Ok::<_, anyhow::Error>(DriveWriter::create(file, &args.endpoints.fleet, PROGRAM)?)
     });
+    let poses = args.poses.as_deref().map(PosesFile::create).transpose()?;
     let options = PlayerOptions {
         zenoh: args.endpoints.zenoh.clone(),
         fleet: args.endpoints.fleet.clone(),
@@ -123,8 +124,11 @@ async fn replay(session: &Session, args: &Args) -> anyhow::Result<ExitCode> {
     };
     let drive = DriveReader::open_bag(opened(&args.file)?, bag).with_context(|| unreadable(&args.file))?;
     let earlier = activity(session, &robot).await;
-    let player = Player::connect(options, answers.transpose()?).await?;
+    let player = Player::connect(options, answers.transpose()?, poses).await?;
     let played = player.play(drive).await.with_context(|| unreadable(&args.file))?;
+    if played.counts.sent() == 0 {
+        return Err(nothing_played(&args.file, &played.counts).into());
+    }
     let inputs =
         inputs_used(session, &robot, earlier.as_ref(), played.counts.odometry + played.counts.scans).await;
     let before = before.or_else(|| args.compare.is_some().then_some(played.before));
@@ -164,6 +168,19 @@ async fn inputs_used(
     }
 }
 
+/// Nothing of a file was sent: a failure, with what was not used.
+fn nothing_played(file: &Path, counts: &Counts) -> Failure {
+    let sentence = format!("Nothing of {} was played.", file.display());
+    let reasons = counts.problems.values().map(|(count, first)| format!("{count} times {first}"));
+    let reasons: Vec<String> = reasons.collect();
+    let advice = if reasons.is_empty() {
+        "It has no frames, odometry or scans of this robot.".to_owned()
+    } else {
+        reasons.join("\n")
+    };
+    Failure::new(Class::Refused, "nothing_played", sentence).advise(advice)
+}
+
 fn opened(path: &Path) -> anyhow::Result<BufReader<File>> {
     let unreadable =
         |error| Failure::new(Class::Usage, "unreadable", format!("{}: {error}", unreadable(path)));
@@ -171,14 +188,27 @@ fn opened(path: &Path) -> anyhow::Result<BufReader<File>> {
     Ok(BufReader::new(File::open(path).map_err(unreadable)?))
 }
 
-fn unreadable(path: &Path) -> String {
+/// A file of messages, and its channels. Error: it is none, or each of its messages is packed.
+pub(super) fn open_messages(path: &Path) -> anyhow::Result<(BufReader<File>, Vec<Arc<ChannelInfo>>)> {
+    let mut messages = MessageReader::open(opened(path)?).with_context(|| unreadable(path))?;
+    let channels = messages.channels().with_context(|| unreadable(path))?;
+    let first = messages.next_message().with_context(|| unreadable(path))?;
+    if first.is_some_and(|first| first.channel.encoding == "cdr" && first.data.starts_with(ZSTD)) {
+        let sentence = format!("cannot play {}: each of its messages is packed with zstd.", path.display());
+        let advice =
+            "`ros2 bag convert` unpacks them: compression_mode: none, or `file` in its output options.";
+        return Err(Failure::new(Class::Usage, "packed_messages", sentence).advise(advice).into());
+    }
+    Ok((opened(path)?, channels))
+}
+
+pub(super) fn unreadable(path: &Path) -> String {
     format!("cannot play {}", path.display())
 }
 
 /// The robot's name at the server and in the recording, and its settings if the file is a bag.
 fn robots(args: &Args) -> anyhow::Result<(Name, Name, Option<BagRobot>)> {
-    let mut file = MessageReader::open(opened(&args.file)?).with_context(|| unreadable(&args.file))?;
-    let channels = file.channels().with_context(|| unreadable(&args.file))?;
+    let (_, channels) = open_messages(&args.file)?;
     if bag::is_bag(channels.iter().map(AsRef::as_ref)) {
         let Some(robot) = args.robot.clone() else {
             let sentence = format!("{} is a bag of ROS: which robot plays it?", args.file.display());
@@ -193,7 +223,11 @@ fn robots(args: &Args) -> anyhow::Result<(Name, Name, Option<BagRobot>)> {
 }
 
 /// The robot of a recording that is played: the one named, or the only one.
-fn recorded_robot(named: Option<&Name>, names: &BTreeSet<&str>, file: &Path) -> anyhow::Result<Name> {
+pub(super) fn recorded_robot(
+    named: Option<&Name>,
+    names: &BTreeSet<&str>,
+    file: &Path,
+) -> anyhow::Result<Name> {
     let all = || names.iter().copied().collect::<Vec<_>>().join(", ");
     let missing = |sentence: String| Failure::new(Class::NotFound, "not_recorded", sentence);
     match (named, names.len()) {
@@ -216,32 +250,18 @@ fn recorded_robot(named: Option<&Name>, names: &BTreeSet<&str>, file: &Path) -> 
 }
 
 /// The robot that a topic of ours belongs to: the chunk after `robot` of its key.
-fn robot_of(channel: &Arc<ChannelInfo>) -> Option<&str> {
+pub(super) fn robot_of(channel: &Arc<ChannelInfo>) -> Option<&str> {
     let is_ours = channel.schema.starts_with("waymark.");
     channel.topic.split('/').skip_while(|chunk| *chunk != "robot").nth(1).filter(|_| is_ours)
 }
 
 fn settings(args: &BagArgs, channels: &[Arc<ChannelInfo>]) -> anyhow::Result<RobotSettings> {
-    let usual = RobotSettings::default();
-    let has = |topic: &str| channels.iter().any(|channel| channel.topic == topic);
-    let odometry = match args.odometry.as_deref() {
-        Some("tf") => None,
-        Some(topic) => Some(topic.to_owned()),
-        None => usual.odometry.clone().filter(|topic| has(topic)),
-    };
     let cameras = if args.image.is_empty() {
         bag::cameras(channels.iter().map(AsRef::as_ref))
     } else {
         args.image.iter().map(|given| camera(given, channels)).collect::<anyhow::Result<_>>()?
     };
-    Ok(RobotSettings {
-        base_frame: args.base_frame.clone().unwrap_or(usual.base_frame),
-        odom_frame: args.odom_frame.clone().unwrap_or(usual.odom_frame),
-        scan: args.scan.clone().or(usual.scan),
-        odometry,
-        cameras,
-        ..RobotSettings::default()
-    })
+    Ok(args.motion.settings(channels, cameras))
 }
 
 fn camera(given: &str, channels: &[Arc<ChannelInfo>]) -> anyhow::Result<CameraSettings> {
@@ -282,6 +302,15 @@ fn play_of(path: &Path, robot: &Name) -> anyhow::Result<Play> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_plays_nothing_fails_with_the_reasons() {
+        let mut counts = Counts::default();
+        let failure = nothing_played(Path::new("bag.mcap"), &counts);
+        assert!(failure.class == Class::Refused && failure.advice.contains("no frames"), "{failure:?}");
+        counts.problems.insert("malformed", (21, "a message of `/image`: its header".into()));
+        assert!(nothing_played(Path::new("bag.mcap"), &counts).advice.contains("21 times a message"));
+    }
 
     #[test]
     fn the_only_robot_of_a_recording_need_not_be_named() {

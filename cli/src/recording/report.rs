@@ -34,6 +34,10 @@ pub(super) fn table(report: &ReplayReport) -> String {
         format!("poses        {} by landmarks, {} fused", counts.poses, counts.fused_poses),
         format!("also sent    {} odometry, {} scans", counts.odometry, counts.scans),
     ];
+    lines.extend(counts.poses_written.map(|n| match n {
+        0 => "written      no pose: the robot's pose on the map was never known".to_owned(),
+        n => format!("written      {n} fused poses"),
+    }));
     lines.extend(
         counts.cut_off_at.map(|at| format!("cut off      the file ends inside a record at byte {at}")),
     );
@@ -88,7 +92,7 @@ mod tests {
             before.add(&robot, &camera, &answer);
         }
         let comparison = Some(before.compare(&now));
-        let counts = Counts { frames: 22, cut_off_at: Some(7), ..Counts::default() };
+        let counts = Counts { frames: 22, cut_off_at: Some(7), poses_written: Some(3), ..Counts::default() };
         let input =
             |input: &str, refused| RobotInput { input: input.into(), refused, ..RobotInput::default() };
         let inputs = vec![input("odometry", 0), input("scan", 12)];
@@ -98,7 +102,10 @@ mod tests {
             text.contains("not answered now     22\n") && text.ends_with("and 2 more: --json lists all"),
             "{text}"
         );
-        assert!(text.contains("ends inside a record at byte 7"), "{text}");
+        assert!(
+            text.contains("ends inside a record at byte 7") && text.contains("3 fused poses\n"),
+            "{text}"
+        );
         assert!(
             text.contains("\nscan         0 used, 12 refused\n") && !text.contains("odometry     0"),
             "{text}"

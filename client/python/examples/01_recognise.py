@@ -7,8 +7,10 @@ python 01_recognise.py --robot r1 photo1.jpg photo2.jpg
 from __future__ import annotations
 
 import argparse
+import sys
+from pathlib import Path
 
-from waymark import Image, Robot, named_landmarks, quad_corners
+from waymark import Image, Robot, WaymarkError, named_landmarks, quad_corners
 
 
 def main() -> None:
@@ -32,4 +34,9 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except (WaymarkError, OSError) as error:
+        sys.exit(f"{Path(sys.argv[0]).name}: {error}")
+    except KeyboardInterrupt:
+        sys.exit(130)

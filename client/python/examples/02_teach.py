@@ -11,9 +11,10 @@ from __future__ import annotations
 
 import argparse
 import re
+import sys
 from pathlib import Path
 
-from waymark import MapClient, Refused, Region, Size, named_landmarks
+from waymark import MapClient, Refused, Region, Size, WaymarkError, named_landmarks
 
 
 def main() -> None:
@@ -58,4 +59,9 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except (WaymarkError, OSError) as error:
+        sys.exit(f"{Path(sys.argv[0]).name}: {error}")
+    except KeyboardInterrupt:
+        sys.exit(130)

@@ -4,7 +4,7 @@ python 03_camera_loop.py --robot r1 --folder pictures/           # a folder of p
 python 03_camera_loop.py --robot r1 --device 0 --jpeg            # needs: pip install opencv-python
 
 The landmarks of the map need a size and a place (04_localise.py). A camera whose calibration is known gives better
-poses than `--view-deg` does: fill `Intrinsics` with it.
+poses than `--view-deg` does: give its file as `--camera`.
 """
 
 from __future__ import annotations
@@ -12,12 +12,13 @@ from __future__ import annotations
 import argparse
 import importlib
 import math
+import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from waymark import Capture, Image, Intrinsics, Pose3, Robot
+from waymark import Capture, Image, Intrinsics, Pose3, Robot, WaymarkError
 
 
 def from_folder(folder: Path) -> Iterator[Image]:
@@ -46,16 +47,18 @@ def main() -> None:
     source.add_argument("--folder", type=Path, help="pictures as camera")
     source.add_argument("--device", type=int, help="number of a camera, by OpenCV")
     parser.add_argument("--view-deg", type=float, default=60.0, help="angle from the left to the right border")
+    parser.add_argument("--camera", type=Path, help="file of `waymark camera calibrate --json`, or ost.yaml of ROS")
     parser.add_argument("--camera-height", type=float, default=1.2, help="over the floor, in metres")
     parser.add_argument("--jpeg", action="store_true", help="compress raw frames: for a slow network")
     arguments = parser.parse_args()
 
     frames = from_folder(arguments.folder) if arguments.folder else from_device(arguments.device)
+    known = Intrinsics.from_file(arguments.camera) if arguments.camera else None
     mounting = Pose3.mounting(0.0, 0.0, arguments.camera_height)
     with Robot.connect(arguments.robot, endpoint=arguments.endpoint) as robot:
         for image in frames:
             captured_ns = time.time_ns()
-            camera = Intrinsics.from_view(image.width_px, image.height_px, math.radians(arguments.view_deg))
+            camera = known or Intrinsics.from_view(image.width_px, image.height_px, math.radians(arguments.view_deg))
             sent = image.jpeg() if arguments.jpeg else image
             capture = Capture(sent, camera, mounting, captured_ns=captured_ns, deadline_ms=5000)
             # One frame at a time; with `publish_frame` and `answers()` the camera need not wait.
@@ -74,4 +77,9 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except (WaymarkError, OSError) as error:
+        sys.exit(f"{Path(sys.argv[0]).name}: {error}")
+    except KeyboardInterrupt:
+        sys.exit(130)

@@ -4,7 +4,8 @@ python 04_localise.py --map hall --landmark poster --place 5.0 0.0 1.5 90 --robo
 
 `--place` is the centre of the landmark on the map (x, y, height over the floor, in metres) and the direction in which
 it faces, in degrees from the map's x axis. A line of the drive is a picture, as a path beside the file, and the
-odometry at its capture: `picture,x_m,y_m,theta_rad`.
+odometry at its capture: `picture,x_m,y_m,theta_rad`. The first line may be these words; `drive.csv` beside this program
+is a sample.
 """
 
 from __future__ import annotations
@@ -12,10 +13,29 @@ from __future__ import annotations
 import argparse
 import csv
 import math
+import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
-from waymark import Capture, Image, Intrinsics, MapClient, Place, Pose2, Pose3, Robot
+from waymark import Capture, Image, Intrinsics, InvalidInput, MapClient, Place, Pose2, Pose3, Robot, WaymarkError
+
+HEADER = ["picture", "x_m", "y_m", "theta_rad"]
+
+
+def steps(drive: Path) -> Iterator[tuple[Path, Pose2]]:
+    """Each picture of a drive with the odometry at its capture."""
+    for number, line in enumerate(csv.reader(drive.read_text(encoding="utf-8-sig").splitlines()), 1):
+        words = [word.strip() for word in line]
+        if not any(words) or (number == 1 and words == HEADER):
+            continue
+        try:
+            picture, x_m, y_m, theta_rad = words
+            yield drive.parent / picture, Pose2(float(x_m), float(y_m), float(theta_rad))
+        except ValueError:
+            raise InvalidInput(
+                f"line {number} of {drive} is not {','.join(HEADER)}: {','.join(line)}", field="drive"
+            ) from None
 
 
 def main() -> None:
@@ -41,9 +61,8 @@ def main() -> None:
 
     mounting = Pose3.mounting(0.0, 0.0, arguments.camera_height)
     with Robot.connect(arguments.robot, endpoint=arguments.endpoint) as robot, robot.poses() as poses:
-        for line in csv.reader(arguments.drive.read_text().splitlines()):
-            image = Image.file(arguments.drive.parent / line[0])
-            odometry = Pose2(*map(float, line[1:]))
+        for picture, odometry in steps(arguments.drive):
+            image = Image.file(picture)
             centre = ((image.width_px - 1) / 2, (image.height_px - 1) / 2)
             camera = Intrinsics(arguments.focal, arguments.focal, *centre)
             # One clock stamps all messages of a robot, at capture.
@@ -56,14 +75,19 @@ def main() -> None:
             while (newer := poses.get(0.1)) is not None:
                 newest = newer
             if newest is None or newest.map_from_robot is None:
-                print(f"{line[0]}: the pose is unknown")
+                print(f"{picture.name}: the pose is unknown")
                 continue
             pose = newest.map_from_robot.pose
             print(
-                f"{line[0]}: x {pose.x_m:.2f} m, y {pose.y_m:.2f} m, {math.degrees(pose.theta_rad):.0f} degrees, "
+                f"{picture.name}: x {pose.x_m:.2f} m, y {pose.y_m:.2f} m, {math.degrees(pose.theta_rad):.0f} degrees, "
                 f"{newest.trust}, by {' and '.join(newest.modalities)}"
             )
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except (WaymarkError, OSError) as error:
+        sys.exit(f"{Path(sys.argv[0]).name}: {error}")
+    except KeyboardInterrupt:
+        sys.exit(130)

@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import argparse
 import asyncio
+import sys
+from pathlib import Path
 
-from waymark import AsyncMapClient, named_landmarks
+from waymark import AsyncMapClient, WaymarkError, named_landmarks
 from waymark.api import LiveAnswer, LiveEvent, LiveMapChange, LiveMissed, LivePose, LivePresence
 
 
@@ -50,4 +52,9 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except (WaymarkError, OSError) as error:
+        sys.exit(f"{Path(sys.argv[0]).name}: {error}")
+    except KeyboardInterrupt:
+        sys.exit(130)

@@ -3,6 +3,7 @@ iteration and by callback; what is wrong is an error with a code."""
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import subprocess
 import sys
@@ -81,6 +82,65 @@ def test_frames_of_every_encoding_are_recognised(server: Server, taught: str) ->
     assert all(quads == same[0] for quads in same)
     found = np.array(quad_corners(named_landmarks(answers["rgb8"])[0].quad))
     assert np.abs(found - np.array(pictures.corners_px(pictures.front(2.2)))).max() < 2.0
+
+
+def test_a_frame_over_the_limit_is_refused_at_once(server: Server, taught: str) -> None:
+    raw = Image.bgr(bytes(1920 * 1200 * 3), (1920, 1200))
+    with connect(server, taught) as robot, server.maps() as maps:
+        begun = time.monotonic()
+        with pytest.raises(Refused) as refused:
+            robot.recognise("wide", raw, wait_s=SOON_S).accepted()
+        assert time.monotonic() - begun < SOON_S / 3
+        assert (refused.value.code, refused.value.field) == ("too_large", "image")
+        assert "6912000" in str(refused.value) and "limits.frame_bytes" in str(refused.value)
+        with pytest.raises(Refused) as asked:
+            robot.localise(capture(raw), wait_s=SOON_S)
+        assert (asked.value.code, asked.value.field) == ("too_large", "frame.image")
+        # The page of the robot counts it, too.
+        activity = maps.robot(taught).activity
+        assert activity is not None
+        reasons = [reason.code for each in activity.inputs for reason in each.reasons]
+        assert "too_large" in reasons, activity
+        # Whatever fits is sent whole.
+        answer = robot.recognise("wide", Image.bgr(bytes(1280 * 1024 * 3), (1280, 1024)), wait_s=SOON_S)
+        assert answer.accepted().status == "no_match"
+
+
+def test_a_camera_of_another_scale_gives_the_same_pose(server: Server, taught: str) -> None:
+    half = dataclasses.replace(
+        pictures.CAMERA, fx_px=250.0, fy_px=250.0, cx_px=159.5, cy_px=119.5, width_px=320, height_px=240
+    )
+    image = Image.rgb(pictures.seen_from(pictures.front(2.0)))
+    with connect(server, taught) as robot:
+        answers = [
+            robot.recognise("front", dataclasses.replace(capture(image), intrinsics=camera), wait_s=SOON_S)
+            for camera in (pictures.CAMERA, half, dataclasses.replace(half, height_px=200))
+        ]
+    first, scaled = (answer.map_from_robot for answer in answers[:2])
+    assert first is not None and scaled is not None
+    assert math.hypot(first.pose.x_m - scaled.pose.x_m, first.pose.y_m - scaled.pose.y_m) < 0.01
+    rejection = answers[2].rejection
+    assert rejection is not None and (rejection.code, rejection.field) == ("size_mismatch", "intrinsics.width_px")
+
+
+def test_pictures_of_pillow_are_taken_wherever_a_picture_is(server: Server, taught: str) -> None:
+    from PIL import Image as Pillow
+
+    picture = Pillow.fromarray(pictures.seen_from(pictures.front(2.0)))
+    with connect(server, taught) as robot, server.maps() as maps:
+        assert recognised(robot.recognise("front", picture, wait_s=SOON_S)) == ["poster-0"]
+        of_capture = Capture(picture, pictures.CAMERA, MOUNTING, deadline_ms=60_000)
+        assert robot.recognise("front", of_capture, wait_s=SOON_S).accepted().map_from_robot is not None
+        assert robot.localise(of_capture, wait_s=SOON_S).status == "located"
+        assert recognised(maps.recognise(taught, picture)) == ["poster-0"]
+
+
+def test_an_address_without_a_server_names_no_builder(server: Server) -> None:
+    with pytest.raises(Unreachable) as refused:
+        Robot.connect("r1", endpoint="tcp/127.0.0.1:1", timeout_s=0.5)
+    text = str(refused.value)
+    assert ".rs" not in text and "cargo" not in text and "tcp/127.0.0.1:1" in text, text
+    assert text.startswith("unreachable") and "waymark serve" in text
 
 
 def test_a_frame_gives_the_pose_of_the_robot(server: Server, taught: str) -> None:

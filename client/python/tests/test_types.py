@@ -20,13 +20,14 @@ from conftest import Server
 import waymark
 from waymark import Capture, Image, Intrinsics, InvalidInput, Pose2, Pose2Covariance, Pose3, Unexpected, api, wire
 from waymark._events import EventParser, live_event
-from waymark._messages import frame_bytes
+from waymark._messages import frame_bytes, prepared
 from waymark._values import MismatchError, fill, from_json, from_message, given, to_json
+from waymark.image import as_image
 from waymark.v1 import waymark_pb2 as pb
 
 PACKAGE = Path(waymark.__file__).parent
 # Messages that the client makes itself, of captures and of `Quads`.
-MADE_HERE = {"Frame", "Odometry", "Scan", "Quads", "FoundQuad", "Border", "Patch", "LocaliseRequest"}
+MADE_HERE = {"Frame", "Odometry", "Scan", "Quads", "FoundQuad", "Border", "Patch", "LocaliseRequest", "Hello"}
 # Replies with the type of the same answer over HTTP.
 OF_THE_API = {"LocaliseReply", "LocaliseHypothesis"}
 # Dataclasses of the API whose type in the OpenAPI document is not described, or has another name or form.
@@ -162,13 +163,13 @@ def test_a_frame_is_the_message_of_the_wire() -> None:
         deadline_ms=5,
         map="hall",
     )
-    frame = pb.Frame.FromString(frame_bytes(capture, 9, 300))
+    frame = pb.Frame.FromString(frame_bytes(prepared(capture), 9, 300))
     assert (frame.epoch, frame.seq, frame.captured_ns, frame.deadline_ms, frame.map) == (9, 300, 17, 5, "hall")
     assert (frame.encoding, frame.width_px, frame.height_px) == (pb.IMAGE_ENCODING_BGR8, 3, 2)
     assert frame.image == pixels.tobytes() and list(frame.intrinsics.plumb_bob)[4] == 0.3
     assert frame.HasField("odometry") and not frame.HasField("prior")
     # A length of more than one byte.
-    long = pb.Frame.FromString(frame_bytes(Image.gray(bytes(300 * 400), (400, 300)), 9, 300))
+    long = pb.Frame.FromString(frame_bytes(prepared(Image.gray(bytes(300 * 400), (400, 300))), 9, 300))
     assert len(long.image) == 120_000 and long.captured_ns > 0
 
 
@@ -184,6 +185,41 @@ def test_a_camera_looks_where_its_mounting_says() -> None:
     assert looks(rolled) == pytest.approx(looks(Pose3.mounting(0, 0, 1, pan_rad=0.3, tilt_rad=0.2)))
     camera = Intrinsics.from_view(640, 480, math.pi / 2)
     assert camera.fx_px == pytest.approx(320.0) and (camera.cx_px, camera.cy_px) == (319.5, 239.5)
+
+
+def test_poses_are_matrices_and_have_a_yaw() -> None:
+    looks = Pose3.mounting(0.1, 0.2, 1.2, pan_rad=0.3, tilt_rad=-0.2, roll_rad=2.5)
+    for pose in (looks, Pose3(), Pose3.from_yaw(1.0, 2.0, 0.0, 3.0), Pose3(qx=1.0, qw=0.0), Pose3(qz=1.0, qw=0.0)):
+        matrix = np.array(pose.matrix())
+        assert matrix.shape == (4, 4) and np.allclose(matrix[:3, :3] @ matrix[:3, :3].T, np.eye(3))
+        back = Pose3.from_matrix(matrix)
+        assert np.allclose(back.matrix(), matrix) and np.allclose(Pose3.from_matrix(pose.matrix()).matrix(), matrix)
+    assert Pose3.from_yaw(1.0, 2.0, 0.0, 3.0).yaw_rad == pytest.approx(3.0)
+    assert Pose3.mounting(0, 0, 1, pan_rad=0.3, tilt_rad=0.2).looks_rad == pytest.approx(0.3)
+    flat = Pose2(1.0, 2.0, 7.0)
+    assert flat.yaw_rad == pytest.approx(7.0 - 2 * math.pi)
+    assert np.array(flat.matrix()) @ (0.0, 0.0, 1.0) == pytest.approx((1.0, 2.0, 1.0))
+    assert Pose2.from_matrix(flat.matrix()).yaw_rad == pytest.approx(flat.yaw_rad)
+    mirrored = np.diag((1.0, 1.0, -1.0, 1.0))
+    of3, of2 = Pose3.from_matrix, Pose2.from_matrix
+    make: Any
+    for make, wrong in ((of3, mirrored), (of3, np.eye(3)), (of2, 2 * np.eye(3))):
+        with pytest.raises(InvalidInput) as refused:
+            make(wrong)
+        assert (refused.value.code, refused.value.field) == ("out_of_range", "matrix")
+
+
+def test_clients_show_their_server_and_no_secret() -> None:
+    with waymark.MapClient("http://127.0.0.1:1/", token="secret") as maps:
+        assert repr(maps) == "MapClient('http://127.0.0.1:1')"
+
+
+def test_errors_say_code_field_and_advice() -> None:
+    text = str(waymark.Refused("5 bytes are more than 4", code="too_large", field="frame"))
+    assert text.startswith("too_large: frame: 5 bytes") and "limits.frame_bytes" in text
+    # A name that only a part of a word is like is said.
+    assert "map: " in str(waymark.Refused("mapping", code="exists", field="map"))
+    assert str(waymark.Refused("there is no map `x`", code="unknown_map", field="map")).count("map:") == 1
 
 
 def test_sizes_are_read_from_headers(tmp_path: Path) -> None:
@@ -212,6 +248,42 @@ def test_png_and_jpeg_show_the_same_picture() -> None:
         assert (np.asarray(Pillow.open(BytesIO(image.png().data))) == expected).all()
         lossy = np.asarray(Pillow.open(BytesIO(image.jpeg(95).data))).astype(int)
         assert np.abs(lossy - expected).mean() < 4
+
+
+def test_pictures_of_pillow_are_sent_as_they_look() -> None:
+    from PIL import Image as Pillow
+
+    rgb = pictures.poster(2)
+    picture = Pillow.fromarray(rgb)
+    for image in (Image.pillow(picture), Image.rgb(picture), as_image(picture), as_image(Capture(picture).image)):
+        assert (image.encoding, image.width_px, image.height_px) == ("rgb8", 480, 360)
+        assert image.data == rgb.tobytes()
+    gray = picture.convert("L")
+    assert Image.pillow(gray) == Image.gray(gray) and Image.pillow(gray).encoding == "gray8"
+    assert Image.gray(picture).data == gray.tobytes()
+    # A half of it is transparent, over black.
+    clear = np.dstack((np.zeros_like(rgb), np.repeat([[0], [255]], 180, axis=0).repeat(480, axis=1).astype(np.uint8)))
+    shown = np.frombuffer(Image.pillow(Pillow.fromarray(clear)).data, np.uint8).reshape(360, 480, 3)
+    assert (shown[:180] == 255).all() and (shown[180:] == 0).all()
+    # What a camera that was held upright wrote: every orientation of EXIF.
+    for orientation in range(1, 9):
+        raw = Pillow.fromarray(rgb)
+        stored = {2: 0, 3: 3, 4: 1, 5: 5, 6: 2, 7: 6, 8: 4}.get(orientation)
+        raw = raw if stored is None else raw.transpose(Pillow.Transpose(stored))
+        raw.getexif()[0x0112] = orientation
+        assert Image.pillow(raw).data == rgb.tobytes(), orientation
+    palette = picture.convert("P")
+    assert Image.pillow(palette).data == palette.convert("RGB").tobytes()
+    with pytest.raises(InvalidInput) as wide:
+        Image.pillow(Pillow.fromarray(np.zeros((3, 4), np.uint16)))
+    assert wide.value.code == "bad_image" and "I;16" in str(wide.value)
+    nothing: Any
+    for nothing in (rgb, None, 3):
+        with pytest.raises(InvalidInput) as refused:
+            as_image(nothing)
+        assert refused.value.code == "bad_image"
+    with pytest.raises(InvalidInput):
+        Image.rgb(nothing)
 
 
 def test_arrays_of_other_shapes_are_refused() -> None:

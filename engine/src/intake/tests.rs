@@ -141,9 +141,22 @@ fn messages_at_the_bound() {
     let mut intake = intake();
     let message = frame(1).encode_to_vec();
     intake.frame_bytes = message.len() - 1;
-    assert_eq!(refusal(&intake, "r1", message.clone()).0, "too_large");
+    let refused = intake.receive(key("r1"), message.clone().into()).unwrap_err();
+    assert_eq!(refused.rejection.as_ref().map(|r| r.code.as_str()), Some("too_large"));
+    assert_eq!((refused.epoch, refused.seq), (frame(1).epoch, 1), "the sender knows its frame again");
     intake.frame_bytes = message.len();
     assert!(intake.receive(key("r1"), message.into()).is_ok());
+}
+
+#[test]
+fn an_image_that_was_not_sent_is_refused_as_too_large() {
+    let intake = intake();
+    let withheld = v1::Frame { image: Vec::new().into(), withheld_bytes: 6_912_000, ..frame(1) };
+    let refused = intake.receive(key("r1"), withheld.encode_to_vec().into()).unwrap_err();
+    let rejection = refused.rejection.clone().unwrap();
+    assert_eq!((rejection.code.as_str(), rejection.field.as_str()), ("too_large", "image"));
+    assert!(rejection.detail.contains("6912000") && rejection.detail.contains("limits.frame_bytes"));
+    assert_eq!(refused.seq, 1);
 }
 
 #[test]

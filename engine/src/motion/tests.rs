@@ -108,6 +108,10 @@ fn scans_are_checked_and_counted() {
     motion.scan_of(&r1, v1::Scan { max_range_m: -1.0, ..scan }.encode_to_vec().into());
     let (_, scans) = motion.counts();
     assert_eq!((scans.accepted, scans.rejected), (1, BTreeMap::from([(Code::OutOfRange, 1)])));
+    // What is not answered is told by the robot's page.
+    let told = motion.live.activity(&r1, time(2.0)).unwrap().inputs;
+    let scans = told.iter().find(|told| told.input == Input::Scan).unwrap();
+    assert_eq!((scans.used, scans.refused, scans.reasons[0].code.as_str()), (1, 1, "out_of_range"));
 }
 
 fn front() -> Name {

@@ -112,7 +112,9 @@ impl CheckedFrame {
             let detail = format!("{} ms is more than {MAX_DEADLINE_MS}", frame.deadline_ms);
             return Err(Rejection::new(Code::OutOfRange, "deadline_ms", detail));
         }
-        let camera = frame.intrinsics.as_ref().map(geometry::intrinsics).transpose();
+        let picture = [frame.width_px as usize, frame.height_px as usize];
+        let camera =
+            frame.intrinsics.as_ref().map(|wire| geometry::intrinsics_of_picture(wire, picture)).transpose();
         let mounting = frame.robot_from_camera.as_ref().map(geometry::mounting).transpose();
         let odometry = frame.odometry.as_ref().map(geometry::pose2).transpose();
         let prior = frame.prior.as_ref().map(geometry::pose2_covariance).transpose();
@@ -137,6 +139,14 @@ impl TryFrom<v1::Frame> for CheckedFrame {
     type Error = Rejection;
 
     fn try_from(frame: v1::Frame) -> Result<Self, Rejection> {
+        if frame.withheld_bytes > 0 {
+            let detail = format!(
+                "an image of {} bytes was not sent: a message with it is larger than the server takes \
+                 (limits.frame_bytes)",
+                frame.withheld_bytes
+            );
+            return Err(Rejection::new(Code::TooLarge, "image", detail));
+        }
         let size = (frame.width_px, frame.height_px);
         let pixels = Pixels::Image(encoded_image(frame.encoding, size, frame.image.clone())?);
         Self::with_pixels(&frame, pixels)

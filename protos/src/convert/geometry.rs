@@ -148,6 +148,23 @@ pub fn intrinsics(wire: &v1::Intrinsics) -> Result<Intrinsics, Rejection> {
     })
 }
 
+/// Checked intrinsics of an image of this width and height, px: those that state another scale are scaled. Errors:
+/// `size_mismatch` with the field `width_px` for other proportions; half a stated size.
+pub fn intrinsics_of_picture(wire: &v1::Intrinsics, picture: [usize; 2]) -> Result<Intrinsics, Rejection> {
+    let camera = intrinsics(wire)?;
+    let stated = match (wire.width_px, wire.height_px) {
+        (None, None) => return Ok(camera),
+        (Some(width @ 1..), Some(height @ 1..)) => [width as usize, height as usize],
+        (width, _) => {
+            let field = if matches!(width, None | Some(0)) { "width_px" } else { "height_px" };
+            let detail = "width_px and height_px are those of one picture: both from 1, or neither";
+            return Err(Rejection::new(Code::OutOfRange, field, detail));
+        }
+    };
+    let scaled = camera.for_picture(Some(stated), picture);
+    scaled.map_err(|error| Rejection::new(Code::SizeMismatch, "width_px", error.to_string()))
+}
+
 /// The lens of a camera and the field that gives it. At most one may be given.
 fn lens(wire: &v1::Intrinsics) -> Result<(Distortion, &'static str), Rejection> {
     let counted = |field: &str, wanted: usize, given: usize| {
@@ -216,6 +233,24 @@ mod tests {
             center_sigma_px: Some(0.0),
             ..v1::Intrinsics::default()
         }
+    }
+
+    #[test]
+    fn intrinsics_of_another_size_are_scaled_or_refused() {
+        let of = |width_px, height_px, picture| {
+            let stated = v1::Intrinsics { width_px, height_px, ..camera() };
+            intrinsics_of_picture(&stated, picture).map(|k| k.fx_px).map_err(|r| (r.code, r.field))
+        };
+        assert_eq!(of(None, None, [1280, 960]), Ok(700.0));
+        assert_eq!(of(Some(640), Some(480), [640, 480]), Ok(700.0));
+        assert_eq!(of(Some(640), Some(480), [1280, 960]), Ok(1400.0));
+        let mismatch = Err((Code::SizeMismatch, "width_px".to_owned()));
+        assert_eq!(of(Some(640), Some(480), [480, 640]), mismatch);
+        assert_eq!(of(Some(640), Some(480), [640, 360]), mismatch);
+        let half = |field: &str| Err((Code::OutOfRange, field.to_owned()));
+        assert_eq!(of(Some(640), None, [640, 480]), half("height_px"));
+        assert_eq!(of(None, Some(480), [640, 480]), half("width_px"));
+        assert_eq!(of(Some(0), Some(480), [640, 480]), half("width_px"));
     }
 
     #[test]

@@ -147,7 +147,8 @@ fn take(
     let own = to.intake.robot_map(robot)?;
     let bytes = query.payload().map(|payload| payload.to_bytes()).unwrap_or_default();
     if bytes.len() > to.intake.frame_bytes {
-        let detail = format!("{} bytes are more than {}", bytes.len(), to.intake.frame_bytes);
+        let detail =
+            format!("{} bytes are more than {} (limits.frame_bytes)", bytes.len(), to.intake.frame_bytes);
         return Err(Rejection::new(Code::TooLarge, "message", detail));
     }
     let request = v1::LocaliseRequest::decode(&*bytes)

@@ -77,6 +77,31 @@ impl Running {
     }
 }
 
+/// Raw colour of 1920 x 1200 px has 6.9 MB: more than the router takes of a message.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_frame_over_the_limit_is_refused_at_once_and_counted() {
+    let running = running(scene::engine(&[Arc::new(MapSnapshot::empty("hall", 3))]), 1).await;
+    let robot = running.robot("r1").await;
+    let limit = crate::config::Limits::default().frame_bytes;
+    for rows in [1200, limit as u32 / 5760 + 1] {
+        let pixels = vec![7; 5760 * rows as usize];
+        let capture = Capture::raw(v1::ImageEncoding::Bgr8, (1920, rows), pixels).unwrap();
+        let begun = std::time::Instant::now();
+        let answer = robot.recognise("front", capture, WAIT).await.unwrap();
+        let rejection = answer.rejection.unwrap();
+        assert_eq!((rejection.code.as_str(), rejection.field.as_str()), ("too_large", "image"));
+        assert!(rejection.detail.contains("limits.frame_bytes"), "{}", rejection.detail);
+        assert!(begun.elapsed() < Duration::from_secs(5), "{:?}", begun.elapsed());
+    }
+    let name = Name::new("r1").unwrap();
+    let activity = running.engine.live.activity(&name, std::time::Instant::now());
+    assert!(format!("{activity:?}").contains("too_large"), "{activity:?}");
+    let within = Capture::raw(v1::ImageEncoding::Bgr8, (1280, 1024), vec![7; 3_932_160]).unwrap();
+    assert_eq!(robot.recognise("front", within, WAIT).await.unwrap().status(), v1::Status::NoMatch);
+    robot.close().await.unwrap();
+    running.stop().await;
+}
+
 fn plain() -> Capture {
     Capture::gray(&GrayImage::from_fn(64, 48, |u, _| u as u8))
 }

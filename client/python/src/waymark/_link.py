@@ -19,9 +19,9 @@ from typing import Any, Generic, TypeVar
 import zenoh
 from google.protobuf.message import DecodeError, Message
 
-from waymark._messages import frame_message, localise_request, localise_result
+from waymark._messages import HEAD_BYTES, Sent, frame_message, localise_request, localise_result, prepared
 from waymark._servers import Servers
-from waymark._session import Delivery, open_session
+from waymark._session import Delivery, in_words, open_session
 from waymark._values import fill, from_message
 from waymark.api.localise import LocaliseResult
 from waymark.errors import InvalidInput, NoAnswer, NotAdmitted, TlsRefused, Unexpected, Unreachable
@@ -44,6 +44,8 @@ _HELLO_EVERY_S = 0.05
 _GREETED_S = (0.5, 2.0)
 # Longest wait for the present versions of maps, in seconds.
 _VERSION_WAIT_S = 10.0
+# Pixels up to here are sent without asking for the server's limit, in bytes: one batch of the transport.
+_SMALL_BYTES = 60_000
 # Liveliness tokens that a robot may have; an epoch takes the one of its remainder.
 _ALIVE_SLOTS = 16
 _NAME = re.compile(r"[a-z0-9_-]{1,64}")
@@ -128,6 +130,8 @@ class Link:
         # 53 bits, so that JSON readers with doubles keep it whole.
         self.epoch = epoch if epoch is not None else secrets.randbits(53) | 1
         self._seq = itertools.count(1)
+        # Of the largest message that the server takes, as far as it is known.
+        self._most_bytes = 0
         self._congestion = zenoh.CongestionControl.BLOCK if delivery == "every" else zenoh.CongestionControl.DROP
         self.answers: Listeners[CameraAnswer] = Listeners()
         self.poses: Listeners[RobotPose] = Listeners()
@@ -151,7 +155,7 @@ class Link:
             ]
         except zenoh.ZError as error:
             self._session.close()
-            raise Unreachable(f"zenoh could not subscribe at {endpoint}: {error}") from error
+            raise Unreachable(f"zenoh could not subscribe at {endpoint}: {in_words(error)}") from error
 
         _close_at_the_end(self)
 
@@ -256,9 +260,31 @@ class Link:
         return next(self._seq)
 
     def publish_frame(self, camera: str, frame: Capture | Quads | Picture, seq: int) -> None:
-        """Sends a frame, or the quads of one."""
-        kind, message = frame_message(frame, self.epoch, seq, self.servers.map)
+        """Sends a frame, or the quads of one. What is larger than the server takes would be dropped on the way: it is
+        sent without its image, and the answer says `too_large`."""
+        kind, message = frame_message(self._within(prepared(frame)), self.epoch, seq, self.servers.map)
         self._put(f"{self._own}/{kind}", message, zenoh.Priority.DATA_LOW, name("camera", camera))
+
+    def _within(self, sent: Sent) -> Sent:
+        """The same, or without its pixels. The server is asked where they are more than it was known to take: another
+        one, with other settings, may have taken its place."""
+        size = sent.pixel_bytes + HEAD_BYTES
+        if size <= _SMALL_BYTES or size <= self._most_bytes:
+            return sent
+        self._most_bytes = self._ask_limit()
+        return sent.withheld() if 0 < self._most_bytes < size else sent
+
+    def _ask_limit(self) -> int:
+        """The largest message that the server takes, in bytes; of several on a router the least. 0: it does not say."""
+        told = []
+        try:
+            for reply in self._session.get(f"{self._own}/rpc/hello", timeout=_HELLO_WAIT_S):
+                if reply.ok is not None:
+                    hello = pb.Hello.FromString(reply.ok.payload.to_bytes())
+                    told.append(hello.frame_bytes)
+        except (zenoh.ZError, DecodeError):
+            return 0
+        return min((each for each in told if each > 0), default=0)
 
     def publish_odometry(self, odom_from_robot: Pose2, captured_ns: int | None) -> int:
         """Sends odometry, read now or at `captured_ns`."""
@@ -283,7 +309,7 @@ class Link:
         try:
             self._session.put(key, payload, congestion_control=congestion, priority=priority, attachment=attachment)
         except zenoh.ZError as error:
-            raise Unreachable(f"zenoh could not send to {self.endpoint}: {error}") from error
+            raise Unreachable(f"zenoh could not send to {self.endpoint}: {in_words(error)}") from error
 
     def gaze(self, request: GazeRequest, wait_s: float) -> GazeAdvice:
         """Asks where to look."""
@@ -297,7 +323,8 @@ class Link:
 
     def localise(self, frame: Capture | Picture | None, scan: Scan | None, map: str, wait_s: float) -> LocaliseResult:
         """Asks where the robot is."""
-        request = localise_request(frame, scan, map or self.servers.map, wait_s)
+        sent = self._within(prepared(frame)) if frame is not None else None
+        request = localise_request(sent, scan, map or self.servers.map, wait_s)
         reply = self._ask(f"{self._own}/rpc/localise", request, pb.LocaliseReply(), wait_s)
         if reply is None:
             raise NoAnswer(f"no localisation within {wait_s} s from {self.endpoint}")
@@ -317,7 +344,7 @@ class Link:
                 reply.ParseFromString(answer.ok.payload.to_bytes())
                 return reply
         except zenoh.ZError as error:
-            raise Unreachable(f"zenoh could not ask {self.endpoint}: {error}") from error
+            raise Unreachable(f"zenoh could not ask {self.endpoint}: {in_words(error)}") from error
         except DecodeError as error:
             raise Unexpected(f"{key}: {error}") from error
         return None

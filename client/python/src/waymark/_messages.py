@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
+from dataclasses import dataclass
+
 from waymark._values import fill, from_message
 from waymark.api.localise import LocaliseHypothesisBody, LocaliseResult, LocaliseStatus
 from waymark.errors import Refused
-from waymark.image import Capture, Encoding, Picture, as_image
+from waymark.image import Capture, Encoding, Image, Picture, as_image
 from waymark.quads import FoundQuad, Quads
 from waymark.v1 import waymark_pb2 as pb
 from waymark.wire import Answer, Point, Pose2Covariance, Scan
@@ -25,31 +28,67 @@ _STATUS: dict[int, LocaliseStatus] = {
 _OPTIONAL = ("intrinsics", "robot_from_camera", "odometry", "prior")
 
 
-def frame_message(frame: Capture | Quads | Picture, epoch: int, seq: int, map: str = "") -> tuple[str, bytes]:
-    """The part of the key, and the message of a frame or of quads; on `map` unless it names one."""
+# What a message has beside its pixels, in bytes: numbers of the camera, its place, a covariance, the name of a map.
+HEAD_BYTES = 1024
+
+
+@dataclass(frozen=True, slots=True)
+class Sent:
+    """What is about to be sent of one image. `withheld_bytes`: of an image that is left out, because with it the
+    message would be larger than the server takes."""
+
+    capture: Capture | Quads
+    image: Image | None
+    withheld_bytes: int = 0
+
+    @property
+    def pixel_bytes(self) -> int:
+        """Bytes of its pixels."""
+        if self.image is not None:
+            return len(self.image.data)
+        return sum(len(quad.patch.data) for quad in self.capture.quads) if isinstance(self.capture, Quads) else 0
+
+    def withheld(self) -> Sent:
+        """The same without pixels: the server refuses it by name."""
+        return dataclasses.replace(self, withheld_bytes=self.pixel_bytes)
+
+
+def prepared(frame: Capture | Quads | Picture) -> Sent:
+    """A frame, or quads, with the image read."""
     if isinstance(frame, Quads):
-        return "quads", _quads_bytes(frame, epoch, seq, map)
-    return "frame", frame_bytes(frame, epoch, seq, map)
+        return Sent(frame, None)
+    capture = frame if isinstance(frame, Capture) else Capture(frame)
+    return Sent(capture, as_image(capture.image))
 
 
-def frame_bytes(frame: Capture | Picture, epoch: int, seq: int, map: str = "") -> bytes:
+def frame_message(sent: Sent, epoch: int, seq: int, map: str = "") -> tuple[str, bytes]:
+    """The part of the key, and the message of a frame or of quads; on `map` unless it names one."""
+    if isinstance(sent.capture, Quads) and not sent.withheld_bytes:
+        return "quads", _quads_bytes(sent.capture, epoch, seq, map)
+    return "frame", frame_bytes(sent, epoch, seq, map)
+
+
+def frame_bytes(sent: Sent, epoch: int, seq: int, map: str = "") -> bytes:
     """The `Frame` message of a frame. The image is copied once, into the message."""
-    capture = frame if isinstance(frame, Capture) else Capture(as_image(frame))
-    image = capture.image
+    capture, image = sent.capture, sent.image
     message = pb.Frame(
         epoch=epoch,
         seq=seq,
         captured_ns=capture.captured_ns,
-        encoding=_ENCODINGS[image.encoding],
-        width_px=image.width_px,
-        height_px=image.height_px,
         deadline_ms=capture.deadline_ms,
         map=capture.map or map,
+        withheld_bytes=sent.withheld_bytes,
     )
     for field in _OPTIONAL:
         value = getattr(capture, field)
         if value is not None:
             fill(getattr(message, field), value)
+    if image is None:
+        return message.SerializeToString()
+    message.encoding = _ENCODINGS[image.encoding]
+    message.width_px, message.height_px = image.width_px, image.height_px
+    if sent.withheld_bytes:
+        return message.SerializeToString()
     # Fields of a message may come in any order: `image` is appended, so that it need not go through the message.
     tag = pb.Frame.IMAGE_FIELD_NUMBER << 3 | 2
     return b"".join((message.SerializeToString(), bytes([tag]), _varint(len(image.data)), image.data))
@@ -105,11 +144,11 @@ def _found_quad(quad: FoundQuad) -> pb.FoundQuad:
     )
 
 
-def localise_request(frame: Capture | Picture | None, scan: Scan | None, map: str, wait_s: float) -> bytes:
+def localise_request(sent: Sent | None, scan: Scan | None, map: str, wait_s: float) -> bytes:
     """The `LocaliseRequest` message."""
     request = pb.LocaliseRequest(map=map, deadline_ms=max(1, min(int(wait_s * 1000), 10_000)))
-    if frame is not None:
-        request.frame.ParseFromString(frame_bytes(frame, 0, 0))
+    if sent is not None:
+        request.frame.ParseFromString(frame_bytes(sent, 0, 0))
     if scan is not None:
         fill(request.scan, scan)
     return request.SerializeToString()

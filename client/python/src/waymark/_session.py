@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import socket
 import ssl
 import threading
@@ -19,6 +20,8 @@ Delivery = Literal["latest", "every"]
 _MAX_MESSAGE_BYTES = 4 << 20
 # What a droppable message waits for room on the link, in microseconds.
 _DROP_US = 50_000
+# A place in the source of zenoh, as its errors have it.
+_SOURCE = re.compile(r"\s*\bat \S+\.rs:\d+\.?")
 # Longest wait for a connection that only shows whether something listens, in seconds.
 _PROBE_S = 0.5
 
@@ -45,11 +48,16 @@ def open_session(endpoint: str, delivery: Delivery, timeout_s: float, file: Robo
     if isinstance(opened, zenoh.Session):
         return opened
     is_late.set()
-    detail = f": {opened}" if opened is not None else f" within {timeout_s} s"
+    detail = f": {in_words(opened)}" if opened is not None else f" within {timeout_s} s"
     if file is not None and _is_turned_away(endpoint, file):
         raise NotAdmitted(f"the server at {endpoint} takes no messages of robot {file.robot} with this certificate")
     kind = TlsRefused if _listens(endpoint) else Unreachable
     raise kind(f"no session with a server at {endpoint}{detail}", field="endpoint") from opened
+
+
+def in_words(error: Exception) -> str:
+    """What zenoh says, without the places in its source: those are paths of the machine that built it."""
+    return _SOURCE.sub("", str(error)).strip()
 
 
 def _address(endpoint: str) -> tuple[str, int] | None:

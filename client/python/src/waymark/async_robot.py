@@ -122,6 +122,9 @@ class AsyncRobot:
         file = RobotFile.read(path)
         return cls(await asyncio.to_thread(Link.of_file, file, delivery, timeout_s, epoch))
 
+    def __repr__(self) -> str:
+        return f"AsyncRobot({self._link.robot!r}, endpoint={self._link.endpoint!r})"
+
     @property
     def name(self) -> str:
         """The robot's name."""

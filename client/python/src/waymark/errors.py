@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 # By code: what to do next, in the words of this package.
@@ -36,6 +37,10 @@ ADVICE: dict[str, str] = {
     "map_contested": "several servers have the map: delete or rename it on all but one",
     "robot_contested": "several servers have the robot: `Robot.enter_map`, or remove it from all but one",
     "superseded": "send the next frame of a camera when the last is answered",
+    "bad_image": "send a JPEG, a PNG, `uint8` pixels or a picture of Pillow",
+    "size_mismatch": "give the size of the pixels, or of the pictures that the camera was calibrated with",
+    "bad_camera_file": "`waymark camera calibrate --json` writes one, and so does ROS' camera_calibration (ost.yaml)",
+    "no_yaml": "pip install 'waymark-client[yaml]', or give the numbers: `Intrinsics(fx_px, fy_px, cx_px, cy_px)`",
     "no_encoder": "pip install 'waymark-client[jpeg]', or send the raw image",
     "unexpected": "are client and server of the same version?",
     "timeout": "the server is busy; ask again",
@@ -46,7 +51,7 @@ ADVICE: dict[str, str] = {
 
 
 class WaymarkError(Exception):
-    """A failure. Its text is the sentence with the advice.
+    """A failure. Its text is the code, the field at fault, the sentence, and the advice.
 
     `code` is stable and for programs; `field` names the input at fault, or is empty; `detail` is a sentence for a
     person; `status` is that of HTTP, or 0; `more` is what the server says beside, by code, such as the `quads` that
@@ -77,7 +82,8 @@ class WaymarkError(Exception):
         return ADVICE.get(self.code, "")
 
     def __str__(self) -> str:
-        where = f"{self.field}: " if self.field and self.field not in self.detail else ""
+        is_named = re.search(rf"(?<!\w){re.escape(self.field)}(?!\w)", self.detail) is not None
+        where = f"{self.field}: " if self.field and not is_named else ""
         advice = f" ({self.advice})" if self.advice else ""
         return f"{self.code}: {where}{self.detail}{advice}"
 

@@ -1,7 +1,8 @@
-"""Pictures and frames. In: files, encoded bytes, raw pixels (NumPy and OpenCV arrays or bytes). Out: what is sent.
+"""Pictures and frames. In: files, encoded bytes, raw pixels (NumPy and OpenCV arrays or bytes), pictures of Pillow.
+Out: what is sent.
 
-Arrays are taken by the buffer protocol: NumPy is not needed to send bytes. Raw pixels are copied once, when they are
-sent.
+Arrays are taken by the buffer protocol, and pictures of Pillow by their methods: neither is needed to send bytes. Raw
+pixels are copied once, when they are sent.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import zlib
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias, runtime_checkable
 
 from waymark.errors import InvalidInput
 from waymark.wire import Intrinsics, Pose2, Pose2Covariance, Pose3
@@ -31,19 +32,42 @@ class PixelArray(Protocol):
     def tobytes(self) -> bytes: ...
 
 
-Pixels: TypeAlias = "Buffer | PixelArray"
+Pixels: TypeAlias = "Buffer | PixelArray | PillowPicture"
+
+
+@runtime_checkable
+class PillowPicture(Protocol):
+    """A picture of Pillow (`PIL.Image.Image`), by what is used of it."""
+
+    @property
+    def mode(self) -> str: ...
+
+    @property
+    def size(self) -> tuple[int, int]: ...
+
+    def convert(self, mode: Any) -> Any: ...
+
+    def getexif(self) -> Any: ...
+
+    def tobytes(self) -> bytes: ...
+
 
 Encoding = Literal["jpeg", "png", "gray8", "rgb8", "bgr8"]
 
 # Bytes of a pixel by raw encoding.
 _BYTES_PER_PX = {"gray8": 1, "rgb8": 3, "bgr8": 3}
+# EXIF: the tag of the orientation, and by its value the `Transpose` of Pillow that turns the picture upright.
+_EXIF_ORIENTATION = 0x0112
+_UPRIGHT = {2: 0, 3: 3, 4: 1, 5: 5, 6: 4, 7: 6, 8: 2}
+# Modes of Pillow with more than 8 bits a pixel: which of them are used is not known.
+_WIDE_MODES = ("I", "F")
 # OpenCV's flag for the quality of a JPEG.
 _IMWRITE_JPEG_QUALITY = 1
 
 
 @dataclass(frozen=True, slots=True)
 class Image:
-    """One picture with its encoding and size. Made by `encoded`, `file`, `gray`, `rgb` or `bgr`."""
+    """One picture with its encoding and size. Made by `encoded`, `file`, `gray`, `rgb`, `bgr` or `pillow`."""
 
     encoding: Encoding
     width_px: int
@@ -72,6 +96,27 @@ class Image:
         return cls.encoded(Path(path).read_bytes())
 
     @classmethod
+    def pillow(cls, picture: PillowPicture) -> Image:
+        """A picture of Pillow, as raw pixels: grey ones as `gray8`, all others as `rgb8`. It is turned upright by its
+        EXIF, as a file is; what is transparent is white. More than 8 bits a pixel are refused."""
+        if picture.mode.split(";")[0] in _WIDE_MODES:
+            raise InvalidInput(
+                f"a picture of mode {picture.mode}: which of its bits are used is not known; scale it to 8 bits first",
+                code="bad_image",
+                field="image",
+            )
+        upright: Any = picture
+        turn = _UPRIGHT.get(picture.getexif().get(_EXIF_ORIENTATION, 1))
+        if turn is not None:
+            upright = upright.transpose(turn)
+        if "A" in upright.mode or "a" in upright.mode or "transparency" in getattr(upright, "info", {}):
+            upright = _on_white(upright.convert("RGBA"))
+        is_gray = upright.mode in ("L", "1")
+        upright = upright.convert("L" if is_gray else "RGB")
+        width_px, height_px = upright.size
+        return cls("gray8" if is_gray else "rgb8", width_px, height_px, upright.tobytes())
+
+    @classmethod
     def gray(cls, pixels: Pixels, size_px: tuple[int, int] | None = None) -> Image:
         """Grey pixels (`mono8`): an H x W array of bytes, or bytes with their width and height."""
         return cls._raw("gray8", pixels, size_px)
@@ -90,7 +135,18 @@ class Image:
     def _raw(cls, encoding: Encoding, pixels: Pixels, size_px: tuple[int, int] | None) -> Image:
         each = _BYTES_PER_PX[encoding]
         array: Any = pixels
-        view = memoryview(array)
+        if isinstance(array, PillowPicture):
+            # It says itself which colours it has.
+            picture = cls.pillow(array if each > 1 else array.convert("L"))
+            return picture if each == 1 or picture.encoding == "rgb8" else cls.pillow(array.convert("RGB"))
+        try:
+            view = memoryview(array)
+        except TypeError:
+            raise InvalidInput(
+                f"{type(array).__name__} has no pixels: bytes, an array or a picture of Pillow is expected",
+                code="bad_image",
+                field="image",
+            ) from None
         if view.format != "B":
             raise InvalidInput(
                 f"pixels of format {view.format!r}: uint8 is expected (in NumPy: `.astype(numpy.uint8)`)",
@@ -151,14 +207,25 @@ class Image:
         return Image("jpeg", self.width_px, self.height_px, data)
 
 
-Picture: TypeAlias = "Image | bytes | str | PathLike[str]"
+Picture: TypeAlias = "Image | PillowPicture | bytes | bytearray | memoryview | str | PathLike[str]"
 
 
 def as_image(picture: Picture) -> Image:
-    """An image, the bytes of a JPEG or PNG file, or the path of one."""
+    """An image, a picture of Pillow, the bytes of a JPEG or PNG file, or the path of one."""
     if isinstance(picture, Image):
         return picture
-    return Image.encoded(picture) if isinstance(picture, bytes) else Image.file(picture)
+    if isinstance(picture, bytes | bytearray | memoryview):
+        return Image.encoded(picture)
+    if isinstance(picture, str | PathLike):
+        return Image.file(picture)
+    if isinstance(picture, PillowPicture):
+        return Image.pillow(picture)
+    raise InvalidInput(
+        f"{type(picture).__name__} does not say which colours it has: `Image.bgr` takes arrays of OpenCV, `Image.rgb` "
+        "and `Image.gray` others",
+        code="bad_image",
+        field="image",
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,10 +236,10 @@ class Capture:
     `odometry` is `odom_from_robot` at capture; `prior` is what the robot believes, `map_from_robot`. `captured_ns` is
     the robot's clock at capture (ns since the Unix epoch); one clock stamps all messages of a robot. `deadline_ms`:
     no work begins later than this after receipt; 0 is the server's default. `map`: recognise against another map than
-    the robot's own.
+    the robot's own. `image` may be all that `Robot.publish_frame` takes: a picture of Pillow, a path, bytes.
     """
 
-    image: Image
+    image: Picture
     intrinsics: Intrinsics | None = None
     robot_from_camera: Pose3 | None = None
     odometry: Pose2 | None = None
@@ -180,6 +247,11 @@ class Capture:
     captured_ns: int = field(default_factory=time.time_ns)
     deadline_ms: int = 0
     map: str = ""
+
+
+def _on_white(picture: Any) -> Any:
+    pillow: Any = importlib.import_module("PIL.Image")
+    return pillow.alpha_composite(pillow.new("RGBA", picture.size, "white"), picture).convert("RGB")
 
 
 def bytes_per_px(image: Image) -> int:

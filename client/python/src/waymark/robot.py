@@ -121,6 +121,9 @@ class Robot:
         """
         return cls(Link.of_file(RobotFile.read(path), delivery, timeout_s, epoch))
 
+    def __repr__(self) -> str:
+        return f"Robot({self._link.robot!r}, endpoint={self._link.endpoint!r})"
+
     @property
     def name(self) -> str:
         """The robot's name."""
@@ -144,7 +147,8 @@ class Robot:
         return inbox._attach(self._link.server_events.add(inbox._push))
 
     def publish_frame(self, camera: str, frame: Capture | Quads | Picture) -> int:
-        """Sends a frame, or the quads of one, and returns its number, at once."""
+        """Sends a frame, or the quads of one, and returns its number, at once. One that is larger than the server takes
+        goes without its image, and its answer is refused as `too_large`."""
         seq = self._link.next_seq()
         self._link.publish_frame(camera, frame, seq)
         return seq

@@ -11,10 +11,13 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from os import PathLike
+from typing import Any, Literal
 
-from waymark.errors import Refused
+from waymark.camera_file import numbers_of_file
+from waymark.errors import InvalidInput, Refused
 
 Status = Literal["unspecified", "matched", "ambiguous", "no_match", "rejected", "expired", "overloaded", "not_ready"]
 QuadKind = Literal["unspecified", "full", "three_sided", "expected", "texture"]
@@ -50,6 +53,73 @@ class Pose3:
         qx, qy, qz, qw = _product(turned, (-0.5, 0.5, -0.5, 0.5))
         return cls(qx, qy, qz, qw, x_m, y_m, z_m)
 
+    @classmethod
+    def from_yaw(cls, x_m: float, y_m: float, z_m: float, yaw_rad: float) -> Pose3:
+        """An upright one: turned about z alone, counter-clockwise."""
+        return cls(*_about(2, yaw_rad), x_m, y_m, z_m)
+
+    @classmethod
+    def from_matrix(cls, matrix: Sequence[Sequence[float]] | Any) -> Pose3:
+        """Of a homogeneous matrix, 4 x 4 or its upper 3 rows: lists, or an array of NumPy. Raises `InvalidInput` if it
+        is no rotation with a translation."""
+        m = [[float(each) for each in row] for row in matrix]
+        _check_rigid(m, 3)
+        # The largest of the four is well conditioned.
+        traces = (m[0][0] - m[1][1] - m[2][2], m[1][1] - m[0][0] - m[2][2], m[2][2] - m[0][0] - m[1][1])
+        of = (*traces, m[0][0] + m[1][1] + m[2][2])
+        best = of.index(max(of))
+        q = math.sqrt(1 + of[best]) / 2
+        off = ((m[2][1], m[1][2]), (m[0][2], m[2][0]), (m[1][0], m[0][1]))
+        if best == 3:
+            x, y, z = ((a - b) / (4 * q) for a, b in off)
+            turn = (x, y, z, q)
+        else:
+            parts = [0.0, 0.0, 0.0, (off[best][0] - off[best][1]) / (4 * q)]
+            for axis in range(3):
+                parts[axis] = q if axis == best else (m[axis][best] + m[best][axis]) / (4 * q)
+            turn = (parts[0], parts[1], parts[2], parts[3])
+        return cls(*turn, m[0][3], m[1][3], m[2][3])
+
+    def matrix(self) -> tuple[tuple[float, ...], ...]:
+        """The homogeneous matrix, 4 rows of 4; `numpy.array` takes it."""
+        x, y, z, w = self.qx, self.qy, self.qz, self.qw
+        return (
+            (1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w), self.x_m),
+            (2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w), self.y_m),
+            (2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y), self.z_m),
+            (0.0, 0.0, 0.0, 1.0),
+        )
+
+    @property
+    def yaw_rad(self) -> float:
+        """Heading of its x axis on the floor, counter-clockwise from x: of a robot, and of a landmark, whose x axis is
+        its normal."""
+        m = self.matrix()
+        return math.atan2(m[1][0], m[0][0])
+
+    @property
+    def looks_rad(self) -> float:
+        """Heading of its z axis on the floor: where a camera looks."""
+        m = self.matrix()
+        return math.atan2(m[1][2], m[0][2])
+
+
+def _check_rigid(m: list[list[float]], size: int) -> None:
+    """Raises `InvalidInput` unless its first `size` rows are a rotation and a translation."""
+    is_rigid = len(m) >= size and all(len(row) == size + 1 for row in m)
+    if is_rigid:
+        for i in range(size):
+            for j in range(size):
+                dot = sum(m[i][k] * m[j][k] for k in range(size))
+                is_rigid &= abs(dot - (i == j)) < 1e-3
+        turn = m[0][0] * m[1][1] - m[0][1] * m[1][0]
+        if size == 3 and is_rigid:
+            turn = sum(m[2][k] * (m[0][k - 2] * m[1][k - 1] - m[0][k - 1] * m[1][k - 2]) for k in range(3))
+        is_rigid &= turn > 0
+    if not is_rigid:
+        shape = f"{size + 1} x {size + 1}"
+        raise InvalidInput(f"matrix is no {shape} rotation with a translation", code="out_of_range", field="matrix")
+
 
 def _about(axis: int, angle_rad: float) -> tuple[float, float, float, float]:
     turn = [0.0, 0.0, 0.0, math.cos(angle_rad / 2)]
@@ -77,6 +147,23 @@ class Pose2:
     x_m: float = 0.0
     y_m: float = 0.0
     theta_rad: float = 0.0
+
+    @classmethod
+    def from_matrix(cls, matrix: Sequence[Sequence[float]] | Any) -> Pose2:
+        """Of a homogeneous matrix, 3 x 3 or its upper 2 rows: lists, or an array of NumPy."""
+        m = [[float(each) for each in row] for row in matrix]
+        _check_rigid(m, 2)
+        return cls(m[0][2], m[1][2], math.atan2(m[1][0], m[0][0]))
+
+    @property
+    def yaw_rad(self) -> float:
+        """`theta_rad`, from -pi to pi."""
+        return math.atan2(math.sin(self.theta_rad), math.cos(self.theta_rad))
+
+    def matrix(self) -> tuple[tuple[float, ...], ...]:
+        """The homogeneous matrix, 3 rows of 3; `numpy.array` takes it."""
+        c, s = math.cos(self.theta_rad), math.sin(self.theta_rad)
+        return ((c, -s, self.x_m), (s, c, self.y_m), (0.0, 0.0, 1.0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,13 +198,25 @@ class Intrinsics:
     # Standard deviations, as a calibration gives them.
     focal_sigma_px: float | None = None
     center_sigma_px: float | None = None
+    # Of the pictures that it was calibrated with: an image of another scale has the intrinsics scaled, one of other
+    # proportions is refused.
+    width_px: int | None = None
+    height_px: int | None = None
+
+    @classmethod
+    def from_file(cls, path: str | PathLike[str]) -> Intrinsics:
+        """A calibrated camera, of the file that `waymark camera calibrate --json` writes, of intrinsics as JSON, or,
+        with PyYAML, of ROS' `ost.yaml` or a `camera_info` that `ros2 topic echo` printed. Raises `InvalidInput`
+        (`bad_camera_file`, `no_yaml`)."""
+        return cls(**numbers_of_file(path))
 
     @classmethod
     def from_view(cls, width_px: int, height_px: int, horizontal_rad: float) -> Intrinsics:
         """A camera without distortion that sees this angle from the left to the right border of its image. A guess
         for the first steps: a calibrated camera gives better poses."""
         focal = width_px / 2 / math.tan(horizontal_rad / 2)
-        return cls(focal, focal, (width_px - 1) / 2, (height_px - 1) / 2)
+        centre = ((width_px - 1) / 2, (height_px - 1) / 2)
+        return cls(focal, focal, *centre, width_px=width_px, height_px=height_px)
 
 
 @dataclass(frozen=True, slots=True)

@@ -61,7 +61,10 @@ async fn a_robot_has_one_question_at_a_time_and_no_larger_one_than_a_frame() {
     let rows = crate::config::Limits::default().frame_bytes / 4096 + 1;
     let large = Capture::gray(&GrayImage::from_fn(4096, rows, |_, _| 9));
     let query = LocaliseQuery::default().with_frame(large);
-    assert_eq!(refused(robot.localise(query, WAIT).await), ("too_large".to_owned(), "message".to_owned()));
+    assert_eq!(
+        refused(robot.localise(query, WAIT).await),
+        ("too_large".to_owned(), "frame.image".to_owned())
+    );
     running.stop().await;
 }
 
@@ -160,7 +163,7 @@ async fn a_robot_without_a_valid_certificate_is_refused_before_its_question_is_r
         assert_eq!(refused(robot.localise(query, WAIT).await), is("unknown_robot", "robot"));
     }
     publish(None);
-    assert_eq!(refused(robot.localise(large(), WAIT).await), is("too_large", "message"));
+    assert_eq!(refused(robot.localise(large(), WAIT).await), is("too_large", "frame.image"));
     assert_eq!(refused(robot.localise(LocaliseQuery::default(), WAIT).await), is("missing", "frame"));
     running.stop().await;
 }

@@ -62,6 +62,10 @@ class Base:
             base_url=self._base, timeout=TIMEOUT_S, trust_env=False, verify=trusted(self._base, authority)
         )
 
+    def __repr__(self) -> str:
+        # The token is a secret.
+        return f"{type(self).__name__}({self._base!r})"
+
     def with_idempotency_key(self: B, key: str) -> B:
         """The same with this key for its next creation, in place of a fresh one: a program that repeats a creation by
         itself, also after its own restart, gives the same key again. The server makes it once, and answers with

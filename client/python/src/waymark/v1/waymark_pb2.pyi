@@ -179,7 +179,7 @@ class Pose2Covariance(_message.Message):
     def __init__(self, pose: _Optional[_Union[Pose2, _Mapping]] = ..., covariance: _Optional[_Iterable[float]] = ...) -> None: ...
 
 class Intrinsics(_message.Message):
-    __slots__ = ("fx_px", "fy_px", "cx_px", "cy_px", "plumb_bob", "rational_polynomial", "equidistant", "focal_sigma_px", "center_sigma_px")
+    __slots__ = ("fx_px", "fy_px", "cx_px", "cy_px", "plumb_bob", "rational_polynomial", "equidistant", "focal_sigma_px", "center_sigma_px", "width_px", "height_px")
     FX_PX_FIELD_NUMBER: _ClassVar[int]
     FY_PX_FIELD_NUMBER: _ClassVar[int]
     CX_PX_FIELD_NUMBER: _ClassVar[int]
@@ -189,6 +189,8 @@ class Intrinsics(_message.Message):
     EQUIDISTANT_FIELD_NUMBER: _ClassVar[int]
     FOCAL_SIGMA_PX_FIELD_NUMBER: _ClassVar[int]
     CENTER_SIGMA_PX_FIELD_NUMBER: _ClassVar[int]
+    WIDTH_PX_FIELD_NUMBER: _ClassVar[int]
+    HEIGHT_PX_FIELD_NUMBER: _ClassVar[int]
     fx_px: float
     fy_px: float
     cx_px: float
@@ -198,10 +200,12 @@ class Intrinsics(_message.Message):
     equidistant: _containers.RepeatedScalarFieldContainer[float]
     focal_sigma_px: float
     center_sigma_px: float
-    def __init__(self, fx_px: _Optional[float] = ..., fy_px: _Optional[float] = ..., cx_px: _Optional[float] = ..., cy_px: _Optional[float] = ..., plumb_bob: _Optional[_Iterable[float]] = ..., rational_polynomial: _Optional[_Iterable[float]] = ..., equidistant: _Optional[_Iterable[float]] = ..., focal_sigma_px: _Optional[float] = ..., center_sigma_px: _Optional[float] = ...) -> None: ...
+    width_px: int
+    height_px: int
+    def __init__(self, fx_px: _Optional[float] = ..., fy_px: _Optional[float] = ..., cx_px: _Optional[float] = ..., cy_px: _Optional[float] = ..., plumb_bob: _Optional[_Iterable[float]] = ..., rational_polynomial: _Optional[_Iterable[float]] = ..., equidistant: _Optional[_Iterable[float]] = ..., focal_sigma_px: _Optional[float] = ..., center_sigma_px: _Optional[float] = ..., width_px: _Optional[int] = ..., height_px: _Optional[int] = ...) -> None: ...
 
 class Frame(_message.Message):
-    __slots__ = ("epoch", "seq", "captured_ns", "encoding", "width_px", "height_px", "image", "intrinsics", "robot_from_camera", "odometry", "prior", "deadline_ms", "map")
+    __slots__ = ("epoch", "seq", "captured_ns", "encoding", "width_px", "height_px", "image", "intrinsics", "robot_from_camera", "odometry", "prior", "deadline_ms", "map", "withheld_bytes")
     EPOCH_FIELD_NUMBER: _ClassVar[int]
     SEQ_FIELD_NUMBER: _ClassVar[int]
     CAPTURED_NS_FIELD_NUMBER: _ClassVar[int]
@@ -215,6 +219,7 @@ class Frame(_message.Message):
     PRIOR_FIELD_NUMBER: _ClassVar[int]
     DEADLINE_MS_FIELD_NUMBER: _ClassVar[int]
     MAP_FIELD_NUMBER: _ClassVar[int]
+    WITHHELD_BYTES_FIELD_NUMBER: _ClassVar[int]
     epoch: int
     seq: int
     captured_ns: int
@@ -228,7 +233,14 @@ class Frame(_message.Message):
     prior: Pose2Covariance
     deadline_ms: int
     map: str
-    def __init__(self, epoch: _Optional[int] = ..., seq: _Optional[int] = ..., captured_ns: _Optional[int] = ..., encoding: _Optional[_Union[ImageEncoding, str]] = ..., width_px: _Optional[int] = ..., height_px: _Optional[int] = ..., image: _Optional[bytes] = ..., intrinsics: _Optional[_Union[Intrinsics, _Mapping]] = ..., robot_from_camera: _Optional[_Union[Pose3, _Mapping]] = ..., odometry: _Optional[_Union[Pose2, _Mapping]] = ..., prior: _Optional[_Union[Pose2Covariance, _Mapping]] = ..., deadline_ms: _Optional[int] = ..., map: _Optional[str] = ...) -> None: ...
+    withheld_bytes: int
+    def __init__(self, epoch: _Optional[int] = ..., seq: _Optional[int] = ..., captured_ns: _Optional[int] = ..., encoding: _Optional[_Union[ImageEncoding, str]] = ..., width_px: _Optional[int] = ..., height_px: _Optional[int] = ..., image: _Optional[bytes] = ..., intrinsics: _Optional[_Union[Intrinsics, _Mapping]] = ..., robot_from_camera: _Optional[_Union[Pose3, _Mapping]] = ..., odometry: _Optional[_Union[Pose2, _Mapping]] = ..., prior: _Optional[_Union[Pose2Covariance, _Mapping]] = ..., deadline_ms: _Optional[int] = ..., map: _Optional[str] = ..., withheld_bytes: _Optional[int] = ...) -> None: ...
+
+class Hello(_message.Message):
+    __slots__ = ("frame_bytes",)
+    FRAME_BYTES_FIELD_NUMBER: _ClassVar[int]
+    frame_bytes: int
+    def __init__(self, frame_bytes: _Optional[int] = ...) -> None: ...
 
 class Rejection(_message.Message):
     __slots__ = ("code", "field", "detail")
