@@ -124,7 +124,8 @@ impl Intake {
         echo: &mut v1::Answer,
     ) -> Result<FrameJob, Rejection> {
         if message.len() > self.frame_bytes {
-            let detail = format!("{} bytes are more than {}", message.len(), self.frame_bytes);
+            let detail =
+                format!("{} bytes are more than {} (limits.frame_bytes)", message.len(), self.frame_bytes);
             return Err(Rejection::new(Code::TooLarge, M::FIELD, detail));
         }
         let message_bytes = message.len();
