@@ -18,6 +18,7 @@ pub(super) fn sentence(name: &str, answer: &Answer) -> String {
         lines.push("  no landmark recognised".to_owned());
     }
     lines.extend(standpoint(answer).map(|line| format!("  {line}")));
+    lines.extend(answer.pose_cautions.iter().map(|word| format!("  caution ({word}): {}", caution(word))));
     lines.join("\n")
 }
 
@@ -41,6 +42,21 @@ fn standpoint(answer: &Answer) -> Option<String> {
         sigma(2).to_degrees(),
         found.landmarks.join(", ")
     ))
+}
+
+/// What a caution of a pose means, and what to look at.
+fn caution(word: &str) -> &'static str {
+    match word {
+        "behind_wall" => {
+            "a wall of the map is between this position and a landmark; check the place, facing and size of the \
+             landmark, unless the wall is low or of glass"
+        }
+        "outside_map" => {
+            "this position is outside of the walls of the map; check the place and facing of the landmark, unless \
+             the map lacks walls there"
+        }
+        _ => "the walls of the map speak against it",
+    }
 }
 
 fn no_standpoint(refusal: &str) -> Option<&'static str> {
@@ -171,6 +187,13 @@ mod tests {
             Some(CameraPose { map_from_camera: Some(pose), covariance, landmarks: vec!["door".into()] });
         let line = "taken at 1.00, -2.00 m (+- 0.02, 0.03), 1.50 m above the floor, looking to 90 degrees (+- 1.0), by door";
         assert!(sentence("a.jpg", &answer).ends_with(line), "{}", sentence("a.jpg", &answer));
+        answer.pose_cautions = vec!["behind_wall".into(), "outside_map".into()];
+        let text = sentence("a.jpg", &answer);
+        let cautions: Vec<&str> = text.lines().filter(|l| l.starts_with("  caution (")).collect();
+        assert!(
+            matches!(cautions.as_slice(), [a, b] if a.contains("between") && b.contains("outside")),
+            "{text}"
+        );
     }
 
     #[test]

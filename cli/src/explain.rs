@@ -61,6 +61,9 @@ pub(crate) async fn explained(failure: Failure, maps: Option<&MapClient>, map: O
         "unknown_backup" => failure.advised("GET /api/v1/backups lists them."),
         "unknown_camera" => failure.advised("waymark camera list ROBOT shows the cameras."),
         "not_recording" => failure.advised("Begin a recording: waymark run start ROBOT"),
+        "aspect_differs" => failure.advised(
+            "Give the size again, width before height: --size WIDTHxHEIGHT, or waymark landmark size NAME WIDTHxHEIGHT.",
+        ),
         "exists" => failure.advised("Choose another name, or delete the other one first."),
         "changed_meanwhile" => failure.advised("Look at it again, then repeat the command if it still fits."),
         "in_progress" => failure.advised("The same request is at work: wait, then repeat it."),

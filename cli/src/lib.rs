@@ -29,6 +29,7 @@ mod recording;
 mod restore;
 mod robot;
 mod run;
+mod sample;
 pub mod scratch;
 pub mod screen;
 mod serve;
@@ -88,6 +89,12 @@ enum Command {
     /// A first drive teaches the posters, then robots drive and send frames over zenoh. Watch it at the printed
     /// address. Ends with a summary; exit status 1 if there was a false match.
     Demo(demo::Args),
+    /// Write the files that the guides name: photographs of a rendered office, a laser log, floor plans
+    ///
+    /// With them the guides can be followed without a poster, a camera or a robot. For example:
+    ///   waymark sample office
+    #[command(verbatim_doc_comment)]
+    Sample(sample::Args),
     Serve(serve::Serve),
     /// Whether a server does its work: status.
     Server(server_status::Args),
@@ -231,6 +238,7 @@ pub fn main() -> ExitCode {
     let done = |()| ExitCode::SUCCESS;
     let result = match &cli.command {
         Command::Demo(args) => run(demo::run(args)),
+        Command::Sample(args) => sample::run(args).map(done),
         Command::Serve(serve) => run(serve.clone().run()).map(done),
         Command::Server(args) => run(server_status::run(args)).map(done),
         Command::Token(args) => run(identity::token::run(args)).map(done),

@@ -4,6 +4,7 @@ use crate::camera_arg::Lens;
 use anyhow::Context as _;
 use engine::{decode::ImageLimits, picture};
 use image::{ImageDecoder as _, ImageEncoder as _};
+use protos::convert::frame::MAX_ENCODED_IMAGE_BYTES;
 use std::{
     fs::File,
     io::{Cursor, Read as _},
@@ -20,6 +21,8 @@ const PHOTOGRAPH_QUALITY: u8 = 95;
 const MAX_PHOTOGRAPH_BYTES: u64 = 256 << 20;
 /// Most pixels of a photograph that is made smaller: phones have up to 200 million.
 const MAX_PHOTOGRAPH_PX: u64 = 220_000_000;
+/// Quality of rendered photographs.
+const PHOTOGRAPH_SAMPLE_QUALITY: u8 = 92;
 /// Quality of the demo's JPEG frames: a VGA frame stays below one zenoh batch.
 const JPEG_QUALITY: u8 = 85;
 
@@ -67,15 +70,45 @@ pub fn photograph(path: &Path) -> Result<Sent, PictureError> {
     Ok(Sent { lens, ..sent.unwrap_or(Sent { bytes, shrunk: None, lens: None }) })
 }
 
+/// Reads a photograph as a robot sends it: upright, for frames are not turned by what their file states, and no larger than
+/// the largest frame. What cannot be decoded stays as it is.
+pub fn frame(path: &Path) -> Result<Sent, PictureError> {
+    let mut bytes = Vec::new();
+    File::open(path)?.take(MAX_PHOTOGRAPH_BYTES).read_to_end(&mut bytes)?;
+    let limits = ImageLimits { bytes: MAX_ENCODED_IMAGE_BYTES, ..ImageLimits::FRAME };
+    let turned = is_turned(&bytes);
+    let fitted = if turned { made(&bytes, limits) } else { fitted(&bytes, limits) };
+    Ok(fitted.unwrap_or(Sent { bytes, shrunk: None }))
+}
+
+/// Whether a file states that its picture is to be turned.
+fn is_turned(bytes: &[u8]) -> bool {
+    let decoder = image::guess_format(bytes)
+        .ok()
+        .and_then(|format| image::ImageReader::with_format(Cursor::new(bytes), format).into_decoder().ok());
+    let orientation = decoder.and_then(|mut decoder| decoder.orientation().ok());
+    orientation.is_some_and(|orientation| orientation != image::metadata::Orientation::NoTransforms)
+}
+
 /// The photograph within the limits; `None` if it is, or cannot be decoded.
 fn fitted(bytes: &[u8], limits: ImageLimits) -> Option<Sent> {
     let format = image::guess_format(bytes).ok()?;
-    let mut decoder = image::ImageReader::with_format(Cursor::new(bytes), format).into_decoder().ok()?;
-    let pixels = |[width, height]: [u32; 2]| u64::from(width) * u64::from(height);
+    let decoder = image::ImageReader::with_format(Cursor::new(bytes), format).into_decoder().ok()?;
     let (width, height) = decoder.dimensions();
-    let size = [width, height];
-    let is_large = bytes.len() > limits.bytes || pixels(size) > limits.pixels as u64;
-    if !(is_large || format == image::ImageFormat::Bmp) || pixels(size) > MAX_PHOTOGRAPH_PX {
+    let is_large = bytes.len() > limits.bytes || pixels([width, height]) > limits.pixels as u64;
+    if is_large || format == image::ImageFormat::Bmp { made(bytes, limits) } else { None }
+}
+
+fn pixels([width, height]: [u32; 2]) -> u64 {
+    u64::from(width) * u64::from(height)
+}
+
+/// A JPEG of the photograph, upright and with no more pixels than the limits say; `None` if it cannot be decoded.
+fn made(bytes: &[u8], limits: ImageLimits) -> Option<Sent> {
+    let format = image::guess_format(bytes).ok()?;
+    let mut decoder = image::ImageReader::with_format(Cursor::new(bytes), format).into_decoder().ok()?;
+    let (width, height) = decoder.dimensions();
+    if pixels([width, height]) > MAX_PHOTOGRAPH_PX {
         return None;
     }
     let orientation = decoder.orientation().unwrap_or(image::metadata::Orientation::NoTransforms);
@@ -106,10 +139,19 @@ pub fn detect_params(file: Option<&Path>) -> anyhow::Result<DetectParams> {
     serde_json::from_slice(&text).with_context(|| format!("{} holds no detection parameters", path.display()))
 }
 
+/// A grey image as JPEG, as phones compress: for photographs to learn from.
+pub fn photograph_jpeg(image: &GrayImage) -> Result<Vec<u8>, image::ImageError> {
+    encoded(image, PHOTOGRAPH_SAMPLE_QUALITY)
+}
+
 /// A grey image as JPEG.
 pub fn jpeg(image: &GrayImage) -> Result<Vec<u8>, image::ImageError> {
+    encoded(image, JPEG_QUALITY)
+}
+
+fn encoded(image: &GrayImage, quality: u8) -> Result<Vec<u8>, image::ImageError> {
     let mut out = Vec::new();
-    image::codecs::jpeg::JpegEncoder::new_with_quality(&mut out, JPEG_QUALITY).write_image(
+    image::codecs::jpeg::JpegEncoder::new_with_quality(&mut out, quality).write_image(
         image.data(),
         image.width() as u32,
         image.height() as u32,
@@ -147,6 +189,34 @@ mod tests {
         assert!(gray.at(30, 79) > gray.at(30, 0));
         std::fs::write(&path, b"\0\0\0\x18ftypheic").unwrap();
         assert!(read(&path).unwrap_err().to_string().contains("HEIC"));
+    }
+
+    #[test]
+    fn frames_are_upright_and_no_larger_than_the_largest() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("p.jpg");
+        let sent = |bytes: &[u8]| {
+            std::fs::write(&path, bytes).unwrap();
+            frame(&path).unwrap()
+        };
+        // Small, and turned: pixels of a frame are as they are seen.
+        let turned = sent(&portrait(&file(ImageFormat::Jpeg)));
+        assert_eq!((picture::upright_size(&turned.bytes), turned.shrunk), (Some([60, 80]), None));
+        assert!(!is_turned(&turned.bytes));
+        // As it is.
+        let plain = file(ImageFormat::Jpeg);
+        assert_eq!(sent(&plain), Sent { bytes: plain, shrunk: None });
+        let mut large = Cursor::new(Vec::new());
+        DynamicImage::ImageLuma8(image::GrayImage::new(2400, 1800))
+            .write_to(&mut large, ImageFormat::Jpeg)
+            .unwrap();
+        let Sent { bytes, shrunk } = sent(&portrait(&large.into_inner()));
+        let Some([before, [width, height]]) = shrunk else { panic!("not made smaller") };
+        assert_eq!(
+            (before, picture::upright_size(&bytes)),
+            ([1800, 2400], Some([width as usize, height as usize]))
+        );
+        assert!(width * height <= protos::convert::frame::MAX_FRAME_PX && width > 1300, "{width}x{height}");
     }
 
     #[test]

@@ -9,7 +9,8 @@ use super::{
     pose_refusal::refusal_wire,
     snapshot::MapSnapshot,
 };
-use map::localise::CameraPose;
+use map::localise::{CameraPose, pose_cautions};
+use nalgebra::Point2;
 use protos::{
     convert::{
         geometry::{pose2_covariance_wire, pose3_wire},
@@ -45,7 +46,10 @@ pub fn analyse_photograph<'a>(
     let mut answer = answer(&analysis, map);
     if camera.is_some() {
         match photograph_pose(&analysis, map) {
-            Ok(pose) => answer.camera_pose = Some(camera_pose_wire(&pose, map)),
+            Ok(pose) => {
+                answer.pose_cautions = cautions_of(&pose, map);
+                answer.camera_pose = Some(camera_pose_wire(&pose, map));
+            }
             Err(reason) => reason.as_str().clone_into(&mut answer.camera_pose_refusal),
         }
     }
@@ -118,6 +122,26 @@ fn camera_pose_wire(pose: &CameraPose, map: &MapSnapshot) -> v1::CameraPose {
         covariance: pose.covariance.transpose().as_slice().to_vec(),
         landmarks: pose.landmarks.iter().map(|id| name(map, *id)).collect(),
     }
+}
+
+/// What the walls say against the pose of a photograph.
+fn cautions_of(pose: &CameraPose, map: &MapSnapshot) -> Vec<String> {
+    let at_m = pose.map_from_camera.translation.vector.xy();
+    let position_m2 = pose.covariance.fixed_view::<2, 2>(3, 3).trace();
+    cautions(&at_m.into(), position_m2.sqrt(), &pose.landmarks, map)
+}
+
+/// The words for what the walls say against a position, map frame, by these landmarks.
+pub(crate) fn cautions(
+    at_m: &Point2<f64>,
+    sigma_m: f64,
+    landmarks: &[LandmarkId],
+    map: &MapSnapshot,
+) -> Vec<String> {
+    let place = |id: &LandmarkId| map.landmarks.get(id)?.place.map(|p| Point2::new(p.x_m, p.y_m));
+    let centres: Vec<_> = landmarks.iter().filter_map(place).collect();
+    let found = pose_cautions(at_m, sigma_m, &centres, &map.walls);
+    found.into_iter().map(|caution| caution.as_str().to_owned()).collect()
 }
 
 fn name(map: &MapSnapshot, id: LandmarkId) -> String {

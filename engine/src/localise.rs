@@ -3,6 +3,7 @@
 
 use super::{
     ambiguous_observations::ambiguous_observations,
+    frame_answer::cautions,
     fixes::{NoFix, landmark_observations, robot_fixes},
     frame_analysis::{StageTimes, analyse_frame, frame_camera},
     relocalise::{RelocalisationInput, Relocalisers},
@@ -17,6 +18,7 @@ use map::{
     localise::FixResult,
     pose2::{Pose2, Pose2Covariance},
 };
+use nalgebra::Point2;
 use protos::{Name, v1};
 use vision::{
     frame::{Intrinsics, PictureRef},
@@ -117,7 +119,7 @@ pub struct Localisation {
 
 /// Localises. `stop` is asked now and then; a stopped search has the reason [`LocaliseReason::Stopped`].
 pub fn localise(input: &LocaliseInput<'_>, stop: &dyn Fn() -> bool) -> Localisation {
-    let (found, answer) = match &input.frame {
+    let (found, mut answer) = match &input.frame {
         Some(frame) => {
             let (found, answer) = by_frame(input.map, frame);
             (found, Some(answer))
@@ -148,6 +150,11 @@ pub fn localise(input: &LocaliseInput<'_>, stop: &dyn Fn() -> bool) -> Localisat
         } else {
             (!is_known).then_some(LocaliseReason::Undetermined)
         };
+        if let Some(answer) = answer.as_mut().filter(|_| reason.is_none()) {
+            let (pose, position_m2) = (&only.pose.pose, c[(0, 0)] + c[(1, 1)]);
+            let at_m = Point2::new(pose.x_m, pose.y_m);
+            answer.pose_cautions = cautions(&at_m, position_m2.sqrt(), &only.landmarks, input.map);
+        }
     } else if !hypotheses.is_empty() {
         reason = Some(LocaliseReason::Ambiguous);
     }

@@ -16,6 +16,7 @@ mod solve;
 mod refusal_causes;
 mod robot_pose;
 mod camera_pose;
+mod pose_cautions;
 pub mod intrinsics_monitor;
 
 pub use camera_pose::{CameraPose, CameraPoseRefusal, camera_pose};
@@ -23,6 +24,7 @@ pub use fix::{
     AmbiguityResolvedBy, Fix, FixRefusal, FixResult, FixSource, LandmarkObservation, Nuisance, NuisanceKey,
 };
 pub use params::LocaliseParams;
+pub use pose_cautions::{PoseCaution, pose_cautions};
 pub use refusal_causes::{FixQuantity, RefusalCause, refusal_causes};
 pub use robot_pose::{MAX_OBSERVATIONS, robot_pose};
 

@@ -503,6 +503,11 @@ pub struct Answer {
     /// The server that answers, over zenoh; empty over HTTP.
     #[prost(string, tag = "22")]
     pub server: ::prost::alloc::string::String,
+    /// What the walls of the map say against the pose of a photograph, or of a localisation by a frame: behind_wall (a wall is
+    /// between the camera and a landmark that the pose rests on), outside_map (it is outside of what the walls surround). The
+    /// pose stands all the same. Usually the place, the facing or the size of a landmark is wrong, or the map lacks walls.
+    #[prost(string, repeated, tag = "23")]
+    pub pose_cautions: ::prost::alloc::vec::Vec<::prost::alloc::string::String>,
 }
 /// robot/{robot}/odometry : odom_from_robot
 #[derive(::serde::Serialize, ::serde::Deserialize)]

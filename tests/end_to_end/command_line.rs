@@ -14,9 +14,10 @@ const SERVER: &[&str] = &["--server", "--token", "--json"];
 const MAP: &[&str] = &["--map", "--server", "--token", "--json"];
 
 /// Options that each command must name in its help, beside those of its group.
-const OPTIONS: [(&str, &[&str], &[&str]); 60] = [
+const OPTIONS: [(&str, &[&str], &[&str]); 62] = [
     ("", &[], &["--log", "--version", "Exit status"]),
     ("demo", &[], &["--robots", "--rate-hz", "--legs", "--seed", "--http", "--data", "--stay", "--json"]),
+    ("sample", &[], &["<FOLDER>"]),
     ("serve", &[], &["--config", "--data", "--http", "--zenoh", "--fleet", "--workers", "--insecure"]),
     (
         "detect",
@@ -148,6 +149,7 @@ const OPTIONS: [(&str, &[&str], &[&str]); 60] = [
     ("robot add", SERVER, &["<ROBOT>", "--map"]),
     ("robot list", SERVER, &[]),
     ("robot show", SERVER, &["<ROBOT>"]),
+    ("robot send", SERVER, &["<ROBOT>", "<PHOTO>", "--camera", "--robot-file", "--zenoh", "--fleet"]),
     ("robot access-control", SERVER, &["--server-certificate", "--robot", "--also-map", "--fleet"]),
     ("robot remove", SERVER, &["<ROBOT>", "--yes"]),
     (
@@ -259,4 +261,21 @@ fn every_command_has_a_manual_page_with_its_options() {
             assert!(is_named, "{name}.1 does not name {verb}");
         }
     }
+}
+
+#[test]
+fn the_page_of_the_command_line_names_every_verb() {
+    let page = std::fs::read_to_string(tests::documents::root().join("docs/guides/command-line.md"));
+    let page = page.expect("the page");
+    let helps = tests::command::helps(program(), LONGEST);
+    let row = |noun: &str| page.lines().find(|line| line.starts_with(&format!("| `{noun}` |")));
+    let mut missing = Vec::new();
+    for command in helps.keys().filter(|command| !command.is_empty()) {
+        let named = match command.split_once(' ') {
+            Some((noun, verb)) => row(noun).is_some_and(|row| row.contains(&format!("`{verb}`"))),
+            None => page.contains(&format!("`{command}`")),
+        };
+        missing.extend((!named).then_some(command));
+    }
+    assert!(helps.len() > 60 && missing.is_empty(), "docs/guides/command-line.md lacks {missing:?}");
 }

@@ -9,7 +9,7 @@
 //! - `cargo run -p client --example NAME` runs the example of this build; `cargo install`, `cargo test` and the demo do
 //!   nothing here.
 
-use crate::command::program;
+use crate::{command::program, guide_output::unsaid};
 use std::{
     fs,
     io::{BufRead, BufReader},
@@ -102,33 +102,17 @@ pub(crate) fn commands(body: &str) -> Vec<String> {
 pub fn run(guide: &Path, folder: &Path, after: &mut dyn FnMut(&str, &Guide)) {
     let text = fs::read_to_string(guide).expect("a guide in UTF-8");
     let mut guide_run = Guide::new(folder);
-    for block in blocks(&text) {
-        match block {
-            Block::File { name, text } => {
-                assert!(!name.contains('/'), "{}: file {name} is not in the folder", guide.display());
-                fs::write(folder.join(name), text).expect("a file of the guide");
-            }
-            Block::Elsewhere(commands) => {
-                for command in commands {
-                    let word = command.split_whitespace().next().unwrap_or_default();
-                    assert!(
-                        ELSEWHERE.contains(&word),
-                        "{}: `{command}` is not run by the test: use a block `sh`",
-                        guide.display()
-                    );
-                }
-            }
-            Block::Run { line, commands, status } => {
-                let last = commands.len().saturating_sub(1);
-                for (i, command) in commands.iter().enumerate() {
-                    let wanted = if i == last { status } else { 0 };
-                    let at = format!("{}:{line}: `{command}`", guide.display());
-                    guide_run.command(command, wanted, &at);
-                    after(command, &guide_run);
-                }
-            }
-        }
-    }
+    guide_run.read(guide, &text, after);
+}
+
+/// The same, and every line that the guide says that commands print is one that they printed.
+pub fn run_compared(guide: &Path, folder: &Path, after: &mut dyn FnMut(&str, &Guide)) {
+    let text = fs::read_to_string(guide).expect("a guide in UTF-8");
+    let mut guide_run = Guide::new(folder);
+    guide_run.read(guide, &text, after);
+    let unsaid = unsaid(&text, &guide_run.said);
+    let said = guide_run.said.join("\n");
+    assert!(unsaid.is_empty(), "{}: no command says {unsaid:#?}; they say\n{said}", guide.display());
 }
 
 /// A guide in work.
@@ -137,6 +121,41 @@ pub struct Guide {
     folder: PathBuf,
     path: String,
     server: Option<Server>,
+    /// Lines that commands printed.
+    said: Vec<String>,
+}
+
+impl Guide {
+    /// Does what a document says.
+    fn read(&mut self, guide: &Path, text: &str, after: &mut dyn FnMut(&str, &Self)) {
+        for block in blocks(text) {
+            match block {
+                Block::File { name, text } => {
+                    assert!(!name.contains('/'), "{}: file {name} is not in the folder", guide.display());
+                    fs::write(self.folder.join(name), text).expect("a file of the guide");
+                }
+                Block::Elsewhere(commands) => {
+                    for command in commands {
+                        let word = command.split_whitespace().next().unwrap_or_default();
+                        assert!(
+                            ELSEWHERE.contains(&word),
+                            "{}: `{command}` is not run by the test: use a block `sh`",
+                            guide.display()
+                        );
+                    }
+                }
+                Block::Run { line, commands, status } => {
+                    let last = commands.len().saturating_sub(1);
+                    for (i, command) in commands.iter().enumerate() {
+                        let wanted = if i == last { status } else { 0 };
+                        let at = format!("{}:{line}: `{command}`", guide.display());
+                        self.command(command, wanted, &at);
+                        after(command, self);
+                    }
+                }
+            }
+        }
+    }
 }
 
 #[derive(Debug)]
@@ -156,7 +175,12 @@ impl Drop for Server {
 
 impl Guide {
     fn new(folder: &Path) -> Self {
-        Self { folder: folder.to_owned(), path: path_with(folder, &[("cargo", CARGO)]), server: None }
+        Self {
+            folder: folder.to_owned(),
+            path: path_with(folder, &[("cargo", CARGO)]),
+            server: None,
+            said: Vec::new(),
+        }
     }
 
     /// Address of the server that the guide started.
@@ -195,6 +219,11 @@ impl Guide {
         let limited = format!("timeout {} bash -euo pipefail -c {}", LONGEST.as_secs(), quoted(command));
         let done = self.shell(&limited).output().expect("bash");
         let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+        self.said.extend(
+            [&done.stdout, &done.stderr]
+                .iter()
+                .flat_map(|bytes| text(bytes).lines().map(str::to_owned).collect::<Vec<_>>()),
+        );
         assert!(
             done.status.code() == Some(status),
             "{at} ended with {:?}, not {status}\n{}{}",

@@ -60,7 +60,7 @@ enum Verb {
     ///   waymark landmark place poster --photo p.jpg --camera 610,610,320,240 --from 2.5,3.0,45 --camera-height 1.2
     #[command(verbatim_doc_comment)]
     Place(Box<place::PlaceArgs>),
-    /// Set the width and height of a landmark.
+    /// Set the width and height of a landmark; a size whose ratio its photographs contradict is refused.
     Size {
         /// The landmark.
         landmark: String,

@@ -134,7 +134,23 @@ pub(super) fn facts(landmark: &Landmark) -> String {
             counted(model.generated_views, "generated view")
         ));
     }
+    lines.extend(aspect_text(landmark).map(|text| format!("  caution {text}")));
     lines.join("\n")
+}
+
+/// That the ratio of its sides is not that of its photographs.
+fn aspect_text(landmark: &Landmark) -> Option<String> {
+    let shown = landmark.model.as_ref()?.facts.get("aspect")?;
+    let number = |name: &str| shown.get(name).and_then(serde_json::Value::as_f64);
+    let is_doubted = matches!(shown.get("size")?.as_str()?, "doubtful" | "differs");
+    let (size, ratio, sigma) = (landmark.size?, number("measured")?, number("sigma")?);
+    is_doubted.then(|| {
+        format!(
+            "by the photographs it is {ratio:.2} +- {sigma:.2} times as wide as high, by its size {:.2}: are width and height \
+             right? More photographs, one from the front, decide",
+            size.width_m / size.height_m
+        )
+    })
 }
 
 /// How far it is trusted, and what robots found.
@@ -220,6 +236,18 @@ mod tests {
         assert!(lines.contains("flagged: not found in 6 frames in a row"), "{lines}");
         assert!(lines.ends_with("  why     It looks like `first` (97 %). Delete one."), "{lines}");
         assert!(!facts(&landmark()).contains("why"), "{lines}");
+    }
+
+    #[test]
+    fn a_size_that_photographs_doubt_is_told() {
+        let with = |agreement: &str| {
+            let aspect = serde_json::json!({ "measured": 0.9, "sigma": 0.1, "size": agreement });
+            let model =
+                serde_json::json!({ "views": 1, "generated_views": 29, "learnt_ms": 0, "aspect": aspect });
+            Landmark { model: serde_json::from_value(model).unwrap(), ..landmark() }
+        };
+        assert!(facts(&with("doubtful")).contains("0.90 +- 0.10 times as wide as high, by its size 0.71"));
+        assert!(!facts(&with("agrees")).contains("caution"));
     }
 
     #[test]

@@ -26,7 +26,8 @@ pub(super) struct TeachArgs {
     /// Photographs of it, PNG or JPEG.
     #[arg(required = true, value_name = "PHOTO")]
     photographs: Vec<PathBuf>,
-    /// Its width and height in metres, such as 0.60x0.84; without it there is recognition but no pose.
+    /// Its width and height in metres, such as 0.60x0.84; without it there is recognition but no pose. A size whose ratio
+    /// the photographs contradict, such as one with swapped sides, is refused.
     #[arg(long, value_parser = size)]
     size: Option<Size>,
     /// The whole picture is the landmark (a scan, a cut-out).
@@ -55,10 +56,21 @@ pub(super) async fn run(session: &Session, map: &str, args: &TeachArgs) -> anyho
     }
     let existing = existing(session, map, &args.landmark).await?;
     // A landmark that exists gets its size once a photograph was taken.
-    let failures = upload_all(session, map, args, args.size.filter(|_| existing.is_none())).await?;
-    if let (Some(landmark), Some(size)) = (&existing, args.size) {
-        resize(session, map, landmark, size).await?;
-    }
+    let uploaded = upload_all(session, map, args, args.size.filter(|_| existing.is_none())).await;
+    let failures = match (uploaded, existing.as_ref().zip(args.size)) {
+        // The photographs contradict the size that it has, and another one is given.
+        (Err(error), Some((landmark, size))) if contradicts(&error) && landmark.size != Some(size) => {
+            resize(session, map, landmark, size).await?;
+            upload_all(session, map, args, None).await?
+        }
+        (uploaded, sized) => {
+            let failures = uploaded?;
+            if let Some((landmark, size)) = sized {
+                resize(session, map, landmark, size).await?;
+            }
+            failures
+        }
+    };
     let learnt = learn(session, map, args).await?;
     session.show(&learnt, &show::facts(&learnt))?;
     in_use(&learnt)?;
@@ -90,6 +102,11 @@ async fn existing(session: &Session, map: &str, name: &str) -> anyhow::Result<Op
     }
 }
 
+/// Whether photographs contradict the size of their landmark.
+fn contradicts(error: &anyhow::Error) -> bool {
+    error.downcast_ref::<Failure>().is_some_and(|failure| failure.code == "aspect_differs")
+}
+
 /// A size given again replaces the other one, and says so.
 async fn resize(session: &Session, map: &str, landmark: &Landmark, size: Size) -> anyhow::Result<()> {
     if landmark.size == Some(size) {
@@ -103,7 +120,7 @@ async fn resize(session: &Session, map: &str, landmark: &Landmark, size: Size) -
 }
 
 /// Sends all photographs and gives the failures of those that could not be used. An error if none could be: then nothing
-/// was made.
+/// was made. An error that is not about one photograph, such as a size that it contradicts, ends it.
 async fn upload_all(
     session: &Session,
     map: &str,
@@ -130,15 +147,15 @@ async fn upload_all(
                     Some(UploadOutcomeBody::New) | None => {}
                 }
             }
-            Err(failure) => failures.push(failure),
+            Err(failure) if matches!(failure.class, Class::Refused | Class::Usage) => failures.push(failure),
+            Err(failure) => {
+                progress.finish_and_clear();
+                return Err(failure.into());
+            }
         }
         progress.inc(1);
     }
     progress.finish_and_clear();
-    let is_of_photograph = |f: &Failure| matches!(f.class, Class::Refused | Class::Usage);
-    if let Some(other) = failures.iter().position(|f| !is_of_photograph(f)) {
-        return Err(failures.swap_remove(other).into());
-    }
     match (used, failures.len()) {
         (0, 1) => Err(failures.swap_remove(0).into()),
         (0, _) => {

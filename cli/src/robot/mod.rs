@@ -4,6 +4,7 @@ mod access_control;
 mod certificates;
 mod enrol;
 pub(crate) mod inputs;
+mod send;
 
 use super::{
     answers::{pose_line, trust},
@@ -40,6 +41,12 @@ enum Verb {
         /// The robot.
         robot: String,
     },
+    /// Send photographs as a robot, over zenoh, and print the answers
+    ///
+    /// The same way as the frames of a driving robot. For example:
+    ///   waymark robot send r1 here.jpg --camera camera.json
+    #[command(verbatim_doc_comment)]
+    Send(Box<send::Args>),
     /// Give a robot a certificate for the encrypted listener
     ///
     /// The private key is made here and stays here: run it on the robot's machine, or bring the folder there as a secret.
@@ -104,6 +111,7 @@ async fn on_server(session: &Session, verb: &Verb, server: &str) -> anyhow::Resu
             )
         }
         Verb::Show { robot } => show(session, robot).await,
+        Verb::Send(args) => send::run(session, args).await,
         Verb::Enrol(args) => enrol::run(session, args, server).await,
         Verb::Certificates { robot } => certificates::list(session, robot).await,
         Verb::Revoke(args) => certificates::revoke(session, args).await,

@@ -199,7 +199,9 @@ fn encoded_image(encoding: i32, size: (u32, u32), bytes: Bytes) -> Result<Encode
     }
     match encoding.bytes_per_px().map(|each| each * area as usize) {
         None if length > MAX_ENCODED_IMAGE_BYTES => {
-            let detail = format!("{length} bytes are more than {MAX_ENCODED_IMAGE_BYTES}");
+            let detail = format!(
+                "{length} bytes are more than {MAX_ENCODED_IMAGE_BYTES}, the most of an encoded frame: send a JPEG, or fewer pixels"
+            );
             Err(Rejection::new(Code::TooLarge, "image", detail))
         }
         Some(expected) if length != expected => {
@@ -220,7 +222,10 @@ fn image_area((width_px, height_px): (u32, u32)) -> Result<u32, Rejection> {
     }
     let area = width_px * height_px;
     if area > MAX_FRAME_PX {
-        let detail = format!("{area} pixels are more than {MAX_FRAME_PX}");
+        let detail = format!(
+            "{area} pixels are more than {MAX_FRAME_PX}, the most of a frame: send it smaller, with intrinsics of that size \
+             (waymark robot send makes photographs smaller)"
+        );
         return Err(Rejection::new(Code::OutOfRange, "width_px", detail));
     }
     Ok(area)

@@ -5,6 +5,7 @@ use super::{
     answers::{Listed, created, page, selected},
     error::{ApiError, out_of_range},
     extract::{Body, PathParams, QueryParams, name, page_limit},
+    landmark_aspect,
     revision::{IfMatch, Revised},
 };
 use crate::{
@@ -264,14 +265,20 @@ async fn get(
 ) -> Result<Revised<Landmark>, ApiError> {
     maps::get(app.store.reads(), &map).await?;
     let row = landmarks::get(app.store.reads(), &map, &landmark).await?;
-    Ok(Revised(row.revision.clone(), shown(&app, &app.jobs.learning(&map).await?, &map, row)))
+    let by_views = landmark_aspect::shown_by_views(&app, Some(row.id), None).await?;
+    let (revision, learning) = (row.revision.clone(), app.jobs.learning(&map).await?);
+    let mut landmark = shown(&app, &learning, &map, row);
+    landmark_aspect::add_fact(&mut landmark, by_views);
+    Ok(Revised(revision, landmark))
 }
 
-/// Renames it; sets or forgets size and place; sets how far it is trusted. Everything that belongs to it follows the name.
+/// Renames it; sets or forgets size and place; sets how far it is trusted. Everything that belongs to it follows the name. A size whose
+/// ratio of sides its photographs contradict is refused.
 #[utoipa::path(patch, path = "/maps/{map}/landmarks/{landmark}", tag = "landmarks",
     params(("map" = String, Path), ("landmark" = String, Path)), request_body = LandmarkPatch,
     responses((status = 200, body = Landmark), (status = 404, body = Problem),
-    (status = 409, body = Problem, description = "exists"),
+    (status = 409, body = Problem, description = "exists; aspect_differs, with `stated`, `measured_aspect`, \
+     `aspect_sigma` and `swapped`"),
     (status = 422, body = Problem, description = "bad_name, out_of_range, invalid_value")))]
 async fn patch(
     State(app): State<AppState>,
@@ -280,6 +287,11 @@ async fn patch(
     Body(changes): Body<LandmarkPatch>,
 ) -> Result<Revised<Landmark>, ApiError> {
     let checked = geometry(changes.size.flatten(), changes.place.flatten())?;
+    if let Some(stated) = checked.size {
+        let row = landmarks::get(app.store.reads(), &map, &landmark).await?;
+        let by_views = landmark_aspect::shown_by_views(&app, Some(row.id), None).await?;
+        landmark_aspect::check(by_views, &landmark, stated)?;
+    }
     let new_name = changes.name.map(|new| name("name", new)).transpose()?;
     let (size, place) = (changes.size.is_some(), changes.place.is_some());
     let (map_name, health) = (map.clone(), changes.health.map(health));
@@ -303,8 +315,11 @@ async fn patch(
         })
     });
     let changed = write.await?;
-    let learning = app.jobs.learning(&map_name).await?;
-    Ok(Revised(changed.revision.clone(), shown(&app, &learning, &map_name, changed)))
+    let by_views = landmark_aspect::shown_by_views(&app, Some(changed.id), None).await?;
+    let (revision, learning) = (changed.revision.clone(), app.jobs.learning(&map_name).await?);
+    let mut landmark = shown(&app, &learning, &map_name, changed);
+    landmark_aspect::add_fact(&mut landmark, by_views);
+    Ok(Revised(revision, landmark))
 }
 
 /// Makes two landmarks one: this one gets the views of `from`, and the size and place that it lacks; `from` is deleted. Its

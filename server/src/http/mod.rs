@@ -24,6 +24,7 @@ mod head_timer;
 mod health;
 mod drafts;
 mod history;
+mod landmark_aspect;
 mod landmark_models;
 mod landmarks;
 mod learning;

@@ -5,6 +5,7 @@ use super::{
     answers::{created, page},
     error::ApiError,
     extract::{self, PathParams, QueryParams, number_cursor, page_limit},
+    landmark_aspect,
     landmarks::checked_size,
     pictures::{FOREVER, IfNoneMatch, PictureHead, grey_answer},
     refused_views::{self, Refused},
@@ -40,7 +41,7 @@ use vision::{
     frame::{GrayImage, Picture},
     geometry::Corners,
     icon::{Icon, IconError, icon},
-    learn::near_duplicates::NoveltyParams,
+    learn::{aspect::AspectView, near_duplicates::NoveltyParams},
     params::Params as Algorithm,
     pose::LandmarkSize,
 };
@@ -98,12 +99,14 @@ enum LandmarkRegion {
 /// none or more than one, the refusal lists what it saw. The same picture with the same corners a second time is
 /// answered with 200 and the view that is there; so is a near-duplicate of a view, which is not stored, as it would teach
 /// nothing (`outcome` says which). With `create` the landmark is made, too, if there is none of this name: nothing is made
-/// where the view is refused. A size is set where the landmark has none by hand; another one is refused.
+/// where the view is refused. A size is set where the landmark has none by hand; another one is refused, and so is one whose
+/// ratio of sides the photographs contradict.
 #[utoipa::path(post, path = "/maps/{map}/landmarks/{landmark}/views", tag = "landmarks",
     params(("map" = String, Path), ("landmark" = String, Path)),
     request_body(content = NewViewForm, content_type = "multipart/form-data"),
     responses((status = 201, body = TrainingView), (status = 200, body = TrainingView), (status = 404, body = Problem),
-    (status = 409, body = Problem, description = "too_many; size_differs, with `stored` and `given`"), (status = 413, body = Problem),
+    (status = 409, body = Problem, description = "too_many; size_differs, with `stored` and `given`; aspect_differs, \
+     with `stated`, `measured_aspect`, `aspect_sigma` and `swapped`"), (status = 413, body = Problem),
     (status = 422, body = Problem, description = "bad_image, too_large, invalid_value, too_small, outside, \
      quad_not_found, quad_ambiguous")))]
 async fn add(
@@ -142,6 +145,12 @@ async fn add(
             return Err(error);
         }
     };
+    let taught = AspectView {
+        corners_px: new.crop.corners_px,
+        size_px: new.size_px,
+        camera: capture.as_ref().and_then(StoredCapture::camera),
+    };
+    landmark_aspect::check_view(&app, &changed, size, taught).await?;
     if let (Some(capture), Some(quad)) = (&mut capture, detected) {
         capture.set_detected_corners(&quad.covariance_px2);
     }

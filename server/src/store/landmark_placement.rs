@@ -69,6 +69,11 @@ struct CheckedCapture {
     corners_px2: [Matrix2<f64>; 4],
 }
 
+/// The camera of a stored capture (JSON); `None` where it cannot be read.
+pub(super) fn camera_of(capture: &str) -> Option<Intrinsics> {
+    serde_json::from_str::<StoredCapture>(capture).ok()?.camera()
+}
+
 impl From<CaptureMetadata> for StoredCapture {
     fn from(body: CaptureMetadata) -> Self {
         Self {
@@ -106,6 +111,11 @@ impl StoredCapture {
     pub(crate) fn top_left(&self, corners_px: &Corners) -> Option<usize> {
         let taken = self.checked().ok()?;
         Up::new(taken.extrinsics.camera_up())?.top_left(corners_px, Some(&taken.camera))
+    }
+
+    /// The camera; `None` where its values are out of range.
+    pub(crate) fn camera(&self) -> Option<Intrinsics> {
+        geometry::intrinsics(&self.intrinsics).ok()
     }
 
     /// Errors: a value is out of range; the rejection names its field.

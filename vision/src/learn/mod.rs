@@ -6,6 +6,7 @@ pub(crate) mod texture;
 pub mod synthesis;
 pub mod near_duplicates;
 pub mod reference_border;
+pub mod aspect;
 pub mod pca;
 pub mod threshold;
 pub mod gates;

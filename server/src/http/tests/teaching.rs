@@ -134,6 +134,39 @@ async fn a_size_given_again_is_applied_or_refused() {
 }
 
 #[tokio::test]
+async fn a_size_that_the_photographs_contradict_is_refused_and_makes_nothing() {
+    let service = Service::start(Limits::default()).await;
+    // From the front, 120 x 168 px: 0.60 x 0.84 m, and not 0.84 x 0.60 m.
+    let corners = ("corners", "[[60,30],[180,30],[180,198],[60,198]]");
+    let swapped = [CREATE, corners, ("width_m", "0.84"), ("height_m", "0.6")];
+    let (status, problem) = service.upload("poster", blocks(1), &swapped).await;
+    assert_eq!(
+        (status, &problem["code"], &problem["field"]),
+        (409, &json!("aspect_differs"), &json!("width_m"))
+    );
+    assert_eq!(
+        (&problem["swapped"], &problem["stated"]["width_m"]),
+        (&json!(true), &json!(0.84)),
+        "{problem}"
+    );
+    let measured = problem["measured_aspect"].as_f64().unwrap();
+    let sigma = problem["aspect_sigma"].as_f64().unwrap();
+    assert!((measured - 120.0 / 168.0).abs() < 1e-6 && (0.01..0.04).contains(&sigma), "{problem}");
+    assert_eq!(service.landmark("poster").await.0, 404);
+
+    let (status, view) = service.upload("poster", blocks(1), &[CREATE, corners, SIZE[0], SIZE[1]]).await;
+    assert_eq!(status, 201, "{view}");
+    let size = |width_m: f64, height_m: f64| json!({ "size": { "width_m": width_m, "height_m": height_m } });
+    let (status, problem) = service.patch("poster", size(0.84, 0.6)).await;
+    assert_eq!((status, &problem["code"]), (409, &json!("aspect_differs")), "{problem}");
+    // Twice as large is another distance, and the same shape.
+    assert_eq!(service.patch("poster", size(1.2, 1.68)).await.0, 200);
+    // A cut-out says nothing of it.
+    let whole = [CREATE, WHOLE, ("width_m", "2"), ("height_m", "0.5")];
+    assert_eq!(service.upload("other", blocks(2), &whole).await.0, 201);
+}
+
+#[tokio::test]
 async fn what_belongs_to_a_landmark_follows_its_new_name() {
     let service = Service::start(Limits::default()).await;
     for (name, number) in [("poster", 1), ("door", 2)] {
