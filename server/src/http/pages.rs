@@ -97,6 +97,7 @@ fn media_type(path: &str) -> HeaderValue {
         Some("js") => "text/javascript; charset=utf-8",
         Some("css") => "text/css; charset=utf-8",
         Some("svg") => "image/svg+xml",
+        Some("woff2") => "font/woff2",
         Some("txt") => "text/plain; charset=utf-8",
         _ => "application/octet-stream",
     })
@@ -158,11 +159,12 @@ mod tests {
     fn every_file_that_a_page_asks_for_is_served() {
         let served: BTreeSet<String> = FILES.iter().map(|(path, ..)| format!("/{path}")).collect();
         for (page, content, _) in FILES {
-            let text = std::str::from_utf8(content).unwrap();
+            let Ok(text) = std::str::from_utf8(content) else { continue };
             let is_file = |text: &&str| {
-                text.starts_with('/') && [".js", ".css", ".svg"].iter().any(|ending| text.ends_with(ending))
+                text.starts_with('/')
+                    && [".js", ".css", ".svg", ".woff2"].iter().any(|ending| text.ends_with(ending))
             };
-            for asked in text.split('"').filter(is_file) {
+            for asked in text.split(['"', '(', ')']).filter(is_file) {
                 assert!(served.contains(asked), "{page} asks for {asked}");
             }
         }
@@ -174,7 +176,7 @@ mod tests {
         let served = answer(file, "\"a\"", &HeaderMap::new());
         assert_eq!(served.headers()[header::CONTENT_TYPE], "text/plain; charset=utf-8");
         let text = std::str::from_utf8(file.1).unwrap();
-        for package in ["ol", "svelte", "uplot"] {
+        for package in ["@fontsource-variable/inter", "@lucide/svelte", "ol", "svelte", "uplot"] {
             assert!(text.contains(&format!("\n{package} ")), "{package}");
         }
         let health = fs::read_to_string(web().join("src/pages/admin/Health.svelte")).unwrap();
