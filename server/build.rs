@@ -18,7 +18,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("cargo:rerun-if-changed={}", folder.display());
     for file in files(&folder)? {
         let path = file.strip_prefix(&folder)?.to_str().ok_or("a file name that is not UTF-8")?;
-        if !matches!(file.extension().and_then(|e| e.to_str()), Some("html" | "js" | "css" | "svg" | "txt")) {
+        if !matches!(
+            file.extension().and_then(|e| e.to_str()),
+            Some("html" | "js" | "css" | "svg" | "txt" | "woff2")
+        ) {
             continue;
         }
         let content = fs::read(&file)?;

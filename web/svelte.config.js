@@ -1,3 +1,4 @@
 import { vitePreprocess } from "@sveltejs/vite-plugin-svelte";
 
-export default { preprocess: vitePreprocess() };
+// Without runes, a component that uses none is compiled in the legacy mode, where `<part.page />` never changes.
+export default { preprocess: vitePreprocess(), compilerOptions: { runes: true } };

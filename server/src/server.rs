@@ -7,9 +7,8 @@ use crate::{
     events::{EventLog, watch_changes::watch_changes},
     fleet::{Fleet, server_name},
     gather::{self, Gatherer, GatheringTap, OfferedFrame},
-    http::{App, Enrolment, Services},
+    http::{App, Enrolment, Services, resumed_sessions},
     identity::{
-        Sessions,
         certificates::{CertificateRegistry, Certificates},
         local_token::LocalToken,
     },
@@ -64,7 +63,7 @@ impl Server {
         let (certificates, listeners) = encrypted(&config, listeners, &stopping)?;
         let (http_addr, metrics_addr) = (listeners.http_addr, listeners.metrics_addr);
         let local_token = write_local_token(&config, &store, http_addr.port())?;
-        let sessions = Arc::<Sessions>::default();
+        let sessions = Arc::new(resumed_sessions(&store).await);
         let (snapshots, vitals) = (store.snapshots().clone(), store.vitals().clone());
         let (tap, offered) = gather::gathering_tap();
         let teaching = Teaching::start(&config, &store, (&tap, offered), &stopping).await?;

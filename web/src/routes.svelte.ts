@@ -1,6 +1,7 @@
 // The address of the page and what it shows. The view (filters, place on the map) lives in the query, so that an address
 // can be sent to somebody else.
-import type { Component } from "svelte";
+import { type Component, tick } from "svelte";
+import type { Operation } from "./api/session.svelte";
 
 /** Names in an address, such as `map`. */
 export type Names = Record<string, string>;
@@ -11,11 +12,13 @@ type Page = () => Promise<{ default: Component<any> }>;
 interface Route {
   pattern: RegExp;
   page: Page;
+  /** What the page is for; whoever may not do it is told so. */
+  needs?: Operation | undefined;
 }
 
-function route(pattern: string, page: Page): Route {
+function route(pattern: string, page: Page, needs?: Operation): Route {
   const text = pattern.replace(/:(\w+)/g, "(?<$1>[^/]+)");
-  return { pattern: new RegExp(`^${text}/?$`), page };
+  return { pattern: new RegExp(`^${text}/?$`), page, needs };
 }
 
 const ROUTES: Route[] = [
@@ -26,26 +29,31 @@ const ROUTES: Route[] = [
   route("/maps/:map/landmarks/:landmark/sheet", () => import("./pages/sheets/LandmarkSheet.svelte")),
   route("/maps/:map/sheet", () => import("./pages/sheets/FloorSheet.svelte")),
   route("/maps/:map/settings", () => import("./pages/settings/MapSettings.svelte")),
-  route("/maps/:map/teach", () => import("./pages/teach/Teach.svelte")),
-  route("/maps/:map/gather", () => import("./pages/gather/Gather.svelte")),
+  route("/maps/:map/teach", () => import("./pages/teach/Teach.svelte"), "POST /maps/{map}/landmarks/{landmark}/views"),
+  route("/maps/:map/gather", () => import("./pages/gather/Gather.svelte"), "POST /maps/{map}/gatherings"),
   route("/maps/:map/history", () => import("./pages/history/History.svelte")),
   route("/maps/:map/drafts/:draft", () => import("./pages/history/OneDraft.svelte")),
   route("/robots", () => import("./pages/robots/Robots.svelte")),
   route("/robots/:robot", () => import("./pages/robots/OneRobot.svelte")),
   route("/answers", () => import("./pages/answers/Answers.svelte")),
   route("/answers/:answer", () => import("./pages/answers/OneAnswer.svelte")),
-  route("/admin", () => import("./pages/admin/Admin.svelte")),
+  route("/admin", () => import("./pages/admin/Admin.svelte"), "GET /jobs"),
 ];
 
 export const here = $state({ path: location.pathname, query: new URLSearchParams(location.search) });
 
 /** The page of an address and the names in it; `undefined` if there is none. */
-export function find(path: string): { page: Page; names: Names } | undefined {
-  for (const { pattern, page } of ROUTES) {
+export function find(path: string): { page: Page; names: Names; needs: Operation | undefined } | undefined {
+  for (const { pattern, page, needs } of ROUTES) {
     const found = pattern.exec(path);
     if (!found) continue;
-    const pairs = Object.entries(found.groups ?? {}).map(([name, value]) => [name, decodeURIComponent(value)]);
-    return { page, names: Object.fromEntries(pairs) };
+    try {
+      const pairs = Object.entries(found.groups ?? {}).map(([name, value]) => [name, decodeURIComponent(value)]);
+      return { page, names: Object.fromEntries(pairs), needs };
+    } catch {
+      // A name that is badly escaped is none.
+      return undefined;
+    }
   }
   return undefined;
 }
@@ -55,8 +63,29 @@ function read(): void {
   here.query = new URLSearchParams(location.search);
 }
 
+/** How long a page that one comes back to may take until it is as long as it was, ms. */
+const LONG_AGAIN_MS = 5000;
+
+/** Notes how far this page is scrolled, for whoever comes back. */
+function noteScroll(): void {
+  history.replaceState({ scroll_px: scrollY }, "");
+}
+
+/** Scrolls to where the page was left, as soon as it is long enough. */
+async function scrollBack(scroll_px: number): Promise<void> {
+  const until = performance.now() + LONG_AGAIN_MS;
+  const path = here.path;
+  await tick();
+  while (performance.now() < until && here.path === path) {
+    scrollTo(0, scroll_px);
+    if (Math.abs(scrollY - scroll_px) < 2) return;
+    await new Promise((then) => setTimeout(then, 50));
+  }
+}
+
 /** Goes to another address of these pages. */
 export function go(to: string): void {
+  noteScroll();
   history.pushState(null, "", to);
   read();
   scrollTo(0, 0);
@@ -70,13 +99,23 @@ export function remember(values: Record<string, string | undefined>): void {
     else query.delete(name);
   }
   const text = query.toString();
-  history.replaceState(null, "", location.pathname + (text ? `?${text}` : ""));
+  history.replaceState(history.state, "", location.pathname + (text ? `?${text}` : ""));
   read();
 }
 
 /** Follows links between these pages without loading everything again. */
 export function followLinks(): void {
-  addEventListener("popstate", read);
+  history.scrollRestoration = "manual";
+  let left: ReturnType<typeof setTimeout> | undefined;
+  addEventListener("scroll", () => {
+    clearTimeout(left);
+    left = setTimeout(noteScroll, 150);
+  });
+  addEventListener("popstate", ({ state }) => {
+    clearTimeout(left);
+    read();
+    void scrollBack((state as { scroll_px?: number } | null)?.scroll_px ?? 0);
+  });
   document.addEventListener("click", (event) => {
     const link = event.target instanceof Element ? event.target.closest("a") : null;
     if (!link || event.defaultPrevented || event.button !== 0) return;

@@ -1,4 +1,4 @@
-// Writes licences.txt into the bundle: each package whose code or styles are in it, with its licence. The packages are those
+// Writes licences.txt into the bundle: each package whose code, styles or files are in it, with its licence. The packages are those
 // of the modules that Rollup has put together; no list is kept by hand. A package without a licence text fails the build.
 import { existsSync, readFileSync, readdirSync } from "node:fs";
 import { dirname, join } from "node:path";
@@ -54,7 +54,10 @@ export function licences() {
     generateBundle(_options, bundle) {
       const modules = new Set([...this.getModuleIds()].filter((id) => /\.css(?:\?|$)/.test(id)));
       for (const part of Object.values(bundle)) {
-        if (part.type !== "chunk") continue;
+        if (part.type !== "chunk") {
+          for (const name of part.originalFileNames ?? []) if (name.includes("node_modules/")) modules.add(join(root, name));
+          continue;
+        }
         for (const [id, module] of Object.entries(part.modules)) if (module.renderedLength > 0) modules.add(id);
       }
       const source = notices(modules, join(root, "node_modules/vite"));

@@ -74,6 +74,7 @@ pub(crate) mod listen;
 mod tests;
 
 pub(crate) use metrics::alone as metrics_alone;
+pub(crate) use page_session::resumed_sessions;
 pub(crate) use router::Service;
 
 use crate::{

@@ -10,8 +10,12 @@ use super::{
     peer::Peer,
 };
 use crate::{
-    identity::{CODE_VALID, Principal, SESSION_VALID, TokenId},
-    store::now_ms,
+    identity::{CODE_VALID, Principal, SESSION_VALID, Sessions, TokenId},
+    publication::Catalogue,
+    store::{
+        now_ms,
+        page_sessions::{self, PageSessionRow},
+    },
 };
 use axum::{
     Extension, Json, Router,
@@ -23,13 +27,28 @@ use axum::{
 };
 use protos::api::{PageLink, Role};
 use serde::Deserialize;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 use utoipa_axum::{router::OpenApiRouter, routes};
 
 /// Largest body of the form, in bytes.
 const FORM_MAX: usize = 1024;
 /// Where a link leads that is not valid any more.
 const LINK_ENDED: HeaderValue = HeaderValue::from_static("/?link=ended");
+
+/// The sessions that an earlier start has left, until their ends.
+pub(crate) async fn resumed_sessions(store: &Catalogue) -> Sessions {
+    let (sessions, now, now_ms) = (Sessions::default(), Instant::now(), now_ms());
+    match page_sessions::open(store.reads(), now_ms).await {
+        Ok(rows) => {
+            for PageSessionRow { sha256, token, ends_ms } in rows {
+                let left = Duration::from_millis(ends_ms.saturating_sub(now_ms).max(0) as u64);
+                sessions.resume(sha256, token, now + left.min(SESSION_VALID), now);
+            }
+        }
+        Err(error) => tracing::warn!(%error, "page_sessions_not_read"),
+    }
+    sessions
+}
 
 /// The operation of the API.
 pub(super) fn api() -> OpenApiRouter<AppState> {
@@ -70,7 +89,7 @@ async fn open(
         |place: HeaderValue| (StatusCode::SEE_OTHER, [(header::LOCATION, place), no_store()]).into_response();
     match token.filter(is_valid) {
         None => to(LINK_ENDED),
-        Some(token) => match begun(&app, &parts, token) {
+        Some(token) => match begun(&app, &parts, token).await {
             Ok(cookie) => ([(header::SET_COOKIE, cookie)], to(HeaderValue::from_static("/"))).into_response(),
             Err(error) => error.into_response(),
         },
@@ -96,7 +115,7 @@ async fn login(State(app): State<AppState>, request: Request) -> Response {
         let LoginForm { token } = json(&bytes, "")?;
         let principal = app.store.tokens().principal_of(token.trim(), now_ms());
         let unknown = |_denial| unauthenticated("the token is not valid", Role::Viewer).field("token");
-        begun(&app, &parts, principal.map_err(unknown)?.token)
+        begun(&app, &parts, principal.map_err(unknown)?.token).await
     };
     match begun.await {
         Ok(cookie) => (StatusCode::NO_CONTENT, [(header::SET_COOKIE, cookie)]).into_response(),
@@ -109,15 +128,24 @@ async fn logout(State(app): State<AppState>, parts: Parts) -> Response {
     if let Err(error) = check_page(&parts.method, &parts.headers) {
         return error.into_response();
     }
-    if let Some(cookie) = session_cookie(&parts.headers) {
-        app.sessions.close(cookie);
+    if let Some(digest) = session_cookie(&parts.headers).and_then(|cookie| app.sessions.close(cookie)) {
+        let removed = app.store.write(move |tx| Box::pin(page_sessions::remove(tx, digest))).await;
+        if let Err(error) = removed {
+            tracing::warn!(%error, "page_session_not_removed");
+        }
     }
     (StatusCode::NO_CONTENT, [(header::SET_COOKIE, cookie(&parts, "", 0))]).into_response()
 }
 
-/// A session for a token: its cookie.
-fn begun(app: &AppState, parts: &Parts, token: TokenId) -> Result<HeaderValue, ApiError> {
-    let value = app.sessions.open(token, Instant::now()).map_err(|e| ApiError::internal(&e))?;
+/// A session for a token: its cookie. One that cannot be stored, on a full disk, lasts until the server stops.
+async fn begun(app: &AppState, parts: &Parts, token: TokenId) -> Result<HeaderValue, ApiError> {
+    let (value, sha256) = app.sessions.open(token, Instant::now()).map_err(|e| ApiError::internal(&e))?;
+    let now = now_ms();
+    let session = PageSessionRow { sha256, token, ends_ms: now + SESSION_VALID.as_millis() as i64 };
+    let stored = app.store.write(move |tx| Box::pin(page_sessions::add(tx, session, now))).await;
+    if let Err(error) = stored {
+        tracing::warn!(%error, "page_session_not_stored");
+    }
     Ok(cookie(parts, &value, SESSION_VALID.as_secs()))
 }
 

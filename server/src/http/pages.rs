@@ -1,11 +1,11 @@
 //! The administrator's pages, embedded in the program.
 
-use super::AppState;
+use super::{AppState, error::not_found};
 use crate::store::pictures::hex;
 use axum::{
     Router,
     body::Bytes,
-    http::{HeaderMap, HeaderValue, StatusCode, header},
+    http::{HeaderMap, HeaderValue, Method, StatusCode, header},
     response::{IntoResponse, Response},
     routing::get,
 };
@@ -34,6 +34,21 @@ pub(super) fn router() -> Router<AppState> {
         router = router.route(&format!("/{}", file.0), served(file));
     }
     router
+}
+
+/// What is at no address: to a browser the pages, which say so; to a program the refusal.
+pub(super) fn unknown(method: &Method, path: &str, asked: &HeaderMap) -> Response {
+    let accepts = |kind: &str| {
+        let accept = asked.get(header::ACCEPT).and_then(|value| value.to_str().ok());
+        accept.is_some_and(|accept| accept.contains(kind))
+    };
+    let is_address = *method == Method::GET && !["/api/", "/assets/"].iter().any(|of| path.starts_with(of));
+    match FILES.iter().find(|(name, ..)| *name == INDEX) {
+        Some(index) if is_address && accepts("text/html") => {
+            (StatusCode::NOT_FOUND, answer(index, &etag(index.1), &HeaderMap::new())).into_response()
+        }
+        _ => not_found().into_response(),
+    }
 }
 
 fn served(file: &'static File) -> axum::routing::MethodRouter<AppState> {
@@ -82,6 +97,7 @@ fn media_type(path: &str) -> HeaderValue {
         Some("js") => "text/javascript; charset=utf-8",
         Some("css") => "text/css; charset=utf-8",
         Some("svg") => "image/svg+xml",
+        Some("woff2") => "font/woff2",
         Some("txt") => "text/plain; charset=utf-8",
         _ => "application/octet-stream",
     })
@@ -143,11 +159,12 @@ mod tests {
     fn every_file_that_a_page_asks_for_is_served() {
         let served: BTreeSet<String> = FILES.iter().map(|(path, ..)| format!("/{path}")).collect();
         for (page, content, _) in FILES {
-            let text = std::str::from_utf8(content).unwrap();
+            let Ok(text) = std::str::from_utf8(content) else { continue };
             let is_file = |text: &&str| {
-                text.starts_with('/') && [".js", ".css", ".svg"].iter().any(|ending| text.ends_with(ending))
+                text.starts_with('/')
+                    && [".js", ".css", ".svg", ".woff2"].iter().any(|ending| text.ends_with(ending))
             };
-            for asked in text.split('"').filter(is_file) {
+            for asked in text.split(['"', '(', ')']).filter(is_file) {
                 assert!(served.contains(asked), "{page} asks for {asked}");
             }
         }
@@ -159,7 +176,7 @@ mod tests {
         let served = answer(file, "\"a\"", &HeaderMap::new());
         assert_eq!(served.headers()[header::CONTENT_TYPE], "text/plain; charset=utf-8");
         let text = std::str::from_utf8(file.1).unwrap();
-        for package in ["ol", "svelte", "uplot"] {
+        for package in ["@fontsource-variable/inter", "@lucide/svelte", "ol", "svelte", "uplot"] {
             assert!(text.contains(&format!("\n{package} ")), "{package}");
         }
         let health = fs::read_to_string(web().join("src/pages/admin/Health.svelte")).unwrap();
@@ -179,6 +196,25 @@ mod tests {
                     || *address == format!("/{first}/{{*rest}}") && pattern.matches('/').count() > 1
             });
             assert!(is_served, "{pattern}");
+        }
+    }
+
+    #[test]
+    fn an_address_that_is_none_shows_the_pages_to_a_browser_and_a_refusal_to_a_program() {
+        let html = HeaderMap::from_iter([(header::ACCEPT, HeaderValue::from_static("text/html,*/*;q=0.8"))]);
+        let kind = |method: Method, path: &str, headers: &HeaderMap| {
+            let response = unknown(&method, path, headers);
+            assert_eq!(response.status(), StatusCode::NOT_FOUND, "{method} {path}");
+            response.headers()[header::CONTENT_TYPE].to_str().unwrap().to_owned()
+        };
+        assert_eq!(kind(Method::GET, "/help", &html), "text/html; charset=utf-8");
+        for (method, path, headers) in [
+            (Method::GET, "/help", &HeaderMap::new()),
+            (Method::POST, "/help", &html),
+            (Method::GET, "/api/v1/help", &html),
+            (Method::GET, "/assets/old.js", &html),
+        ] {
+            assert_eq!(kind(method, path, headers), "application/problem+json");
         }
     }
 

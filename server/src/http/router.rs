@@ -2,7 +2,7 @@
 
 use super::{
     API, AppState, audit, authorise, backups, bulk, bundles, cameras, creation, documented, drafts,
-    error::{ApiError, method_not_allowed, not_found},
+    error::{ApiError, method_not_allowed},
     events,
     examples::with_examples,
     gathering, guard, health, history, landmark_models, landmarks, learning, live, localise, mapping, maps,
@@ -15,7 +15,7 @@ use crate::config::Limits;
 use axum::{
     Json, Router,
     extract::{MatchedPath, Request, State},
-    http::StatusCode,
+    http::{HeaderMap, Method, StatusCode, Uri},
     middleware::{Next, from_fn_with_state},
     response::{IntoResponse, Response},
     routing::get,
@@ -131,7 +131,9 @@ fn routes(app: &AppState) -> Router {
         .merge(pages::router())
         .merge(page_session::router())
         .merge(docs)
-        .fallback(async || not_found())
+        .fallback(async |method: Method, uri: Uri, headers: HeaderMap| {
+            pages::unknown(&method, uri.path(), &headers)
+        })
         .method_not_allowed_fallback(async || method_not_allowed())
         .with_state(app.clone())
 }

@@ -1,7 +1,7 @@
 //! Who asks and what they may do. In: credentials of a request. Out: a [`Principal`], or the reason why there is none.
 //!
 //! A principal is known by a token (of the database, or the local one of this start) or by a session of the page, which
-//! stands for the token that opened it. Tokens are read from memory ([`registry`]); the publication fills it after each
+//! stands for the token that opened it and outlives a restart. Tokens are read from memory ([`registry`]); the publication fills it after each
 //! commit, so a revoked token is refused by the next request.
 //!
 //! The server's own certificate and those of robots come of [`certificates`].
@@ -16,7 +16,7 @@ mod sessions;
 pub(crate) use crate::private_file;
 pub(crate) use registry::{Denial, PublishedToken, TokenRegistry};
 pub(crate) use secret::{Secret, TokenText};
-pub(crate) use sessions::{CODE_VALID, SESSION_VALID, Sessions};
+pub(crate) use sessions::{CODE_VALID, MAX_SESSIONS, SESSION_VALID, Sessions};
 
 use protos::api::Role;
 use std::{

@@ -1,5 +1,6 @@
 //! Sessions of the page, in memory: opened by a code that is valid once or by a token, ended by logging out, by age, or
-//! with the token that opened them. Codes and cookies are found by their digests.
+//! with the token that opened them. Codes and cookies are found by their digests. The store keeps the sessions for the next
+//! start (`store/page_sessions.rs`); a code ends with the server.
 
 use super::{
     TokenId,
@@ -19,7 +20,7 @@ pub(crate) const SESSION_VALID: Duration = Duration::from_hours(12);
 /// Most codes that wait; the oldest makes room.
 const MAX_CODES: usize = 64;
 /// Most sessions; the oldest makes room.
-const MAX_SESSIONS: usize = 256;
+pub(crate) const MAX_SESSIONS: usize = 256;
 
 /// Whose it is, and until when.
 #[derive(Debug, Clone, Copy)]
@@ -67,13 +68,17 @@ impl Sessions {
         codes.remove(&digest).filter(|grant| grant.ends > now).map(|grant| grant.token)
     }
 
-    /// A session for this token: the value of its cookie.
-    pub(crate) fn open(&self, token: TokenId, now: Instant) -> Result<String, NoRandomness> {
+    /// A session for this token: the value of its cookie, and the digest of that.
+    pub(crate) fn open(&self, token: TokenId, now: Instant) -> Result<(String, [u8; 32]), NoRandomness> {
         let cookie = Secret::<32>::random()?;
-        let grant = Grant { token, ends: now + SESSION_VALID };
-        insert(&self.open, cookie.digest(), grant, MAX_SESSIONS, now);
+        self.resume(cookie.digest(), token, now + SESSION_VALID, now);
+        Ok((cookie.expose(), cookie.digest()))
+    }
+
+    /// A session of an earlier start.
+    pub(crate) fn resume(&self, digest: [u8; 32], token: TokenId, ends: Instant, now: Instant) {
+        insert(&self.open, digest, Grant { token, ends }, MAX_SESSIONS, now);
         self.changes.send_replace(());
-        Ok(cookie.expose())
     }
 
     /// The token that a session stands for.
@@ -83,14 +88,14 @@ impl Sessions {
         sessions.get(&digest).filter(|grant| grant.ends > now).map(|grant| grant.token)
     }
 
-    /// Ends a session.
-    pub(crate) fn close(&self, cookie: &str) {
-        if let Some(secret) = Secret::<32>::of(cookie) {
-            let mut sessions = self.open.lock().unwrap_or_else(PoisonError::into_inner);
-            sessions.remove(&secret.digest());
-            drop(sessions);
-            self.changes.send_replace(());
-        }
+    /// Ends a session. Returns the digest of its cookie; `None` if there is no such session.
+    pub(crate) fn close(&self, cookie: &str) -> Option<[u8; 32]> {
+        let digest = Secret::<32>::of(cookie)?.digest();
+        let mut sessions = self.open.lock().unwrap_or_else(PoisonError::into_inner);
+        sessions.remove(&digest)?;
+        drop(sessions);
+        self.changes.send_replace(());
+        Some(digest)
     }
 
     /// Each beginning and end of a session by its user from now on.
@@ -118,11 +123,22 @@ mod tests {
     #[test]
     fn a_session_ends_by_age_and_by_logging_out() {
         let (sessions, now) = (Sessions::default(), Instant::now());
-        let [a, b] = [1, 2].map(|i| sessions.open(TokenId::Stored(i), now).unwrap());
+        let [a, b] = [1, 2].map(|i| sessions.open(TokenId::Stored(i), now).unwrap().0);
         assert_eq!(sessions.token(&a, now + SESSION_VALID / 2), Some(TokenId::Stored(1)));
         assert_eq!(sessions.token(&a, now + SESSION_VALID), None);
-        sessions.close(&a);
+        assert!(sessions.close(&a).is_some() && sessions.close(&a).is_none());
         assert_eq!((sessions.token(&a, now), sessions.token(&b, now)), (None, Some(TokenId::Stored(2))));
+    }
+
+    #[test]
+    fn a_session_goes_on_after_a_restart_until_its_end() {
+        let (sessions, now) = (Sessions::default(), Instant::now());
+        let (cookie, digest) = sessions.open(TokenId::Stored(1), now).unwrap();
+        let later = Sessions::default();
+        assert_eq!(later.token(&cookie, now), None);
+        later.resume(digest, TokenId::Stored(1), now + Duration::from_secs(9), now);
+        assert_eq!(later.token(&cookie, now + Duration::from_secs(8)), Some(TokenId::Stored(1)));
+        assert_eq!(later.token(&cookie, now + Duration::from_secs(9)), None);
     }
 
     #[test]
@@ -130,7 +146,7 @@ mod tests {
         let (sessions, now) = (Sessions::default(), Instant::now());
         let at = |i: usize| now + Duration::from_millis(i as u64);
         let cookies: Vec<_> =
-            (0..=MAX_SESSIONS).map(|i| sessions.open(TokenId::Local, at(i)).unwrap()).collect();
+            (0..=MAX_SESSIONS).map(|i| sessions.open(TokenId::Local, at(i)).unwrap().0).collect();
         let valid = cookies.iter().filter(|cookie| sessions.token(cookie, at(MAX_SESSIONS)).is_some());
         assert_eq!((valid.count(), sessions.token(&cookies[0], now)), (MAX_SESSIONS, None));
         let codes: Vec<_> = (0..=MAX_CODES).map(|i| sessions.code(TokenId::Local, at(i)).unwrap()).collect();

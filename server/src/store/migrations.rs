@@ -43,6 +43,7 @@ const FILES: &[(&str, &str)] = files![
     "0035_job_times",
     "0036_answer_basis",
     "0037_refused_views",
+    "0038_page_sessions",
 ];
 
 /// The steps in order.

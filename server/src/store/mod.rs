@@ -22,6 +22,7 @@ pub(crate) mod copies;
 pub(crate) mod integrity;
 pub(crate) mod schema;
 pub(crate) mod restored;
+pub(crate) mod page_sessions;
 pub(crate) mod pictures;
 pub(crate) mod views;
 pub(crate) mod models;

@@ -34,6 +34,7 @@ async fn every_statement_prepares_on_the_migrated_schema() {
         kept_answers::ALL,
         audit::ALL,
         stored_answers::ALL,
+        page_sessions::ALL,
         refused_views::ALL,
         revisions::ALL,
         map_rows::ALL,

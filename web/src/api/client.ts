@@ -1,4 +1,5 @@
 // Requests to the server. In: a path below /api/v1. Out: the body, or an ApiError whose text a person can act on.
+import { heard, missed } from "./connection.svelte";
 
 const ROOT = "/api/v1";
 /** Time until a request is given up, ms. Lessons and backups run as jobs, so no request takes long. */
@@ -83,11 +84,16 @@ async function send(method: Method, at: string, options: Options): Promise<Respo
   try {
     answer = await fetch(address(at, options.query), request(method, options));
   } catch (cause) {
-    if (options.signal?.aborted) throw cause;
+    // Given up by the page; a deadline of the page's own is none of that.
+    if (options.signal?.aborted && (options.signal.reason as DOMException | undefined)?.name !== "TimeoutError") throw cause;
     const late = cause instanceof DOMException && cause.name === "TimeoutError";
+    missed();
     const text = late ? `The server has not answered within ${(options.file?.deadline_ms ?? DEADLINE_MS) / 1000} s.` : "The server cannot be reached. Does it run? Is the network up?";
     throw new ApiError(text, 0, "unreachable", null);
   }
+  // A proxy before the server answers so while the server is away.
+  if (answer.status === 502 || answer.status === 504) missed();
+  else heard();
   if (answer.ok || answer.status === options.alsoTakes) return answer;
   if (answer.status === 401) onSignedOut();
   throw await refusal(answer);
@@ -96,9 +102,15 @@ async function send(method: Method, at: string, options: Options): Promise<Respo
 async function refusal(answer: Response): Promise<ApiError> {
   const problem = await answer.json().catch(() => ({}));
   const { detail, code, field } = problem as { detail?: string; code?: string; field?: string };
-  const text = detail ?? `The server answers ${answer.status} ${answer.statusText}.`;
-  const next = answer.status === 412 ? " Somebody has changed it meanwhile: load it again, then repeat the change." : "";
-  return new ApiError(sentence(text) + next, answer.status, code ?? "unknown", field ?? null);
+  const text = words(answer.status, detail) ?? detail ?? `The server answers ${answer.status} ${answer.statusText}.`;
+  return new ApiError(sentence(text), answer.status, code ?? "unknown", field ?? null);
+}
+
+/** What a person is told instead of the server's words. */
+function words(status: number, detail: string | undefined): string | undefined {
+  if (status === 412) return "Somebody has changed it meanwhile.";
+  const bytes = status === 413 ? /\d{5,}/.exec(detail ?? "")?.[0] : undefined;
+  return bytes && `The file is larger than ${Math.floor(Number(bytes) / 2 ** 20)} MB, the most that the server takes.`;
 }
 
 function sentence(text: string): string {

@@ -1,5 +1,6 @@
 // Who is signed in, and what that one may do.
 import { ApiError, get, whenSignedOut } from "./client";
+import { watch, whenBack } from "./connection.svelte";
 import rights from "./rights.json";
 import type { Role, Whoami } from "./types";
 
@@ -21,15 +22,17 @@ export function may(operation: Operation): boolean {
   return ROLES.indexOf(session.who.role) >= ROLES.indexOf(role as Role);
 }
 
-/** Asks who is signed in. */
-export async function ask(): Promise<void> {
+/** Asks who is signed in. While the server does not answer, whoever was signed in stays so. */
+export async function ask(signal?: AbortSignal): Promise<void> {
   try {
-    session.who = await get<Whoami>("/whoami");
+    const who = await get<Whoami>("/whoami", undefined, signal);
+    // The same one leaves the pages as they are.
+    if (JSON.stringify(who) !== JSON.stringify(session.who)) session.who = who;
     session.state = "signed-in";
   } catch (error) {
-    session.who = null;
     session.trouble = error instanceof Error ? error.message : String(error);
-    session.state = error instanceof ApiError && error.status === 401 ? "signed-out" : "unreachable";
+    if (error instanceof ApiError && error.status === 401) [session.who, session.state] = [null, "signed-out"];
+    else if (session.state === "asking") session.state = "unreachable";
   }
 }
 
@@ -51,6 +54,9 @@ export async function signOut(): Promise<void> {
   session.who = null;
   session.state = "signed-out";
 }
+
+watch(ask);
+whenBack(() => session.state === "unreachable" && void ask());
 
 whenSignedOut(() => {
   session.who = null;

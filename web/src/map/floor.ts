@@ -19,6 +19,8 @@ export const METRES = "waymark-metres";
 const FAR_M = 1e5;
 /** A pointer that moves less between press and release has clicked, px. */
 const CLICK_PX = 6;
+/** A single click is known as one after less than this, ms. */
+const DOUBLE_MS = 600;
 
 const projection = new Projection({ code: METRES, units: "m", extent: [-FAR_M, -FAR_M, FAR_M, FAR_M] });
 projection.setGetPointResolution((resolution) => resolution);
@@ -27,6 +29,8 @@ addProjection(projection);
 export interface FloorEvents {
   /** A landmark or a robot was clicked, or the bare floor. */
   onpick(picked: { landmark?: string; robot?: string; at: Point }): void;
+  /** The pointer is over this point, without a button. */
+  onhover?(at: Point): void;
   /** The view has moved: centre, m per px, turn. */
   onmove(view: string): void;
 }
@@ -34,7 +38,9 @@ export interface FloorEvents {
 export class Floor {
   readonly map: OlMap;
   /** While this is set, a drag over the floor is told to it, and does not move the map. */
-  aim: ((from: Point, to: Point, is_done: boolean) => void) | undefined;
+  aim: ((from: Point, to: Point, is_done: boolean, is_first: boolean) => void) | undefined;
+  /** While this is set, every click is told at once: none waits for a second one that would zoom. */
+  is_quick = false;
   #grid = new Graticule({ source: new VectorSource(), zIndex: -1 });
 
   constructor(target: HTMLElement, events: FloorEvents) {
@@ -49,8 +55,19 @@ export class Floor {
     });
     this.map.updateSize();
     this.map.addLayer(this.#grid);
+    const point = (coordinate: number[]): Point => [coordinate[0] ?? 0, coordinate[1] ?? 0];
+    this.map.on("pointermove", ({ dragging, coordinate }) => !dragging && events.onhover?.(point(coordinate)));
+    let told_ms = -Infinity;
+    this.map.on("click", ({ coordinate }) => {
+      if (!this.is_quick) return;
+      told_ms = performance.now();
+      events.onpick({ at: point(coordinate) });
+    });
+    this.map.on("dblclick", () => !this.is_quick);
     this.map.on("singleclick", ({ pixel, coordinate }) => {
-      const at: Point = [coordinate[0] ?? 0, coordinate[1] ?? 0];
+      // It comes late: what was told by then is not told once more.
+      if (this.is_quick || performance.now() - told_ms < DOUBLE_MS) return;
+      const at = point(coordinate);
       let picked: { landmark?: string; robot?: string } = {};
       this.map.forEachFeatureAtPixel(pixel, (feature) => {
         const members = (feature.get("features") ?? [feature]) as Feature[];
@@ -82,15 +99,21 @@ export class Floor {
       },
       handleDragEvent: ({ coordinate, pixel }) => {
         if (!from) return;
+        const was_drag = is_drag;
         is_drag ||= Math.hypot((pixel[0] ?? 0) - (from.pixel[0] ?? 0), (pixel[1] ?? 0) - (from.pixel[1] ?? 0)) > CLICK_PX;
-        if (is_drag) this.aim?.(from.at, point(coordinate), false);
+        if (is_drag) this.aim?.(from.at, point(coordinate), false, !was_drag);
       },
       handleUpEvent: ({ coordinate }) => {
-        if (from && is_drag) this.aim?.(from.at, point(coordinate), true);
+        if (from && is_drag) this.aim?.(from.at, point(coordinate), true, false);
         from = undefined;
         return false;
       },
     });
+  }
+
+  /** Metres of a pixel. */
+  get px_m(): number {
+    return this.map.getView().getResolution() ?? 1;
   }
 
   /** Shows these bounds, with a margin. */

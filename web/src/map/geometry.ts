@@ -53,6 +53,13 @@ export function boundsOf(points: Iterable<Point>): Bounds | undefined {
   return box;
 }
 
+/** The point of a segment that is nearest to `at`. */
+export function nearestOn(at: Point, [ax, ay]: Point, [bx, by]: Point): Point {
+  const [dx, dy] = [bx - ax, by - ay];
+  const along = Math.max(0, Math.min(1, ((at[0] - ax) * dx + (at[1] - ay) * dy) / (dx * dx + dy * dy || 1)));
+  return [ax + along * dx, ay + along * dy];
+}
+
 /** Where a landmark lands that is dropped at a point: on the nearest wall within `reach_m`, facing the side it is dropped on. */
 export function onWall(at: Point, walls: readonly { a: number[]; b: number[] }[], reach_m: number, facing?: Point): Pick<Place, "x_m" | "y_m" | "theta_rad"> | undefined {
   let best: { distance: number; x: number; y: number; normal: Point } | undefined;
@@ -62,8 +69,7 @@ export function onWall(at: Point, walls: readonly { a: number[]; b: number[] }[]
     const [dx, dy] = [bx - ax, by - ay];
     const length = Math.hypot(dx, dy);
     if (length === 0) continue;
-    const along = Math.max(0, Math.min(1, ((at[0] - ax) * dx + (at[1] - ay) * dy) / length ** 2));
-    const [x, y] = [ax + along * dx, ay + along * dy];
+    const [x, y] = nearestOn(at, [ax, ay], [bx, by]);
     const distance = Math.hypot(at[0] - x, at[1] - y);
     if (distance <= reach_m && (!best || distance < best.distance)) best = { distance, x, y, normal: [-dy / length, dx / length] };
   }

@@ -18,7 +18,7 @@ const APART_PX = 22;
 const NEAR_M_PER_PX = 0.012;
 /** How far in front of its wall a label stands, px. */
 const LABEL_PX = 14;
-const FONT = "12px system-ui, sans-serif";
+const FONT = "12px Inter, system-ui, sans-serif";
 
 export interface LandmarkLayer {
   layer: VectorLayer;

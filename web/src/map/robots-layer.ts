@@ -60,7 +60,7 @@ export function drawn(robot: LiveRobot, now_ms: number, colours: Colours): Featu
   const label = stale ? `${name} (${ago(now_ms - robot.posed_ms)})` : name;
   const text = new Text({
     text: label,
-    font: "600 12px system-ui, sans-serif",
+    font: "600 12px Inter, system-ui, sans-serif",
     offsetY: -16,
     fill: new Fill({ color: colours.text }),
     stroke: new Stroke({ color: colours.halo, width: 3 }),
@@ -77,7 +77,7 @@ function possible({ probability, pose, covariance }: Hypothesis, name: string, c
   const strength = Math.round(40 + 150 * Math.min(1, probability)).toString(16).padStart(2, "0");
   const text = new Text({
     text: `${name}? ${Math.round(100 * probability)} %`,
-    font: "12px system-ui, sans-serif",
+    font: "12px Inter, system-ui, sans-serif",
     fill: new Fill({ color: colours.text }),
     stroke: new Stroke({ color: colours.halo, width: 3 }),
   });

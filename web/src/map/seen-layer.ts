@@ -1,4 +1,4 @@
-// From where landmarks are seen: the areas of all of them, one upon the other, so that the floor is the darker the more
+// From where landmarks are seen: the areas of all of them, one upon the other, so that the colour is the stronger the more
 // landmarks a robot may see there. What stays bare is blind.
 import Feature from "ol/Feature";
 import MultiPolygon from "ol/geom/MultiPolygon";
@@ -10,7 +10,7 @@ import { Fill, Style } from "ol/style";
 export type SeenArea = number[][][][];
 
 /** Opacity of one area. */
-const ONE = "20";
+const ONE = "30";
 
 export function seenLayer(areas: readonly SeenArea[], colour: string): VectorLayer {
   const features = areas.map((area) => new Feature(new MultiPolygon(area)));

@@ -1,5 +1,5 @@
 // Light, dark, or as the system has it. Kept in this browser.
-const WORDS = { system: "As the system", light: "Light", dark: "Dark" } as const;
+const WORDS = { system: "Theme: system", light: "Theme: light", dark: "Theme: dark" } as const;
 type Choice = keyof typeof WORDS;
 const KEY = "waymark-appearance";
 

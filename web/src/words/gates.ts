@@ -7,7 +7,7 @@ const GATES: Record<string, string> = {
   mismatch: "a part of it shows something else",
   low_content: "there is too little to see in it",
   margin: "another landmark fits nearly as well",
-  points: "so many points would agree by chance too often",
+  points: "too few matching points to be sure",
   disagreement: "a connected part of it shows something else",
   corners: "where its corners are is not clear",
   plain: "its small picture alone speaks for it",

@@ -30,8 +30,11 @@ export const STATES: Record<LandmarkState, Words> = {
   "not-learnt": { word: "Not learnt", meaning: "It has no model yet. Add photographs, then learn.", kind: "plain" },
   inactive: { word: "Not in use", meaning: "It was learnt, but is not good enough to be relied on.", kind: "warn" },
   flagged: { word: "To be checked", meaning: "Robots have seen something that speaks against it. It is still used.", kind: "warn" },
-  quarantined: { word: "Out of use", meaning: "It has moved or changed, so it corrects no robot until somebody has looked.", kind: "bad" },
+  quarantined: { word: "Out of use", meaning: "Robots found that it has moved or changed, or somebody took it out of use. It corrects no robot until it is put back in use.", kind: "bad" },
 };
+
+/** Of a landmark out of use against which no robot has found anything. */
+export const BY_HAND = "Somebody took it out of use: it corrects no robot until it is put back. The audit log of the server says who.";
 
 /** How far a robot's pose is trusted. */
 export const TRUST: Record<string, string> = {

@@ -12,7 +12,7 @@ const CHROMIUM = process.env.CHROMIUM ?? "/usr/bin/chromium";
 const OUTPUT = new URL("../output/", import.meta.url).pathname;
 const AXE = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
 const GUIDE = new URL("../../../docs/pictures/pages/", import.meta.url).pathname;
-const PICTURES = ["map-desk", "landmarks-desk", "landmark-desk", "teach", "answer-evidence-desk", "history", "health-desk"];
+const PICTURES = ["map-desk", "landmarks-desk", "landmark-desk", "teach", "answer-evidence-desk", "history", "health-desk", "walls-desk", "placing-desk", "connection-lost", "start-desk", "connect-desk"];
 /** Time for anything that a journey waits for, ms: two cores are shared with driving robots. */
 export const SOON = 90_000;
 
@@ -27,14 +27,15 @@ export async function demo() {
 
 /** Starts `waymark serve`. It prints no link where no person reads: its token gives one. */
 export async function serve(...args) {
-  const { found, stop } = await started(["serve", "--http", "127.0.0.1:0", ...args], /pages\s+\S+:(\d+)\/\s+robots\s+(\S+)\s+token\s+(\S+)\n/);
+  const http = args.includes("--http") ? [] : ["--http", "127.0.0.1:0"];
+  const { found, stop, kill } = await started(["serve", ...http, ...args], /pages\s+\S+:(\d+)\/\s+robots\s+(\S+)\s+token\s+(\S+)\n/);
   const [, port, robots, file] = found;
   // With encryption, too, plain text is served to this machine.
   const origin = `http://127.0.0.1:${port}`;
   const headers = { authorization: `Bearer ${readFileSync(file, "utf8").trim()}` };
   const answer = await fetch(`${origin}/api/v1/session/links`, { method: "POST", headers });
   assert.ok(answer.ok, `a link: ${answer.status} ${await answer.clone().text()}`);
-  return { link: `${origin}${(await answer.json()).path}`, origin, robots, stop };
+  return { link: `${origin}${(await answer.json()).path}`, origin, robots, stop, kill };
 }
 
 /** Runs a command of the program to its end. */
@@ -68,7 +69,13 @@ async function started(args, says) {
     child.kill("SIGINT");
     setTimeout(() => child.kill("SIGKILL"), 20_000).unref();
   });
-  return { found, stop };
+  /** As a power cut does. */
+  const kill = () => new Promise((ended) => {
+    child.removeAllListeners("exit");
+    child.on("exit", ended);
+    child.kill("SIGKILL");
+  });
+  return { found, stop, kill };
 }
 
 /** A browser that is signed in by a link. */
@@ -82,6 +89,13 @@ export async function browser({ link, origin }) {
   // After the link, whose answer leads on to a page.
   if (process.env.WAYMARK_PAGES) await replaced(context, process.env.WAYMARK_PAGES);
   return { context, close: () => launched.close() };
+}
+
+/** Another browser of the same server, in which nobody is signed in. */
+export async function guestOf({ context }, { origin }) {
+  const guest = await context.browser().newContext({ viewport: DESKTOP, baseURL: origin, ignoreHTTPSErrors: true });
+  if (process.env.WAYMARK_PAGES) await replaced(guest, process.env.WAYMARK_PAGES);
+  return guest;
 }
 
 /** Takes the pages from a folder (`dist`) instead of those in the program: while pages are changed, that spares building it. */
@@ -137,7 +151,11 @@ export const uploaded = (context, origin, landmark, buffer, parts = {}) =>
 
 /** How many pixels of a part of a page have about this colour, [r, g, b]. */
 export async function pixels(part, colour) {
+  // Without what lies over the map.
+  const over = (visibility) => part.page().evaluate((visibility) => document.querySelectorAll(".floor > :not(.canvas)").forEach((one) => (one.style.visibility = visibility)), visibility);
+  await over("hidden");
   const shot = await part.screenshot();
+  await over("");
   return part.page().evaluate(
     async ([base64, [r, g, b]]) => {
       const bytes = Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));

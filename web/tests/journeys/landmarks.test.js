@@ -31,6 +31,7 @@ for (const [size, where] of [[undefined, "desk"], [PHONE, "phone"]]) {
     await page.getByLabel("Name").fill(first.name);
     await page.getByRole("link", { name: first.name, exact: true }).click();
     await page.getByRole("heading", { name: "Photographs", exact: true }).waitFor();
+    await page.getByText("Details: how well it is told apart").click();
     await page.getByRole("img", { name: /Hausdorff/ }).waitFor();
     await page.getByRole("img", { name: /Photograph \d+/ }).first().waitFor();
     await check(page, `landmark-${where}`);
@@ -47,8 +48,8 @@ test("a landmark is renamed, measured, taken out of use and brought back by undo
   await page.getByRole("button", { name: "Undo" }).click();
   await page.getByText(`${first.size.width_m.toFixed(2)} m wide`).waitFor();
   await page.getByRole("button", { name: "Take out of use" }).click();
-  await page.getByText("Out of use").first().waitFor();
-  await page.getByRole("button", { name: "It is as it was: use it" }).click();
+  await page.getByText("Out of use", { exact: true }).first().waitFor();
+  await page.getByRole("button", { name: "Put back in use" }).click();
   await page.getByRole("button", { name: "Take out of use" }).waitFor();
   await page.getByRole("button", { name: "Rename" }).click();
   await page.getByRole("dialog").getByLabel("Name").fill("by-the-door");
@@ -69,11 +70,12 @@ test("two landmarks that are one object are merged", async () => {
   const [first] = (await api("GET", `/maps/${MAP}/landmarks`)).items;
   await api("POST", `/maps/${MAP}/landmarks`, { name: "twin" });
   const page = await go(`/maps/${MAP}/landmarks/${first.name}`);
+  await page.getByText("Details: how well it is told apart").click();
   await page.getByRole("img", { name: /Points .*named/ }).waitFor();
   await page.getByRole("button", { name: "Merge" }).click();
   await page.getByLabel("The other one").selectOption("twin");
   await check(page, "landmark-merge");
-  await page.getByRole("button", { name: "Make them one" }).click();
+  await page.getByRole("dialog").getByRole("button", { name: "Merge" }).click();
   await page.getByText(`twin is part of ${first.name} now`).waitFor();
   const names = (await api("GET", `/maps/${MAP}/landmarks`)).items.map(({ name }) => name);
   assert.ok(!names.includes("twin"), names.join());
@@ -162,12 +164,12 @@ for (const [size, where] of [[undefined, "desk"], [PHONE, "phone"]]) {
     const { id, found, quad } = await answer();
     const page = await go(`/answers/${id}`, size);
     await page.getByRole("img", { name: /The floor with before the frame, as the server had it; by the picture alone/ }).waitFor();
-    const gate = page.getByText(/the position by the picture lies \d+\.\d standard deviations/i);
+    const gate = page.getByText(/the position by the picture and .* are \d+\.\d sigma apart/i);
     await gate.waitFor();
-    assert.ok((await gate.textContent()).includes(`distance ${found.prior_check.distance2.toFixed(1)})`), await gate.textContent());
+    assert.ok((await gate.textContent()).includes(`are ${Math.sqrt(found.prior_check.distance2).toFixed(1)} sigma apart`), await gate.textContent());
     const { landmark, matches } = quad.matched;
     const agreeing = matches.filter(({ agrees }) => agrees).length;
-    const drawing = page.getByRole("img", { name: `Points of the quad joined with points of ${landmark}: ${agreeing} of ${matches.length} agree` }).first();
+    const drawing = page.getByRole("img", { name: `Points of the outline joined with points of ${landmark}: ${agreeing} of ${matches.length} agree` }).first();
     await drawing.waitFor();
     assert.equal(await drawing.locator("line").count(), matches.length);
     assert.equal(await drawing.locator(".agrees line").count(), agreeing);
@@ -181,6 +183,7 @@ for (const [size, where] of [[undefined, "desk"], [PHONE, "phone"]]) {
     const { found } = await answer();
     const name = found.summary.landmarks[0] ?? (await landmarksOf())[0].name;
     const page = await go(`/maps/${MAP}/landmarks/${name}`, size);
+    await page.getByText("Details: how well it is told apart").click();
     const drawing = page.getByRole("img", { name: new RegExp(`^Stored answers of the last 24 hours by hour: [1-9]\\d* name ${name}, \\d+ only compared with it`) });
     await drawing.waitFor();
     assert.equal(await drawing.locator("rect.named").count(), 24);

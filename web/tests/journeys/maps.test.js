@@ -30,7 +30,7 @@ test("maps are made, renamed, copied and deleted", async () => {
   await page.getByRole("textbox", { name: "Name" }).fill("hall");
   await page.getByLabel("Building").fill("Main house");
   await page.getByLabel("Floor").fill("2");
-  await page.getByRole("button", { name: "Make it" }).click();
+  await page.getByRole("button", { name: "Create" }).click();
   await page.getByRole("heading", { name: "hall" }).waitFor();
   await page.getByRole("link", { name: "Waymark" }).click();
   await page.getByRole("heading", { name: "Main house" }).waitFor();
@@ -65,7 +65,7 @@ for (const [size, where] of [[undefined, "desk"], [PHONE, "phone"]]) {
     await page.keyboard.press("Enter");
     await page.getByRole("region", { name: "Chosen landmark" }).waitFor();
     assert.match(page.url(), /landmark=/, "the chosen landmark is in the address");
-    await page.getByRole("button", { name: "What is seen from here" }).click();
+    await page.getByRole("button", { name: "Visible landmarks here" }).click();
     const box = await canvas.boundingBox();
     await page.mouse.click(box.x + box.width / 2, box.y + box.height / 2);
     await page.getByText(/A robot here may see \d+ landmarks?\./).waitFor();
@@ -135,9 +135,13 @@ test("a landmark is moved on the map and snaps to a wall", async () => {
   await api("POST", "/maps/room/landmarks", { name: "sign", size, place: { x_m: -3, y_m: 2, z_m: 1.4, theta_rad: -Math.PI / 2, roll_rad: 0, tilt_rad: 0 } });
   const page = await go("/maps/room?landmark=sign&view=0,0,0.02,0");
   await page.getByRole("button", { name: "Move" }).click();
+  await page.getByRole("button", { name: "Save the place" }).waitFor();
   const box = await page.getByRole("application").boundingBox();
   // 1 m to the right of the middle, 1.8 m below it: 20 cm before the lower wall.
   await page.mouse.click(box.x + box.width / 2 + 50, box.y + box.height / 2 + 90);
+  await page.getByText(/^On the wall at/).waitFor();
+  assert.equal((await api("GET", "/maps/room/landmarks/sign")).place.y_m, 2, "nothing is stored before it is saved");
+  await page.getByRole("button", { name: "Save the place" }).click();
   await page.getByText(/sign is on the wall/).waitFor();
   const { place } = await api("GET", "/maps/room/landmarks/sign");
   assert.ok(Math.abs(place.y_m + 2) < 1e-9 && Math.abs(place.x_m - 1) < 0.1, JSON.stringify(place));
@@ -147,10 +151,13 @@ test("a landmark is moved on the map and snaps to a wall", async () => {
   assert.equal((await api("GET", "/maps/room/landmarks/sign")).place.y_m, 2);
   // By a drag, to 0.3 m before the lower wall.
   await page.getByRole("button", { name: "Move", exact: true }).click();
-  await page.mouse.move(box.x + box.width / 2 - 150, box.y + box.height / 2 - 100);
+  await page.getByRole("button", { name: "Save the place" }).waitFor();
+  const now = await page.getByRole("application").boundingBox();
+  await page.mouse.move(now.x + now.width / 2 - 150, now.y + now.height / 2 - 100);
   await page.mouse.down();
-  await page.mouse.move(box.x + box.width / 2 - 100, box.y + box.height / 2 + 85, { steps: 8 });
+  await page.mouse.move(now.x + now.width / 2 - 100, now.y + now.height / 2 + 85, { steps: 8 });
   await page.mouse.up();
+  await page.getByRole("button", { name: "Save the place" }).click();
   await page.getByText(/sign is on the wall at -2\.\d\d m, -2\.00 m/).waitFor();
   await check(page, "landmark-moved");
 });
@@ -158,7 +165,7 @@ test("a landmark is moved on the map and snaps to a wall", async () => {
 test("a person tells a robot where it is", async () => {
   const page = await go(`/maps/${MAP}`);
   await page.getByRole("region", { name: "Robots on this map" }).getByText("Live").first().waitFor();
-  await page.getByRole("button", { name: "Tell a robot where it is" }).click();
+  await page.getByRole("button", { name: "Set robot position" }).click();
   const robot = await page.getByLabel("Robot", { exact: true }).inputValue();
   const box = await page.getByRole("application").boundingBox();
   await page.mouse.click(box.x + box.width / 2, box.y + box.height / 2);
@@ -167,7 +174,7 @@ test("a person tells a robot where it is", async () => {
   await page.mouse.click(box.x + box.width / 2 + 60, box.y + box.height / 2);
   await page.getByText(`${robot} is told where it is`).waitFor();
   // The same by one drag, which leaves the map where it was.
-  await page.getByRole("button", { name: "Tell a robot where it is" }).click();
+  await page.getByRole("button", { name: "Set robot position" }).click();
   const view = new URL(page.url()).searchParams.get("view");
   await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
   await page.mouse.down();
@@ -193,7 +200,7 @@ test("the blind parts of what a robot drove are shown", async () => {
 for (const [size, where] of [[undefined, "desk"], [PHONE, "phone"]]) {
   test(`where landmarks are seen is drawn, and sheets are printed, at the ${where}`, async () => {
     const page = await go(`/maps/${MAP}`, size);
-    await page.getByRole("button", { name: "Where landmarks are seen" }).click();
+    await page.getByRole("button", { name: "Coverage" }).click();
     await page.getByText(/Areas of ([1-9]\d*) of \1 landmarks? with size and place/).waitFor();
     await check(page, `seen-${where}`);
     await page.goto(`/maps/${MAP}/sheet`);
@@ -207,7 +214,7 @@ for (const [size, where] of [[undefined, "desk"], [PHONE, "phone"]]) {
 
   test(`settings of a map are read and changed, at the ${where}`, async () => {
     const page = await go(`/maps/${MAP}/settings`, size);
-    for (const part of ["Where it lies", "Which camera looks", "Best modality", "Walls from scans"]) {
+    for (const part of ["Position in the building", "Camera assumed for coverage", "Which sensor to trust, where", "Walls from scans"]) {
       await page.getByRole("button", { name: part }).click();
       await page.getByRole("heading", { name: part }).waitFor();
       await page.waitForFunction(() => !document.querySelector(".loading"));
@@ -226,12 +233,12 @@ test("a map lies in another, has a camera, a named area and a choice of what is 
   await page.getByText(`upstairs lies in ${MAP} now.`).waitFor();
   const { parent } = await api("GET", "/maps/upstairs");
   assert.ok(parent.level_m === 3.2 && Math.abs(parent.theta_rad - Math.PI / 2) < 1e-6, JSON.stringify(parent));
-  await page.getByRole("button", { name: "Which camera looks" }).click();
+  await page.getByRole("button", { name: "Camera assumed for coverage" }).click();
   await page.getByLabel("Camera above the floor, m").fill("0.9");
   await page.getByRole("button", { name: "Save", exact: true }).click();
   await page.getByText(/The camera is set/).waitFor();
   assert.equal((await api("GET", "/maps/upstairs/visibility-settings")).camera_height_m, 0.9);
-  await page.getByRole("button", { name: "Best modality" }).click();
+  await page.getByRole("button", { name: "Which sensor to trust, where" }).click();
   await page.getByLabel(/^Where runs have told/).selectOption("best");
   await page.getByText("The choice is kept.").waitFor();
   await page.getByRole("button", { name: "Name an area" }).click();
@@ -263,14 +270,14 @@ test("walls are made of a robot's scans, or the drive is given up", async () => 
 
 test("a map is saved as a file and loaded under another name", async () => {
   const page = await go(`/maps/${MAP}/settings`);
-  const [download] = await Promise.all([page.waitForEvent("download"), page.getByRole("link", { name: "Save the map as a file" }).click()]);
+  const [download] = await Promise.all([page.waitForEvent("download"), page.getByRole("link", { name: "Export map" }).click()]);
   assert.equal(download.suggestedFilename(), `${MAP}.zip`);
   const file = await download.path();
   await page.goto("/");
-  await page.getByRole("button", { name: "Load a map from a file" }).click();
+  await page.getByRole("button", { name: "Import map" }).click();
   await page.getByRole("dialog").getByLabel("File", { exact: true }).setInputFiles({ name: "map.zip", mimeType: "application/zip", buffer: await readFile(file) });
-  await page.getByRole("dialog").getByLabel(/called otherwise/).fill("twin");
-  await page.getByRole("button", { name: "Load it" }).click();
+  await page.getByRole("dialog").getByLabel(/New name/).fill("twin");
+  await page.getByRole("button", { name: "Import", exact: true }).click();
   await page.getByRole("heading", { name: "twin", level: 1 }).waitFor();
   const [a, b] = [await api("GET", `/maps/${MAP}`), await api("GET", "/maps/twin")];
   assert.equal(a.landmarks, b.landmarks);

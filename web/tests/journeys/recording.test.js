@@ -75,7 +75,7 @@ for (const [size, where] of [[undefined, "desk"], [PHONE, "phone"]]) {
     await page.goto("/robots");
     const cells = page.getByRole("row").filter({ hasText: robot });
     await cells.getByText("Not connected").waitFor();
-    await cells.getByRole("cell", { name: /^\d+ (s|min) ago$/ }).first().waitFor();
+    await cells.getByRole("cell", { name: /^(Last seen )?\d+ (s|min) ago$/ }).first().waitFor();
     // A page that is opened after the robot has stopped does not show it alive.
     await page.goto("/maps/hall");
     await row.getByText("Not connected", { exact: true }).waitFor();

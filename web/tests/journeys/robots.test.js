@@ -1,7 +1,7 @@
 // Journeys about robots, what they were told, and the server, at a desk and on a phone.
 import assert from "node:assert/strict";
 import { after, afterEach, before, test } from "node:test";
-import { PHONE, SOON, asker, browser, check, demo, open } from "./harness.js";
+import { PHONE, SOON, asker, browser, check, demo, guestOf, open } from "./harness.js";
 
 let server, its, api;
 before(async () => {
@@ -28,7 +28,7 @@ for (const [size, where] of [[undefined, "desk"], [PHONE, "phone"]]) {
     await check(page, `robots-${where}`);
     await page.getByRole("row").nth(1).getByRole("link").first().click();
     await page.getByRole("img", { name: /Last frame/ }).first().waitFor();
-    await page.getByText(/From receipt to answer, ms: \d/).waitFor();
+    await page.getByText(/Response time, ms: \d/).waitFor();
     await check(page, `robot-${where}`);
   });
 
@@ -140,7 +140,7 @@ test("a camera is calibrated from what it has seen, or it is said what is missin
 
 test("a viewer sees no button that may not be pressed, and is refused all the same", async () => {
   const { text } = await api("POST", "/tokens", { name: "guest", role: "viewer" });
-  const guest = await its.context.browser().newContext({ baseURL: server.origin });
+  const guest = await guestOf(its, server);
   const page = await open(guest, server.origin, "/");
   await page.getByLabel("Token").fill(text);
   await page.getByRole("button", { name: "Sign in" }).click();

@@ -37,7 +37,7 @@ for (const [size, where] of [[undefined, "desk"], [PHONE, "phone"]]) {
     await page.getByText(/Nothing is wrong/).waitFor();
     const { storage } = await api("GET", "/readyz");
     await page.getByText(new RegExp(`^\\s*${storage.used_percent} % of .* used, .* free.*From ${storage.limit_percent} % on, learning and uploads are refused`)).waitFor();
-    await page.getByText("This server is alone: it joins no router.").waitFor();
+    await page.getByText("Stand-alone server.").waitFor();
     await page.getByRole("row").filter({ hasText: "(this one)" }).getByRole("link", { name: "hall" }).waitFor();
     await check(page, `health-${where}`);
   });

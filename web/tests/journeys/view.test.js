@@ -66,10 +66,10 @@ for (const [size, where] of [[undefined, "desk"], [PHONE, "phone"]]) {
     await page.getByLabel("How opaque: Floor plan").fill("1");
     const rows = async () => (await page.locator(".layers li").allTextContents()).map((text) => text.replace(/[▲▼]/g, "").trim());
     assert.deepEqual((await rows()).at(-1), "Floor plan");
-    await page.locator("summary").press("Enter");
+    await page.locator(".layers summary").press("Enter");
     const shown = await walls();
     assert.ok(shown > 300, `${shown} pixels of walls over the plan`);
-    await page.locator("summary").press("Enter");
+    await page.locator(".layers summary").press("Enter");
     const up = page.getByRole("button", { name: "Move up: Floor plan" });
     await up.focus();
     for (let i = 0; i < 4; i++) await page.keyboard.press("Enter");
@@ -78,7 +78,7 @@ for (const [size, where] of [[undefined, "desk"], [PHONE, "phone"]]) {
     await page.getByText("Floor plan: number 1 of 5 from the top.").waitFor({ state: "attached" });
     await page.waitForURL(/order=walls\.landmarks\.tracks\.robots\.plan/);
     await check(page, `layers-${where}`);
-    await page.locator("summary").press("Enter");
+    await page.locator(".layers summary").press("Enter");
     const hidden = await walls();
     assert.ok(hidden < shown / 10, `${hidden} of ${shown} pixels of walls beneath the plan`);
     const address = page.url();
@@ -150,6 +150,8 @@ test("a grid of ROS is laid beneath a map by its two files, and a picture by a l
   await page.getByText("The floor plan is set.").waitFor();
   const underlay = await api("GET", "/maps/cellar/underlay");
   assert.deepEqual([underlay.place.metres_per_pixel, underlay.place.x_m, underlay.place.y_m, underlay.width_px], [0.25, -5, -2.5, 40]);
+  // The form is closed; it is opened once more to measure.
+  await page.getByRole("button", { name: "Floor plan" }).click();
   const line = page.getByRole("group", { name: "Measured line" });
   await line.scrollIntoViewIfNeeded();
   const box = await line.boundingBox();

@@ -39,9 +39,9 @@ test("every reason for no position has words", () => {
 
 test("the gate of the known position is told with its number and limit", () => {
   const check = { prior: {}, seen: {}, distance2: 20.25, limit: 11.34, source: "robot" as const, refused: true };
-  expect(priorText(check)).toBe("Refused: the position by the picture lies 4.5 standard deviations (squared Mahalanobis distance 20.3) from the one that the robot sent; at most 3.4 (11.3) is let pass.");
-  expect(priorText({ ...check, distance2: 1, refused: false })).toMatch(/^Let pass: .* 1\.0 standard deviations/);
-  expect(priorText({ ...check, distance2: 1, refused: false, source: "server" })).toMatch(/refuses nothing.* within 3\.4 \(11\.3\)\.$/);
+  expect(priorText(check)).toBe("Disagrees: the position by the picture and the one that the robot sent are 4.5 sigma apart; at most 3.4 sigma is let pass.");
+  expect(priorText({ ...check, distance2: 1, refused: false })).toMatch(/^Agrees: .* 1\.0 sigma apart/);
+  expect(priorText({ ...check, distance2: 1, refused: false, source: "server" })).toMatch(/refuses nothing.* within 3\.4 sigma\.$/);
   expect(priorText({ ...check, distance2: null })).toMatch(/gave no position/);
 });
 

@@ -4,7 +4,9 @@ use super::{
     authorisation::{token, with_token},
     *,
 };
+use crate::identity::TokenId;
 use protos::api::Role;
+use std::time::Instant;
 
 /// A request as the browser sends it.
 pub(super) fn with_cookie(mut request: Request<Body>, cookie: &str) -> Request<Body> {
@@ -55,6 +57,26 @@ async fn a_link_opens_the_page_once_with_the_rights_of_its_maker() {
     assert_eq!(ask(request("GET", "/api/v1/maps/hall/live", "")).await.status(), StatusCode::OK);
     let forbidden = from_page(request("POST", "/api/v1/maps", r#"{"name": "x"}"#));
     assert_eq!(read(ask(forbidden).await).await.1["code"], "forbidden");
+}
+
+#[tokio::test]
+async fn a_session_outlives_the_server_and_one_that_was_logged_out_does_not() {
+    let service = Service::start(Limits::default()).await;
+    let viewer = token(&service, Role::Viewer, None, None).await;
+    let form = || from_page(request("POST", "/login", format!("{{\"token\": \"{viewer}\"}}")));
+    let value = |set: &str| set.split_once('=').unwrap().1.to_owned();
+    let [kept, left] =
+        [cookie(&service.ask_as_it_is(form()).await), cookie(&service.ask_as_it_is(form()).await)];
+    let out = from_page(with_cookie(request("POST", "/logout", ""), &left));
+    assert_eq!(service.ask_as_it_is(out).await.status(), StatusCode::NO_CONTENT);
+    let local = link(&service, &service.local).await;
+    let local = cookie(&service.ask_as_it_is(request("GET", &local, "")).await);
+    // What the next start knows.
+    let next = page_session::resumed_sessions(&service.store).await;
+    let of = |cookie: &str| next.token(&value(cookie), Instant::now());
+    assert_eq!(of(&kept), Some(TokenId::Stored(1)));
+    assert_eq!(of(&local), Some(TokenId::Local));
+    assert_eq!(of(&left), None, "it was logged out");
 }
 
 #[tokio::test]

@@ -276,6 +276,7 @@ async fn every_column_of_a_map_is_in_its_history() {
         "gatherings",
         "tracks",
         "stored_answers",
+        "page_sessions",
         "refused_views",
         "visibility_areas",
         "draft_landmarks",

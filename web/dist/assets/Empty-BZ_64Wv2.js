@@ -1,1 +1,0 @@
-import{s as i,x as o,d,c as l,t as m,g as n,A as v,B as c}from"./index-w8fjWeUi.js";import{s as f}from"./snippet-BQhQbBL0.js";var h=n('<div class="card empty svelte-1fpw1hr"><p> </p> <!></div>');function y(e,t){var a=h(),s=l(a),r=c(s,!0),p=i(s,2);f(p,()=>t.children??m),o(()=>v(r,t.what)),d(e,a)}export{y as E};

@@ -1,1 +1,0 @@
-import{d as i,g as s,c as d}from"./index-w8fjWeUi.js";import{s as e}from"./snippet-BQhQbBL0.js";var p=s('<div class="scroll" role="group" tabindex="0" aria-label="Table"><!></div>');function n(a,o){var r=p(),l=d(r);e(l,()=>o.children),i(a,r)}export{n as S};

@@ -1,1 +1,0 @@
-import{x as r,d as n,g as l,a5 as i,z as o,A as m,B as _}from"./index-w8fjWeUi.js";var d=l("<span> </span>");function v(e,a){var t=d(),s=_(t,!0);r(()=>{i(t,1,`state ${a.kind??""}`,"svelte-lrhrev"),o(t,"title",a.meaning),m(s,a.word)}),n(e,t)}export{v as S};

@@ -1,1 +1,0 @@
-import{J as s,i as n}from"./index-w8fjWeUi.js";const i=400;async function f(o,a){for(;;){const t=await s(n`/jobs/${o}`);if(t.state!=="queued"&&t.state!=="running")return t;a(t),await new Promise(e=>setTimeout(e,i))}}export{f};

@@ -1,0 +1,21 @@
+// The icons of the pages: one set (Lucide), one size. They stand beside words or have a label, so that they are decoration.
+export { default as Bot } from "@lucide/svelte/icons/bot";
+export { default as Camera } from "@lucide/svelte/icons/camera";
+export { default as Compass } from "@lucide/svelte/icons/compass";
+export { default as Expand } from "@lucide/svelte/icons/expand";
+export { default as Eye } from "@lucide/svelte/icons/eye";
+export { default as Flame } from "@lucide/svelte/icons/flame";
+export { default as History } from "@lucide/svelte/icons/history";
+export { default as House } from "@lucide/svelte/icons/house";
+export { default as MapIcon } from "@lucide/svelte/icons/map";
+export { default as MapPin } from "@lucide/svelte/icons/map-pin";
+export { default as Minus } from "@lucide/svelte/icons/minus";
+export { default as Navigation } from "@lucide/svelte/icons/navigation";
+export { default as Pencil } from "@lucide/svelte/icons/pencil";
+export { default as Plus } from "@lucide/svelte/icons/plus";
+export { default as RotateCcw } from "@lucide/svelte/icons/rotate-ccw";
+export { default as Route } from "@lucide/svelte/icons/route";
+export { default as Ruler } from "@lucide/svelte/icons/ruler";
+export { default as ScanSearch } from "@lucide/svelte/icons/scan-search";
+export { default as Server } from "@lucide/svelte/icons/server";
+export { default as Settings } from "@lucide/svelte/icons/settings";

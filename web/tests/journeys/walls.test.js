@@ -1,0 +1,159 @@
+// Journeys from a floor plan to walls and to the first placed landmark: walls are traced, moved, removed, offered of the plan.
+import assert from "node:assert/strict";
+import { mkdtempSync, rmSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { after, afterEach, before, test } from "node:test";
+import { PHONE, asker, browser, check, open, serve } from "./harness.js";
+
+let folder, server, its, api;
+before(async () => {
+  folder = mkdtempSync(join(tmpdir(), "waymark-walls-"));
+  server = await serve("--data", folder, "--zenoh", "tcp/127.0.0.1:0");
+  its = await browser(server);
+  api = asker(its, server);
+});
+after(async () => {
+  await its?.close();
+  await server?.stop();
+  if (folder) rmSync(folder, { recursive: true, force: true });
+});
+afterEach(() => Promise.all(its.context.pages().map((page) => page.close())));
+
+const go = (address, size) => open(its.context, server.origin, address, size);
+const wallsOf = async (map) => (await api("GET", `/maps/${map}/walls`)).segments;
+
+/** A map with a plan of 20 m by 12 m: a room, its outline drawn 1 m inside of the picture, and a landmark without a place. */
+async function planned(map) {
+  await api("POST", "/maps", { name: map });
+  await api("POST", `/maps/${map}/landmarks`, { name: "sign", size: { width_m: 0.6, height_m: 0.8 } });
+  const page = await its.context.newPage();
+  await page.goto(server.origin);
+  const base64 = await page.evaluate(() => {
+    const canvas = Object.assign(document.createElement("canvas"), { width: 400, height: 240 });
+    const pen = canvas.getContext("2d");
+    pen.fillStyle = "#fff";
+    pen.fillRect(0, 0, 400, 240);
+    pen.lineWidth = 4;
+    pen.strokeRect(20, 20, 360, 200);
+    return canvas.toDataURL("image/png").split(",")[1];
+  });
+  await page.close();
+  const multipart = { image: { name: "plan.png", mimeType: "image/png", buffer: Buffer.from(base64, "base64") }, metres_per_pixel: "0.05", x_m: "0", y_m: "0" };
+  const answer = await its.context.request.put(`${server.origin}/api/v1/maps/${map}/underlay`, { headers: { "x-waymark-page": "1", "if-match": "*" }, multipart });
+  assert.ok(answer.ok(), await answer.text());
+}
+
+/** Where a point of the floor is on the screen. The view of these journeys has its middle at 10, 6. */
+async function screen(page, metres_of_a_pixel) {
+  const floor = page.getByRole("application");
+  await floor.evaluate((element) => element.scrollIntoView({ block: "center" }));
+  const box = await floor.boundingBox();
+  return (x, y) => [box.x + box.width / 2 + (x - 10) / metres_of_a_pixel, box.y + box.height / 2 - (y - 6) / metres_of_a_pixel];
+}
+
+const near = (wall, [ax, ay, bx, by]) => {
+  const off = (values) => Math.max(...values.map(([got, wanted]) => Math.abs(got - wanted)));
+  const { a, b } = wall;
+  return Math.min(off([[a[0], ax], [a[1], ay], [b[0], bx], [b[1], by]]), off([[b[0], ax], [b[1], ay], [a[0], bx], [a[1], by]])) < 0.15;
+};
+
+for (const [size, where, scale] of [[undefined, "desk", 0.03], [PHONE, "phone", 0.06]]) {
+  test(`walls are traced on a plan and the first landmark is placed within twelve clicks, at the ${where}`, async () => {
+    const map = `traced-${where}`;
+    await planned(map);
+    const page = await go(`/maps/${map}?view=10,6,${scale},0`, size);
+    let clicks = 0;
+    const press = async (locator) => {
+      clicks += 1;
+      await locator.click();
+    };
+    const at = async (x, y) => {
+      clicks += 1;
+      await page.mouse.click(...(await screen(page, scale))(x, y));
+    };
+    await press(page.getByRole("button", { name: "Trace walls" }));
+    await page.getByText("Click where a wall begins.").waitFor();
+    // A little beside: right angles and ends snap.
+    await at(1, 1);
+    await at(19, 1.3);
+    await at(19.2, 11);
+    await at(1.2, 11.2);
+    await at(1.1, 1.1);
+    assert.equal((await wallsOf(map)).length, 0, "nothing is stored before it is saved");
+    await check(page, `walls-${where}`);
+    await press(page.getByRole("button", { name: "Save the walls" }));
+    await page.getByText("The walls are saved: 4 drawn or moved, 0 taken away or moved.").waitFor();
+    const walls = await wallsOf(map);
+    assert.equal(walls.length, 4);
+    for (const { a, b } of walls) assert.ok(Math.abs(a[0] - b[0]) < 1e-6 || Math.abs(a[1] - b[1]) < 1e-6, `${a} to ${b} is square`);
+    const corners = new Set(walls.flatMap(({ a, b }) => [a, b]).map(([x, y]) => `${x.toFixed(6)} ${y.toFixed(6)}`));
+    assert.equal(corners.size, 4, "ends meet");
+    await press(page.getByRole("region", { name: "Landmarks", exact: true }).getByRole("button", { name: "sign" }));
+    await press(page.getByRole("button", { name: "Place on the map" }));
+    const top = Math.max(...walls.map(({ a }) => a[1]));
+    await at(10, top - 0.3);
+    await page.getByText(/^On the wall at/).waitFor();
+    assert.equal(await page.getByLabel("Faces, degrees").inputValue(), "270", "the wall gives the direction");
+    await page.getByLabel("Centre above the floor, m").fill("1.6");
+    await press(page.getByRole("button", { name: "Save the place" }));
+    await page.getByText(/sign is on the wall at .* 1\.60 m above the floor, and faces 270°/).waitFor();
+    const { place } = await api("GET", `/maps/${map}/landmarks/sign`);
+    assert.ok(Math.abs(place.y_m - top) < 1e-6 && place.z_m === 1.6, JSON.stringify(place));
+    assert.ok(clicks <= 12, `${clicks} clicks`);
+    assert.deepEqual(page.faults, []);
+  });
+}
+
+test("a single wall is chosen, moved, removed, and saved with a way back", async () => {
+  await api("POST", "/maps", { name: "single" });
+  const stored = [{ a: [6, 4], b: [14, 4], covariance: [1e-6, 0, 1e-4] }, { a: [6, 8], b: [14, 8] }];
+  await api("PUT", "/maps/single/walls", { segments: stored }, { "if-match": "*" });
+  const page = await go("/maps/single?view=10,6,0.03,0");
+  await page.getByRole("button", { name: "Trace walls" }).click();
+  await page.getByRole("button", { name: "Choose" }).click();
+  const to = await screen(page, 0.03);
+  await page.mouse.click(...to(10, 8.1));
+  await page.getByText("Drag the wall, or one of its ends; or remove it.").waitFor();
+  await page.mouse.move(...to(10, 8));
+  await page.mouse.down();
+  await page.mouse.move(...to(10, 9), { steps: 6 });
+  await page.mouse.up();
+  await page.mouse.click(...to(10, 4));
+  await page.keyboard.press("Delete");
+  await page.getByRole("button", { name: "One step back" }).click();
+  await page.getByRole("button", { name: "Save the walls" }).click();
+  await page.getByText(/The walls are saved/).waitFor();
+  const moved = await wallsOf("single");
+  assert.ok(moved.length === 2 && near(moved[1], [6, 9, 14, 9]), JSON.stringify(moved));
+  assert.deepEqual(moved[0], stored[0], "what nobody touched is as it was, with how well it is known");
+  await page.getByRole("button", { name: "Trace walls" }).click();
+  await page.getByRole("button", { name: "Choose" }).click();
+  await page.mouse.click(...(await screen(page, 0.03))(10, 4));
+  await page.getByRole("button", { name: "Remove this wall" }).click();
+  await page.getByRole("button", { name: "Save the walls" }).click();
+  const told = page.getByRole("status").filter({ hasText: "0 drawn or moved, 1 taken away" });
+  await told.waitFor();
+  assert.equal((await wallsOf("single")).length, 1);
+  await told.getByRole("button", { name: "Undo" }).click();
+  await page.getByText(/2 wall segments/).waitFor();
+  assert.equal((await wallsOf("single")).length, 2);
+});
+
+test("walls that are found in a plan are shown, and stored only when they are taken", async () => {
+  await planned("found");
+  const page = await go("/maps/found?view=10,6,0.03,0");
+  await page.getByRole("button", { name: "Trace walls" }).click();
+  await page.getByRole("button", { name: "Find walls in the plan" }).click();
+  await page.getByText("4 lines of the plan may be walls").waitFor();
+  await check(page, "walls-offered");
+  assert.equal((await wallsOf("found")).length, 0);
+  await page.getByRole("button", { name: "Leave them out" }).click();
+  assert.ok(await page.getByRole("button", { name: "Save the walls" }).isDisabled());
+  await page.getByRole("button", { name: "Find walls in the plan" }).click();
+  await page.getByRole("button", { name: "Take 4 walls" }).click();
+  await page.getByRole("button", { name: "Save the walls" }).click();
+  await page.getByText("The walls are saved: 4 drawn or moved").waitFor();
+  const walls = await wallsOf("found");
+  for (const wanted of [[1, 1, 19, 1], [1, 11, 19, 11], [1, 1, 1, 11], [19, 1, 19, 11]]) assert.ok(walls.some((wall) => near(wall, wanted)), `${wanted} of ${JSON.stringify(walls)}`);
+});
