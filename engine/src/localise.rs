@@ -3,9 +3,9 @@
 
 use super::{
     ambiguous_observations::ambiguous_observations,
-    frame_answer::cautions,
     fixes::{NoFix, landmark_observations, robot_fixes},
     frame_analysis::{StageTimes, analyse_frame, frame_camera},
+    frame_answer::cautions,
     relocalise::{RelocalisationInput, Relocalisers},
     snapshot::MapSnapshot,
 };

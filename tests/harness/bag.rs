@@ -37,7 +37,7 @@ pub struct Stop {
 pub struct LaserTopic {
     /// Where.
     pub topic: &'static str,
-    /// Whether the first ray comes again after a turn, as that of a TurtleBot3 in Gazebo.
+    /// Whether the first ray comes again after a turn, as that of a `TurtleBot3` in Gazebo.
     pub repeats_first: bool,
 }
 
