@@ -78,7 +78,8 @@ pub fn frame(path: &Path) -> Result<Sent, PictureError> {
     let limits = ImageLimits { bytes: MAX_ENCODED_IMAGE_BYTES, ..ImageLimits::FRAME };
     let turned = is_turned(&bytes);
     let fitted = if turned { made(&bytes, limits) } else { fitted(&bytes, limits) };
-    Ok(fitted.unwrap_or(Sent { bytes, shrunk: None }))
+    let lens = Lens::of_photograph(&bytes);
+    Ok(Sent { lens, ..fitted.unwrap_or(Sent { bytes, shrunk: None, lens: None }) })
 }
 
 /// Whether a file states that its picture is to be turned.
@@ -205,12 +206,12 @@ mod tests {
         assert!(!is_turned(&turned.bytes));
         // As it is.
         let plain = file(ImageFormat::Jpeg);
-        assert_eq!(sent(&plain), Sent { bytes: plain, shrunk: None });
+        assert_eq!(sent(&plain), Sent { bytes: plain, shrunk: None, lens: None });
         let mut large = Cursor::new(Vec::new());
         DynamicImage::ImageLuma8(image::GrayImage::new(2400, 1800))
             .write_to(&mut large, ImageFormat::Jpeg)
             .unwrap();
-        let Sent { bytes, shrunk } = sent(&portrait(&large.into_inner()));
+        let Sent { bytes, shrunk, .. } = sent(&portrait(&large.into_inner()));
         let Some([before, [width, height]]) = shrunk else { panic!("not made smaller") };
         assert_eq!(
             (before, picture::upright_size(&bytes)),

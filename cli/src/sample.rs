@@ -10,6 +10,7 @@ use sim::{
     render::Renderer,
 };
 use std::{
+    fmt::Write as _,
     fs,
     path::{Path, PathBuf},
 };
@@ -50,7 +51,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
         let image = office::photograph(&mut renderer, &building, standpoint, number);
         put(folder, name, &pictures::photograph_jpeg(&image)?)?;
         let at = office::pose(&building, standpoint).translation.vector;
-        truths.push_str(&format!("{name},{:.3},{:.3},{:.3}\n", at.x, at.y, at.z));
+        writeln!(truths, "{name},{:.3},{:.3},{:.3}", at.x, at.y, at.z)?;
     }
     for (number, standpoint) in (0_u64..).zip(office::around()) {
         let image = office::photograph(&mut renderer, &building, &standpoint, 100 + number);

@@ -136,21 +136,16 @@ fn check_topic(path: &Path, args: &ScanArgs, channels: &[Arc<ChannelInfo>]) -> R
 
 fn no_scans(path: &Path, robot: &Name, is_bag: bool, problems: &BTreeMap<String, (u64, String)>) -> Failure {
     let whose = if is_bag { String::new() } else { format!(" of robot {robot}") };
-    match problems.values().max_by_key(|(count, _)| *count) {
-        Some((count, first)) => {
-            let sentence =
-                format!("No scan{whose} in {} can be used: {count} times {first}.", path.display());
-            let advice = if is_bag {
-                "Scans need odometry of their time: --odometry, --base-frame and --odom-frame name topic and frames."
-            } else {
-                ""
-            };
-            Failure::new(Class::Refused, "no_scans", sentence).advise(advice)
-        }
-        None => {
-            let sentence = format!("There are no laser scans{whose} in {}.", path.display());
-            Failure::new(Class::NotFound, "no_scans", sentence)
-                .advise("Walls need the scans of a laser: record a robot that sends them.")
-        }
+    if let Some((count, first)) = problems.values().max_by_key(|(count, _)| *count) {
+        let sentence = format!("No scan{whose} in {} can be used: {count} times {first}.", path.display());
+        let advice = if is_bag {
+            "Scans need odometry of their time: --odometry, --base-frame and --odom-frame name topic and frames."
+        } else {
+            ""
+        };
+        return Failure::new(Class::Refused, "no_scans", sentence).advise(advice);
     }
+    let sentence = format!("There are no laser scans{whose} in {}.", path.display());
+    Failure::new(Class::NotFound, "no_scans", sentence)
+        .advise("Walls need the scans of a laser: record a robot that sends them.")
 }

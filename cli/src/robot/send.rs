@@ -67,11 +67,19 @@ pub(super) async fn run(session: &Session, args: &Args) -> anyhow::Result<()> {
 
 async fn photograph(session: &Session, robot: &RobotClient, args: &Args, path: &Path) -> anyhow::Result<()> {
     let name = path.display().to_string();
-    let Sent { bytes, shrunk } = pictures::frame(path).with_context(|| name.clone())?;
+    let Sent { bytes, shrunk, lens } = pictures::frame(path).with_context(|| name.clone())?;
     if let Some([[w, h], [to_w, to_h]]) = shrunk {
         session.note(&format!("{name}: {w}x{h} px made {to_w}x{to_h}; corners are of that size."));
     }
-    let camera = args.camera.map(|camera| camera.of_photograph(&bytes)).transpose()?;
+    let camera = match &args.camera {
+        Some(camera) => {
+            if let Some(caution) = camera.check_lens(lens.as_ref())? {
+                session.note(&format!("{name}: {caution}"));
+            }
+            Some(camera.of_photograph(&bytes)?)
+        }
+        None => None,
+    };
     let mut capture = Capture::encoded(bytes).with_context(|| name.clone())?;
     if let Some(camera) = &camera {
         capture = capture.with_intrinsics(camera);

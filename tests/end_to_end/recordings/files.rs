@@ -73,7 +73,7 @@ fn walls_are_built_from_a_bag() {
     assert!(words.contains("--odometry") && words.contains("--odom-frame"), "{words}");
 }
 
-/// TurtleBot3 in Gazebo (ROBOTIS-GIT/turtlebot3 #404): 360 rays, a step of 0.017501922 rad, so that the last one is the
+/// `TurtleBot3` in Gazebo (ROBOTIS-GIT/turtlebot3 #404): 360 rays, a step of 0.017501922 rad, so that the last one is the
 /// first one again.
 #[tokio::test(flavor = "multi_thread")]
 async fn the_scans_of_a_turtlebot_are_used_and_walls_are_built_of_them() {
@@ -118,11 +118,11 @@ async fn the_scans_of_a_turtlebot_are_used_and_walls_are_built_of_them() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn what_cannot_be_played_is_said_and_fails() {
+    const IMAGE: &str = "sensor_msgs/msg/Image";
+    const CHATTER: &str = "std_msgs/msg/String";
     let inside = Inside::start(Limits::default()).await;
     let folder = tempfile::tempdir().expect("a folder");
     let at = |name: &str| folder.path().join(name);
-    const IMAGE: &str = "sensor_msgs/msg/Image";
-    const CHATTER: &str = "std_msgs/msg/String";
     let packed: &[u8] = b"\x28\xb5\x2f\xfd\x04\x00rest";
     bag::write_raw(&at("packed.mcap"), "cdr", &[("/cam/image_raw", IMAGE, packed), ("/scan", IMAGE, packed)]);
     bag::write_raw(&at("chatter.mcap"), "cdr", &[("/chatter", CHATTER, b"\0\x01\0\0")]);
