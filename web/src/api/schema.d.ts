@@ -748,7 +748,10 @@ export interface paths {
         delete: operations["delete"];
         options?: never;
         head?: never;
-        /** Renames it; sets or forgets size and place; sets how far it is trusted. Everything that belongs to it follows the name. */
+        /**
+         * Renames it; sets or forgets size and place; sets how far it is trusted. Everything that belongs to it follows the name. A size whose
+         *     ratio of sides its photographs contradict is refused.
+         */
         patch: operations["patch"];
         trace?: never;
     };
@@ -909,7 +912,8 @@ export interface paths {
          *     none or more than one, the refusal lists what it saw. The same picture with the same corners a second time is
          *     answered with 200 and the view that is there; so is a near-duplicate of a view, which is not stored, as it would teach
          *     nothing (`outcome` says which). With `create` the landmark is made, too, if there is none of this name: nothing is made
-         *     where the view is refused. A size is set where the landmark has none by hand; another one is refused.
+         *     where the view is refused. A size is set where the landmark has none by hand; another one is refused, and so is one whose
+         *     ratio of sides the photographs contradict.
          */
         post: operations["add"];
         delete?: never;
@@ -11884,7 +11888,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description exists */
+            /** @description exists; aspect_differs, with `stated`, `measured_aspect`, `aspect_sigma` and `swapped` */
             409: {
                 headers: {
                     [name: string]: unknown;
@@ -13091,7 +13095,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description too_many; size_differs, with `stored` and `given`, in_progress */
+            /** @description too_many; size_differs, with `stored` and `given`; aspect_differs, with `stated`, `measured_aspect`, `aspect_sigma` and `swapped`, in_progress */
             409: {
                 headers: {
                     [name: string]: unknown;

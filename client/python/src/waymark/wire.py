@@ -379,6 +379,8 @@ class Answer:
     camera_pose: CameraPose | None = None
     # Why recognised landmarks gave no pose of the camera; empty where they did.
     camera_pose_refusal: str = ""
+    # What the walls of the map say against the pose of a photograph: behind_wall, outside_map. The pose stands all the same.
+    pose_cautions: tuple[str, ...] = ()
 
     def accepted(self) -> Answer:
         """This answer; raises `Refused` with the code and the field if the server refused the frame."""

@@ -467,7 +467,7 @@ class Hypothesis(_message.Message):
     def __init__(self, probability: _Optional[float] = ..., map_from_robot: _Optional[_Union[Pose2Covariance, _Mapping]] = ...) -> None: ...
 
 class Answer(_message.Message):
-    __slots__ = ("epoch", "seq", "captured_ns", "map", "map_version", "status", "rejection", "quads", "map_from_robot", "pose_landmarks", "latency_ms", "timings", "clock_suspect", "pose_refusal", "hypotheses", "guided_map_from_robot", "guided_landmarks", "only_expected", "pose_refusal_detail", "camera_pose", "camera_pose_refusal", "server")
+    __slots__ = ("epoch", "seq", "captured_ns", "map", "map_version", "status", "rejection", "quads", "map_from_robot", "pose_landmarks", "latency_ms", "timings", "clock_suspect", "pose_refusal", "hypotheses", "guided_map_from_robot", "guided_landmarks", "only_expected", "pose_refusal_detail", "camera_pose", "camera_pose_refusal", "server", "pose_cautions")
     EPOCH_FIELD_NUMBER: _ClassVar[int]
     SEQ_FIELD_NUMBER: _ClassVar[int]
     CAPTURED_NS_FIELD_NUMBER: _ClassVar[int]
@@ -490,6 +490,7 @@ class Answer(_message.Message):
     CAMERA_POSE_FIELD_NUMBER: _ClassVar[int]
     CAMERA_POSE_REFUSAL_FIELD_NUMBER: _ClassVar[int]
     SERVER_FIELD_NUMBER: _ClassVar[int]
+    POSE_CAUTIONS_FIELD_NUMBER: _ClassVar[int]
     epoch: int
     seq: int
     captured_ns: int
@@ -512,7 +513,8 @@ class Answer(_message.Message):
     camera_pose: CameraPose
     camera_pose_refusal: str
     server: str
-    def __init__(self, epoch: _Optional[int] = ..., seq: _Optional[int] = ..., captured_ns: _Optional[int] = ..., map: _Optional[str] = ..., map_version: _Optional[int] = ..., status: _Optional[_Union[Status, str]] = ..., rejection: _Optional[_Union[Rejection, _Mapping]] = ..., quads: _Optional[_Iterable[_Union[QuadAnswer, _Mapping]]] = ..., map_from_robot: _Optional[_Union[Pose2Covariance, _Mapping]] = ..., pose_landmarks: _Optional[_Iterable[str]] = ..., latency_ms: _Optional[float] = ..., timings: _Optional[_Iterable[_Union[StageTime, _Mapping]]] = ..., clock_suspect: bool = ..., pose_refusal: _Optional[str] = ..., hypotheses: _Optional[_Iterable[_Union[Hypothesis, _Mapping]]] = ..., guided_map_from_robot: _Optional[_Union[Pose2Covariance, _Mapping]] = ..., guided_landmarks: _Optional[_Iterable[str]] = ..., only_expected: bool = ..., pose_refusal_detail: _Optional[_Union[PoseRefusalDetail, _Mapping]] = ..., camera_pose: _Optional[_Union[CameraPose, _Mapping]] = ..., camera_pose_refusal: _Optional[str] = ..., server: _Optional[str] = ...) -> None: ...
+    pose_cautions: _containers.RepeatedScalarFieldContainer[str]
+    def __init__(self, epoch: _Optional[int] = ..., seq: _Optional[int] = ..., captured_ns: _Optional[int] = ..., map: _Optional[str] = ..., map_version: _Optional[int] = ..., status: _Optional[_Union[Status, str]] = ..., rejection: _Optional[_Union[Rejection, _Mapping]] = ..., quads: _Optional[_Iterable[_Union[QuadAnswer, _Mapping]]] = ..., map_from_robot: _Optional[_Union[Pose2Covariance, _Mapping]] = ..., pose_landmarks: _Optional[_Iterable[str]] = ..., latency_ms: _Optional[float] = ..., timings: _Optional[_Iterable[_Union[StageTime, _Mapping]]] = ..., clock_suspect: bool = ..., pose_refusal: _Optional[str] = ..., hypotheses: _Optional[_Iterable[_Union[Hypothesis, _Mapping]]] = ..., guided_map_from_robot: _Optional[_Union[Pose2Covariance, _Mapping]] = ..., guided_landmarks: _Optional[_Iterable[str]] = ..., only_expected: bool = ..., pose_refusal_detail: _Optional[_Union[PoseRefusalDetail, _Mapping]] = ..., camera_pose: _Optional[_Union[CameraPose, _Mapping]] = ..., camera_pose_refusal: _Optional[str] = ..., server: _Optional[str] = ..., pose_cautions: _Optional[_Iterable[str]] = ...) -> None: ...
 
 class Odometry(_message.Message):
     __slots__ = ("epoch", "seq", "captured_ns", "odom_from_robot", "map")
