@@ -152,7 +152,7 @@ async fn landmarks_are_placed_patched_taught_and_learnt() {
         ceiling_height_m: None,
         corner_covariance_px2: Some([[1.0, 0.0, 1.0]; 4]),
     };
-    let corners = LandmarkRegion::Corners([[20.0, 20.0], [140.0, 20.0], [140.0, 100.0], [20.0, 100.0]]);
+    let corners = LandmarkRegion::Corners([[20.0, 20.0], [80.0, 20.0], [80.0, 100.0], [20.0, 100.0]]);
     let new =
         NewView { capture: Some(capture), keep_near_duplicate: true, ..NewView::new(picture(1), corners) };
     let second = maps.upload_view_with("hall", "poster", new).await.expect("view");

@@ -2,7 +2,7 @@
 //! contradicts them is refused; where they do not determine the ratio, it is taken, and the landmark's `facts` say so.
 
 use super::{App, error::ApiError};
-use crate::store::{StoreError, landmarks, views};
+use crate::store::{StoreError, aspect_views::aspect_views, landmarks};
 use axum::http::StatusCode;
 use protos::api::{Landmark, Size};
 use serde_json::{Value, json};
@@ -19,7 +19,7 @@ pub(super) async fn shown_by_views(
 ) -> Result<Option<Aspect>, StoreError> {
     let mut all: Vec<AspectView> = new.into_iter().collect();
     if let Some(landmark) = landmark {
-        all.extend(views::aspect_views(app.store.reads(), landmark).await?);
+        all.extend(aspect_views(app.store.reads(), landmark).await?);
     }
     Ok(aspect(&all))
 }

@@ -29,6 +29,7 @@ pub(crate) mod models;
 pub(crate) mod walls;
 pub(crate) mod landmark_merge;
 pub(crate) mod landmark_placement;
+pub(crate) mod aspect_views;
 pub(crate) mod teaching;
 pub(crate) mod gatherings;
 pub(crate) mod track_acceptance;

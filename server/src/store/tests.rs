@@ -19,6 +19,7 @@ async fn every_statement_prepares_on_the_migrated_schema() {
         schema::ALL,
         pictures::ALL,
         views::ALL,
+        aspect_views::ALL,
         models::ALL,
         walls::ALL,
         underlays::ALL,

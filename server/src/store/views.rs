@@ -3,13 +3,13 @@
 use super::{
     StoreError, Tx,
     kind::Kind,
-    landmark_placement, landmarks, now_ms,
+    landmarks, now_ms,
     pictures::{self, Digest},
     statements::statements,
     within,
 };
 use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
-use vision::{geometry::Corners, icon::Icon, learn::aspect::AspectView, model::LandmarkId};
+use vision::{geometry::Corners, icon::Icon, model::LandmarkId};
 
 statements! {
     COUNT = "SELECT count(*) FROM views WHERE landmark_id = ?1";
@@ -29,7 +29,6 @@ statements! {
             JOIN maps m ON m.id = l.map_id WHERE m.name = ?1 AND l.name = ?2 AND v.id = ?3";
     DELETE = "DELETE FROM views WHERE id = ?1 AND landmark_id = ?2";
     GET = "SELECT id, image_kind, width_px, height_px, corners_px, created_ms FROM views WHERE id = ?1";
-    ASPECTS = "SELECT width_px, height_px, corners_px, capture FROM views WHERE landmark_id = ?1 ORDER BY id DESC LIMIT 64";
     CROPS = "SELECT id, corners_px, icon_side, icon, icon_scale FROM views WHERE landmark_id = ?1 ORDER BY id";
     OF_MAP = "SELECT v.id, v.landmark_id, v.image_sha256, v.width_px, v.height_px, v.corners_px, v.icon_side, v.icon, \
               v.icon_scale FROM views v JOIN landmarks l ON l.id = v.landmark_id WHERE l.map_id = ?1 ORDER BY v.id";
@@ -172,25 +171,6 @@ pub(super) async fn get(db: impl SqliteExecutor<'_>, view: i64) -> Result<ViewRo
     let row =
         sqlx::query(GET).bind(view).fetch_optional(db).await.map_err(StoreError::during("read view"))?;
     view_row(&row.ok_or_else(|| StoreError::NotFound { what: Kind::View, name: view.to_string() })?)
-}
-
-/// Corners, sizes and cameras of the newest views of a landmark, for the ratio of its sides.
-pub(crate) async fn aspect_views(
-    db: impl SqliteExecutor<'_>,
-    landmark: i64,
-) -> Result<Vec<AspectView>, StoreError> {
-    let at = || StoreError::during("read the corners of views");
-    let rows = sqlx::query(ASPECTS).bind(landmark).fetch_all(db).await.map_err(at())?;
-    let view = |row: &SqliteRow| -> Result<AspectView, StoreError> {
-        let side = |column: &str| row.try_get::<u32, _>(column).map_err(at());
-        let capture: Option<&str> = row.try_get("capture").map_err(at())?;
-        Ok(AspectView {
-            corners_px: corners_in(row)?,
-            size_px: [side("width_px")? as usize, side("height_px")? as usize],
-            camera: capture.and_then(landmark_placement::camera_of),
-        })
-    };
-    rows.iter().map(view).collect()
 }
 
 /// The crops of a landmark's views, by number.

@@ -13023,7 +13023,7 @@ export interface operations {
             content: {
                 /**
                  * @example {
-                 *       "corners": "[[20, 20], [100, 22], [98, 100], [22, 96]]",
+                 *       "corners": "[[20, 20], [77, 21], [76, 100], [21, 98]]",
                  *       "create": "true",
                  *       "height_m": "0.84",
                  *       "image": "@photograph.jpg",
