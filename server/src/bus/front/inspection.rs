@@ -9,7 +9,7 @@
 
 use super::lasting::{InterestKeys, MAX_INTEREST_BYTES};
 use std::{
-    collections::{BTreeMap, btree_map::Entry},
+    collections::{BTreeMap, BTreeSet, btree_map::Entry},
     sync::Arc,
 };
 use zenoh::key_expr::keyexpr;
@@ -17,7 +17,7 @@ use zenoh_buffers::reader::DidntRead;
 use zenoh_codec::{RCodec, Zenoh080, Zenoh080Bounded, Zenoh080Condition, transport::frame::FrameReader};
 use zenoh_protocol::{
     common::imsg,
-    core::{Field, Reliability, WireExpr},
+    core::{Field, Reliability, WhatAmI, WireExpr},
     network::{
         DeclareBody, Mapping, NetworkBody, NetworkMessage, RequestId, id, interest::InterestMode, push::flag,
     },
@@ -89,6 +89,8 @@ enum Kind {
 struct Agreed {
     has_markers: bool,
     sn_mask: u64,
+    /// A router declares all that it tells of others with the number 0: each is known by its key.
+    is_router: bool,
 }
 
 /// What is known of a connection. At most [`MAX_DECLARED`] entries of the robot, [`MAX_ROUTER_KEY_BYTES`] of keys of the router,
@@ -101,9 +103,10 @@ pub(super) struct Inspection {
     /// Those of the router. One that ends is kept: the robot may have used it before it knew.
     router_keys: BTreeMap<u16, Box<str>>,
     router_key_bytes: usize,
-    /// What the robot has declared, and its key.
-    declared: BTreeMap<(Kind, u32), Box<str>>,
-    /// Bytes of the keys of both.
+    /// What the robot has declared, and its keys: one, or those of the number 0 of a router.
+    declared: BTreeMap<(Kind, u32), BTreeSet<Box<str>>>,
+    declared_count: usize,
+    /// Bytes of the keys of all.
     declared_bytes: usize,
     interests: Arc<InterestKeys>,
     /// Sequence number of the next fragment, by reliability and priority.
@@ -240,7 +243,7 @@ impl Inspection {
                         self.begins(Kind::Interest, interest.id, key)
                     }
                     InterestMode::Final => {
-                        self.ends(Kind::Interest, interest.id);
+                        self.ends(Kind::Interest, interest.id, "");
                         Ok(())
                     }
                     InterestMode::Current => Ok(()),
@@ -302,32 +305,45 @@ impl Inspection {
     /// A router keeps for ever what was declared before with the same number, if that had another key. No client of zenoh uses a
     /// number again before its end.
     fn begins(&mut self, kind: Kind, id: u32, key: String) -> Result<(), Violation> {
-        match self.declared.entry((kind, id)) {
-            Entry::Occupied(before) if **before.get() != *key => return Err(Violation::Protocol),
-            Entry::Occupied(_) => {}
-            Entry::Vacant(place) => {
-                self.declared_bytes += key.len();
-                place.insert(key.into());
+        let of_router = self.of_router_without_number(id);
+        let keys = self.declared.entry((kind, id)).or_default();
+        if !keys.contains(&*key) {
+            if !keys.is_empty() && !of_router {
+                return Err(Violation::Protocol);
             }
+            self.declared_count += 1;
+            self.declared_bytes += key.len();
+            keys.insert(key.into());
         }
         self.is_within_bounds()
     }
 
-    fn ends(&mut self, kind: Kind, id: u32) {
-        self.declared_bytes -= self.declared.remove(&(kind, id)).map_or(0, |key| key.len());
+    fn of_router_without_number(&self, id: u32) -> bool {
+        id == 0 && self.agreed.is_some_and(|agreed| agreed.is_router)
+    }
+
+    /// `key`: empty where the number says what ends.
+    fn ends(&mut self, kind: Kind, id: u32, key: &str) {
+        let Entry::Occupied(mut keys) = self.declared.entry((kind, id)) else { return };
+        let ended = if id == 0 && keys.get().len() > 1 {
+            keys.get_mut().take(key).into_iter().collect()
+        } else {
+            keys.remove()
+        };
+        self.declared_count -= ended.len();
+        self.declared_bytes -= ended.iter().map(|key| key.len()).sum::<usize>();
     }
 
     /// The end of a declaration may name its key, and need not.
     fn ends_named(&mut self, kind: Kind, id: u32, key: &WireExpr<'_>) -> Result<(), Violation> {
-        if key.scope != 0 || !key.suffix.is_empty() {
-            self.named(key)?;
-        }
-        self.ends(kind, id);
+        let is_named = key.scope != 0 || !key.suffix.is_empty();
+        let key = if is_named { self.named(key)? } else { String::new() };
+        self.ends(kind, id, &key);
         Ok(())
     }
 
     fn is_within_bounds(&self) -> Result<(), Violation> {
-        let count = self.declared.len() + self.keys.len();
+        let count = self.declared_count + self.keys.len();
         if count > MAX_DECLARED || self.declared_bytes > MAX_DECLARED_BYTES {
             return Err(Violation::ManyDeclared);
         }
@@ -368,6 +384,7 @@ impl Agreed {
     fn of(syn: &InitSyn) -> Self {
         Self {
             has_markers: syn.ext_patch.has_fragmentation_markers(),
+            is_router: syn.whatami == WhatAmI::Router,
             sn_mask: syn.resolution.get(Field::FrameSN).mask().min(MAX_SN),
         }
     }

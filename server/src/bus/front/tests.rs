@@ -31,9 +31,13 @@ use zenoh_protocol::{
 
 /// The first message of a client; `patch` of zenoh's changes to its protocol.
 fn init(patch: u8) -> Vec<u8> {
+    init_of(WhatAmI::Client, patch)
+}
+
+fn init_of(whatami: WhatAmI, patch: u8) -> Vec<u8> {
     let message = InitSyn {
         version: zenoh_protocol::VERSION,
-        whatami: WhatAmI::Client,
+        whatami,
         zid: ZenohIdProto::default(),
         resolution: zenoh_protocol::core::Resolution::default(),
         batch_size: u16::MAX,

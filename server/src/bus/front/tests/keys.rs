@@ -100,6 +100,34 @@ fn a_number_is_declared_again_with_the_same_key_alone() {
 }
 
 #[test]
+fn a_router_declares_what_others_have_without_a_number_and_each_counts() {
+    let begins = |n: usize| {
+        let it = DeclareSubscriber { id: 0, wire_expr: key(0, n) };
+        frame([declare(DeclareBody::DeclareSubscriber(it))])
+    };
+    let ends = |n: usize| {
+        let ext_wire_expr = declare::common::ext::WireExprType { wire_expr: key(0, n) };
+        frame([declare(DeclareBody::UndeclareSubscriber(UndeclareSubscriber { id: 0, ext_wire_expr }))])
+    };
+    let mut inspection = Inspection::default();
+    assert!(inspection.batch(&init_of(WhatAmI::Router, 1)).is_ok());
+    for n in 1..=1000 {
+        assert!(inspection.batch(&begins(n)).is_ok(), "{n}");
+    }
+    for n in 1..=990 {
+        assert!(inspection.batch(&ends(n)).is_ok(), "{n}");
+    }
+    // Ten are left.
+    for id in 1..=(MAX_DECLARED - 10) as u32 {
+        assert!(inspection.batch(&frame([subscriber(id)])).is_ok(), "{id}");
+    }
+    assert_eq!(inspection.batch(&begins(1)), Err(Violation::ManyDeclared));
+    let mut client = opened();
+    assert!(client.batch(&begins(1)).is_ok());
+    assert_eq!(client.batch(&begins(2)), Err(Violation::Protocol));
+}
+
+#[test]
 fn interests_in_ever_new_keys_end_the_connection_and_the_same_ones_do_not() {
     let interest = |i: usize| {
         let wire_expr = WireExpr::from(format!("r1/{i:04}"));
