@@ -25,8 +25,8 @@ const REALS: [f64; 10] = [
 ];
 const WHOLE: [i64; 6] = [0, -1, i64::MIN, i64::MAX, 9_007_199_254_740_993, 2_147_483_647];
 
-/// Refused with another field than the one that was changed: sizes and encodings are compared with the pixels.
-const COMPARED: [&str; 3] = ["width_px", "height_px", "encoding"];
+/// Refused with another field than the one that was changed: sizes, encodings and bytes are compared with the pixels.
+const COMPARED: [&str; 4] = ["width_px", "height_px", "encoding", "withheld_bytes"];
 
 /// Parts of a question where a robot is that have no meaning in it, and are not looked at.
 const UNUSED: [[&str; 2]; 3] = [["frame", "odometry"], ["frame", "prior"], ["scan", "odom_from_robot"]];

@@ -231,6 +231,7 @@ test("a viewer who opens what he may not do is told so", async () => {
   const page = await open(guest, server.origin, "/maps/hall/teach");
   await page.getByLabel("Token").fill(text);
   await page.getByRole("button", { name: "Sign in" }).click();
+  await page.getByText("onlooker · viewer").first().waitFor();
   for (const [address, role] of [["/maps/hall/teach", "teacher"], ["/maps/hall/gather", "teacher"]]) {
     await page.goto(`${server.origin}${address}`);
     await page.getByText(`This page needs the role ${role}. You are signed in as onlooker, viewer.`).waitFor({ timeout: 10_000 });

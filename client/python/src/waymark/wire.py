@@ -379,7 +379,7 @@ class Answer:
     camera_pose: CameraPose | None = None
     # Why recognised landmarks gave no pose of the camera; empty where they did.
     camera_pose_refusal: str = ""
-    # What the walls of the map say against the pose of a photograph: behind_wall, outside_map. The pose stands all the same.
+    # What walls say against the pose of a photograph: behind_wall, outside_map. The pose stands all the same.
     pose_cautions: tuple[str, ...] = ()
 
     def accepted(self) -> Answer:
