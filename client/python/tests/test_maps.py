@@ -56,7 +56,7 @@ def hall(maps: MapClient, name: str) -> None:
     """A map with two walls and a poster on the first of them."""
     maps.create_map(name)
     maps.set_walls(name, [WallBody((0.0, 0.0), (10.0, 0.0)), WallBody((10.0, 8.0), (0.0, 8.0))])
-    maps.add_landmark(name, "poster", Size(0.6, 0.8), Place(5.0, 0.0, 1.5, QUARTER))
+    maps.add_landmark(name, "poster", Size(*pictures.SIZE_M), Place(5.0, 0.0, 1.5, QUARTER))
 
 
 def test_the_server_says_how_it_is(server: Server) -> None:
@@ -189,7 +189,7 @@ def test_a_landmark_is_made_with_its_first_view_renamed_and_refused_for_its_like
         assert maps.landmarks("first-views") == (), "nothing is left behind"
         maps.upload_view("first-views", "first", photo, make_landmark=True, size=size)
         with pytest.raises(Refused) as differs:
-            maps.upload_view("first-views", "first", photo, size=Size(1.0, 2.0))
+            maps.upload_view("first-views", "first", photo, size=Size(2 * size.width_m, 2 * size.height_m))
         assert differs.value.code == "size_differs" and {"stored", "given"} <= set(differs.value.more)
         maps.upload_view("first-views", "again", photo, make_landmark=True, size=size)
         maps.wait_for_job(maps.learn("first-views"), SOON_S * 2)

@@ -379,8 +379,6 @@ class Answer:
     camera_pose: CameraPose | None = None
     # Why recognised landmarks gave no pose of the camera; empty where they did.
     camera_pose_refusal: str = ""
-    # What walls say against the pose of a photograph: behind_wall, outside_map. The pose stands all the same.
-    pose_cautions: tuple[str, ...] = ()
 
     def accepted(self) -> Answer:
         """This answer; raises `Refused` with the code and the field if the server refused the frame."""
@@ -390,6 +388,8 @@ class Answer:
 
     # The server that answers, over zenoh.
     server: str = ""
+    # What walls say against the pose of a photograph: behind_wall, outside_map. The pose stands all the same.
+    pose_cautions: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
