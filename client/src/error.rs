@@ -223,10 +223,9 @@ mod tests {
 
     #[test]
     fn no_path_of_a_builder_is_told() {
-        let error: zenoh::Error =
-            "Unable to connect to any of [tcp/h:1] at /root/.cargo/zenoh/src/orchestrator.rs:480. \
+        let error: zenoh::Error = "Unable to connect to any of [tcp/h:1] at zenoh/src/orchestrator.rs:480. \
             Stay at home"
-                .into();
+            .into();
         assert_eq!(in_words(&error), "Unable to connect to any of [tcp/h:1] Stay at home");
     }
 }

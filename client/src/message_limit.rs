@@ -31,7 +31,6 @@ impl MessageLimit {
         // Of several servers on a router any may be the robot's: the least counts.
         while let Ok(reply) = replies.recv_async().await {
             let Ok(sample) = reply.result() else { continue };
-            // An earlier server replies with nothing.
             let hello = v1::Hello::decode(&*sample.payload().to_bytes()).unwrap_or_default();
             if let Ok(bytes @ 1..) = usize::try_from(hello.frame_bytes) {
                 most = Some(most.map_or(bytes, |most: usize| most.min(bytes)));

@@ -123,7 +123,7 @@ pub struct Frame {
     #[prost(uint64, tag = "14")]
     pub withheld_bytes: u64,
 }
-/// The reply to robot/{robot}/rpc/hello: the robot's messages arrive. Earlier servers reply with nothing.
+/// The reply to robot/{robot}/rpc/hello: the robot's messages arrive.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct Hello {
     /// The largest message that the server takes of a robot, in bytes.

@@ -322,14 +322,11 @@ impl Inspection {
         id == 0 && self.agreed.is_some_and(|agreed| agreed.is_router)
     }
 
-    /// `key`: empty where the number says what ends.
+    /// A router's end without a number names its key in `key`; one that does not ends nothing.
     fn ends(&mut self, kind: Kind, id: u32, key: &str) {
+        let of_router = self.of_router_without_number(id);
         let Entry::Occupied(mut keys) = self.declared.entry((kind, id)) else { return };
-        let ended = if id == 0 && keys.get().len() > 1 {
-            keys.get_mut().take(key).into_iter().collect()
-        } else {
-            keys.remove()
-        };
+        let ended = if of_router { keys.get_mut().take(key).into_iter().collect() } else { keys.remove() };
         self.declared_count -= ended.len();
         self.declared_bytes -= ended.iter().map(|key| key.len()).sum::<usize>();
     }

@@ -12,8 +12,8 @@ use std::{
     sync::{Arc, Mutex, PoisonError},
 };
 
-/// Most bytes that the router keeps for one robot, or for one address that connects without a certificate. A robot of ROS 2
-/// with hundreds of topics takes a fifth of it.
+/// Most bytes that the router keeps for one robot, or for one address that connects without a certificate: about 500 keys of
+/// eight chunks.
 pub(crate) const MAX_INTEREST_BYTES: usize = 2 << 20;
 /// Bytes of a router's entry for one chunk of a key, beside its text.
 const CHUNK_BYTES: usize = 512;

@@ -117,7 +117,10 @@ fn a_router_declares_what_others_have_without_a_number_and_each_counts() {
     for n in 1..=990 {
         assert!(inspection.batch(&ends(n)).is_ok(), "{n}");
     }
-    // Ten are left.
+    // Ten are left, also after ends of what is not there, or of nothing that is named.
+    let ended = UndeclareSubscriber { id: 0, ext_wire_expr: declare::common::ext::WireExprType::null() };
+    let unnamed = frame([declare(DeclareBody::UndeclareSubscriber(ended))]);
+    assert!(inspection.batch(&ends(1)).is_ok() && inspection.batch(&unnamed).is_ok());
     for id in 1..=(MAX_DECLARED - 10) as u32 {
         assert!(inspection.batch(&frame([subscriber(id)])).is_ok(), "{id}");
     }
