@@ -178,7 +178,7 @@ impl Epochs {
         if let Some(refused) = epochs.refuse(epoch, now) {
             tracing::warn!(
                 %robot, live_epoch = live, refused_epoch = epoch, refused,
-                "epoch_conflict: two programs use the name of one robot; messages of the later one are refused"
+                "epoch_conflict"
             );
         }
         let detail = format!("epoch {live} of robot {robot} is live; two programs use the robot's name");

@@ -64,9 +64,9 @@ fn the_page_of_log_events_is_that_of_the_code() {
     assert!(code.len() > 80, "{}", code.len());
     let page = fs::read_to_string(root().join("docs/guides/log-events.md")).expect("the page");
     let mut listed: BTreeMap<String, BTreeSet<&str>> = BTreeMap::new();
-    for row in page.lines().filter_map(|line| line.strip_prefix("| `")) {
-        let (event, rest) = row.split_once("` | ").expect("an event");
-        let (levels, says) = rest.split_once(" | ").expect("levels");
+    for row in page.lines().filter_map(|line| line.strip_prefix("- `")) {
+        let (event, rest) = row.split_once("` (").expect("an event");
+        let (levels, says) = rest.split_once("): ").expect("levels");
         assert!(says.len() > 4, "{event} is not explained");
         listed.insert(event.to_owned(), levels.split(", ").collect());
     }

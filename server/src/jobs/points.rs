@@ -78,12 +78,9 @@ impl Jobs {
                 })
             });
             match write.await {
-                Ok(job) => tracing::info!(
-                    map = map.name,
-                    landmarks = count,
-                    job = job.id,
-                    "stored models have no points yet: a job takes them from the views; recognition goes on with the models as they are"
-                ),
+                Ok(job) => {
+                    tracing::info!(map = map.name, landmarks = count, job = job.id, "models_without_points")
+                }
                 Err(StoreError::Limit { what, max }) => {
                     tracing::warn!(
                         map = map.name,

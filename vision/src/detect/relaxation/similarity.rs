@@ -55,7 +55,7 @@ pub struct SimilarityParams {
 /// Weights by `waymark-lab train similarity` on photographs of paintings and rendered corridors.
 ///
 /// Departs from method 2, which asks for this fit: lengths and the third side discriminate opposite sides of a
-/// quad, profiles hardly. Figures: docs/results/2026-11-22.md.
+/// quad, profiles hardly. Figures: docs/results/README.md.
 const FITTED_WEIGHTS: [f64; 6] = [0.41, 0.0, 0.17, 0.03, 0.32, 0.07];
 
 impl Default for SimilarityParams {
