@@ -7,6 +7,7 @@ mod recognise;
 mod bound;
 mod poses;
 mod score;
+mod sizes;
 mod report;
 mod table;
 mod draw;
@@ -100,6 +101,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
         scores.iter().for_each(listing::name_pose);
     }
     let mut report = Report::new(worlds.len(), &scores, unreadable);
+    report.sizes = (!args.strangers).then(|| sizes::sizes(&worlds, &scores)).flatten();
     if args.peer {
         match peer::beside(&args.python, &worlds) {
             Ok(peer) => report.peer = Some(peer),

@@ -4,6 +4,7 @@ use super::bound::drawn_m;
 use super::peer::PeerReport;
 use super::poses::CameraScore;
 use super::score::{FOUND, FOUND_WELL, LabelScore, PICTURES, PictureScore, PoseOutcome, View};
+use super::sizes::SizeReport;
 use crate::evaluate::statistics::{median, quantile};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -152,6 +153,8 @@ pub(super) struct Report {
     pub(super) missed: Vec<(String, usize)>,
     /// SIFT on the same pictures.
     #[serde(skip_serializing_if = "Option::is_none")]
+    /// How often the check of sizes is right; `None` without true sizes.
+    pub(super) sizes: Option<SizeReport>,
     pub(super) peer: Option<PeerReport>,
 }
 
@@ -232,6 +235,7 @@ impl Report {
             measurements: measurements(scores),
             ms_per_picture: median(&mut scores.iter().map(|s| s.ms).collect::<Vec<_>>()),
             missed: missed(scores),
+            sizes: None,
             peer: None,
         }
     }

@@ -51,7 +51,9 @@ pub(super) struct LabelScore {
     pub(super) angle_rad: Option<f64>,
     /// With the nearest quad that the detector shows.
     pub(super) shown_iou: f64,
-    /// Mean distance of that quad's corners, if it is found.
+    /// That quad's corners in the order of the label's, if it is found.
+    pub(super) found: Option<Corners>,
+    /// Their mean distance from the label's.
     pub(super) corner_error_px: Option<f64>,
     /// With the nearest border that recognition was asked for.
     pub(super) asked_iou: f64,
@@ -94,6 +96,8 @@ pub(super) enum PoseOutcome {
 pub(super) struct PictureScore {
     pub(super) world: String,
     pub(super) file: String,
+    /// Width and height of the picture, px.
+    pub(super) size_px: [usize; 2],
     pub(super) labels: Vec<LabelScore>,
     /// Borders that recognition was asked for.
     pub(super) asked: usize,
@@ -127,6 +131,7 @@ pub(super) fn score(world: &World, image: &TruthImage, map: &MapSnapshot, r: &Re
     PictureScore {
         world: world.truth.name.clone(),
         file: image.file.clone(),
+        size_px: [r.image.width(), r.image.height()],
         labels: image.quads.iter().filter_map(|quad| label(world, image, quad, map, r)).collect(),
         asked: r.asked().count(),
         false_quads: image.quads_complete.then(|| shown().filter(is_false).collect()),
@@ -176,12 +181,20 @@ fn label(
         side_px: quad.corners.min_side_px(),
         angle_rad: quad.view_angle_rad,
         shown_iou: nearest.map_or(0.0, |(iou, _)| iou),
+        found: found.map(|(_, corners)| in_order_of(&quad.corners, corners)),
         corner_error_px: found.map(|(_, corners)| corner_error_px(&quad.corners, corners)),
         asked_iou: r.asked().map(overlap).fold(0.0, f64::max),
         answer_error_px: named.as_ref().map(|(_, _, corners)| corner_error_px(&quad.corners, corners)),
         measurement,
         miss: if named.is_some() { Miss::default() } else { miss(quad, map, r) },
     })
+}
+
+/// The corners in the order of `truth`'s: turned so that they are nearest to it.
+fn in_order_of(truth: &Corners, corners: &Corners) -> Corners {
+    let turned = (0..4).map(|shift| corners.rotated(shift));
+    let nearest = turned.min_by(|a, b| truth.furthest_px(a).total_cmp(&truth.furthest_px(b)));
+    nearest.unwrap_or(*corners)
 }
 
 fn evidence<'a>(

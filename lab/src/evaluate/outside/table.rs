@@ -4,6 +4,7 @@ use super::{
     bound::CORNER_SIGMA_PX,
     peer::PeerReport,
     report::{Errors, Group, Nees, PositionFigures, Report},
+    sizes::{SizeFigures, SizeReport},
 };
 
 /// A share, or a line where nothing was counted.
@@ -72,6 +73,7 @@ pub(super) fn table(r: &Report) -> String {
     poses(&mut lines, r);
     lines.push(format!("  full views without a name: {}", counts(&r.missed)));
     lines.push(format!("  time a picture: {} ms", number(r.ms_per_picture, 1.0, 1)));
+    lines.extend(r.sizes.as_ref().map(sizes).unwrap_or_default());
     lines.extend(r.peer.as_ref().map(peer));
     lines.join("\n")
 }
@@ -134,6 +136,23 @@ fn poses(lines: &mut Vec<String>, r: &Report) {
             share(m.misfit).trim()
         ),
     ]);
+}
+
+/// How often the true size was refused.
+fn sizes(s: &SizeReport) -> Vec<String> {
+    let of = |name: &str, f: &SizeFigures| {
+        format!(
+            "    {name:<26}refused {} ({} of good borders) and doubted {} of {}; sides swapped: refused {} of {}",
+            f.refused, f.refused_wrongly, f.doubted, f.stated, f.swapped_refused, f.swapped
+        )
+    };
+    vec![
+        "  true sizes against the views' ratio of sides".to_owned(),
+        of("one view", &s.one_view),
+        of("one view, known camera", &s.one_view_of_known_camera),
+        of("all views", &s.all_views),
+        of("all views, known camera", &s.all_views_of_known_camera),
+    ]
 }
 
 fn peer(p: &PeerReport) -> String {
