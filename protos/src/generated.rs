@@ -2,6 +2,7 @@
 /// Rigid transform: unit quaternion and translation.
 #[derive(::serde::Serialize, ::serde::Deserialize)]
 #[serde(default)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Clone, Copy, PartialEq, ::prost::Message)]
 pub struct Pose3 {
     #[prost(double, tag = "1")]
@@ -22,6 +23,7 @@ pub struct Pose3 {
 /// Pose on the floor.
 #[derive(::serde::Serialize, ::serde::Deserialize)]
 #[serde(default)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Clone, Copy, PartialEq, ::prost::Message)]
 pub struct Pose2 {
     #[prost(double, tag = "1")]
@@ -34,6 +36,7 @@ pub struct Pose2 {
 /// Pose on the floor with covariance over (x, y, theta), 9 numbers.
 #[derive(::serde::Serialize, ::serde::Deserialize)]
 #[serde(default)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct Pose2Covariance {
     #[prost(message, optional, tag = "1")]
@@ -43,6 +46,7 @@ pub struct Pose2Covariance {
 }
 #[derive(::serde::Serialize, ::serde::Deserialize)]
 #[serde(default)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct Intrinsics {
     #[prost(double, tag = "1")]
@@ -133,6 +137,7 @@ pub struct Hello {
 /// Why a message was refused: a stable code, the field at fault and a sentence for a person.
 #[derive(::serde::Serialize, ::serde::Deserialize)]
 #[serde(default)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct Rejection {
     #[prost(string, tag = "1")]
@@ -144,6 +149,7 @@ pub struct Rejection {
 }
 #[derive(::serde::Serialize, ::serde::Deserialize)]
 #[serde(default)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Clone, Copy, PartialEq, ::prost::Message)]
 pub struct Point {
     #[prost(double, tag = "1")]
@@ -232,6 +238,7 @@ pub struct Quads {
 }
 #[derive(::serde::Serialize, ::serde::Deserialize)]
 #[serde(default)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct Candidate {
     #[prost(string, tag = "1")]
@@ -263,6 +270,7 @@ pub struct Candidate {
 /// What matched points say of the first candidate.
 #[derive(::serde::Serialize, ::serde::Deserialize)]
 #[serde(default)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct PointEvidence {
     /// Tentative matches at different places, and how many of them agree on one homography.
@@ -282,11 +290,13 @@ pub struct PointEvidence {
     /// 25 values: the landmark divided into 5 by 5 equal parts, as it was taught, upright. Rows from its top, in each row
     /// from its left: value 5 * row + column.
     #[prost(enumeration = "PartAgreement", repeated, tag = "6")]
+    #[cfg_attr(feature = "openapi", schema(value_type = Vec<PartAgreement>))]
     #[serde(with = "crate::json::part_agreement")]
     pub agreement: ::prost::alloc::vec::Vec<i32>,
 }
 #[derive(::serde::Serialize, ::serde::Deserialize)]
 #[serde(default)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct LandmarkPose {
     #[prost(message, optional, tag = "1")]
@@ -300,6 +310,7 @@ pub struct LandmarkPose {
 /// Where a photograph was taken. Nothing is assumed of how the camera was held.
 #[derive(::serde::Serialize, ::serde::Deserialize)]
 #[serde(default)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct CameraPose {
     /// Camera coordinates (x right, y down, z forward) to those of the map.
@@ -314,17 +325,20 @@ pub struct CameraPose {
 }
 #[derive(::serde::Serialize, ::serde::Deserialize)]
 #[serde(default)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct QuadAnswer {
     /// As detected; for a unique landmark its own top-left comes first.
     #[prost(message, repeated, tag = "1")]
     pub corners: ::prost::alloc::vec::Vec<Point>,
     #[prost(enumeration = "QuadKind", tag = "2")]
+    #[cfg_attr(feature = "openapi", schema(value_type = QuadKind, default = json!("unspecified")))]
     #[serde(with = "crate::json::quad_kind")]
     pub kind: i32,
     #[prost(double, tag = "3")]
     pub score: f64,
     #[prost(enumeration = "Verdict", tag = "4")]
+    #[cfg_attr(feature = "openapi", schema(value_type = Verdict, default = json!("unspecified")))]
     #[serde(with = "crate::json::verdict")]
     pub verdict: i32,
     /// Set only for UNIQUE; what a known pose adds is `guided_landmark`.
@@ -361,6 +375,7 @@ pub struct QuadAnswer {
     pub doubtful_landmark: ::prost::alloc::string::String,
     /// How it was named: GLOBAL with `landmark`, GUIDED with `guided_landmark`; unspecified where it was not.
     #[prost(enumeration = "Sighting", tag = "16")]
+    #[cfg_attr(feature = "openapi", schema(value_type = Sighting, default = json!("unspecified")))]
     #[serde(with = "crate::json::sighting")]
     pub sighting: i32,
     /// The landmark that the quad is by the pose known before the frame, where the picture alone leaves several. The verdict
@@ -371,9 +386,11 @@ pub struct QuadAnswer {
 /// A number that makes recognised landmarks fit a pose if it alone is changed.
 #[derive(::serde::Serialize, ::serde::Deserialize)]
 #[serde(default)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct PoseRefusalCause {
     #[prost(enumeration = "FixQuantity", tag = "1")]
+    #[cfg_attr(feature = "openapi", schema(value_type = FixQuantity, default = json!("unspecified")))]
     #[serde(with = "crate::json::fix_quantity")]
     pub quantity: i32,
     /// Of SIZE: the landmark.
@@ -394,6 +411,7 @@ pub struct PoseRefusalCause {
 /// By how much recognised landmarks fit no pose of an upright robot, and why.
 #[derive(::serde::Serialize, ::serde::Deserialize)]
 #[serde(default)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct PoseRefusalDetail {
     /// Weighted squared re-projection error of the best pose, and the largest that is accepted.
@@ -411,6 +429,7 @@ pub struct PoseRefusalDetail {
 }
 #[derive(::serde::Serialize, ::serde::Deserialize)]
 #[serde(default)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct StageTime {
     #[prost(string, tag = "1")]
@@ -421,6 +440,7 @@ pub struct StageTime {
 /// A place where the robot may be.
 #[derive(::serde::Serialize, ::serde::Deserialize)]
 #[serde(default)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct Hypothesis {
     /// Its share of the belief, 0 to 1.
@@ -432,6 +452,7 @@ pub struct Hypothesis {
 /// robot/{robot}/answer, with the camera attached
 #[derive(::serde::Serialize, ::serde::Deserialize)]
 #[serde(default)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct Answer {
     #[prost(uint64, tag = "1")]
@@ -445,6 +466,7 @@ pub struct Answer {
     #[prost(uint64, tag = "5")]
     pub map_version: u64,
     #[prost(enumeration = "Status", tag = "6")]
+    #[cfg_attr(feature = "openapi", schema(value_type = crate::api::AnswerStatus, default = json!("unspecified")))]
     #[serde(with = "crate::json::status")]
     pub status: i32,
     #[prost(message, optional, tag = "7")]
@@ -824,6 +846,11 @@ impl Status {
         }
     }
 }
+#[cfg_attr(
+    feature = "openapi",
+    derive(utoipa::ToSchema),
+    schema(rename_all = "snake_case")
+)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, ::prost::Enumeration)]
 #[repr(i32)]
 pub enum QuadKind {
@@ -862,6 +889,11 @@ impl QuadKind {
         }
     }
 }
+#[cfg_attr(
+    feature = "openapi",
+    derive(utoipa::ToSchema),
+    schema(rename_all = "snake_case")
+)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, ::prost::Enumeration)]
 #[repr(i32)]
 pub enum Verdict {
@@ -895,6 +927,11 @@ impl Verdict {
     }
 }
 /// What a part of a landmark says.
+#[cfg_attr(
+    feature = "openapi",
+    derive(utoipa::ToSchema),
+    schema(rename_all = "snake_case")
+)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, ::prost::Enumeration)]
 #[repr(i32)]
 pub enum PartAgreement {
@@ -931,6 +968,11 @@ impl PartAgreement {
     }
 }
 /// How a landmark was named.
+#[cfg_attr(
+    feature = "openapi",
+    derive(utoipa::ToSchema),
+    schema(rename_all = "snake_case")
+)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, ::prost::Enumeration)]
 #[repr(i32)]
 pub enum Sighting {
@@ -964,6 +1006,11 @@ impl Sighting {
     }
 }
 /// A number that a robot pose by landmarks rests on.
+#[cfg_attr(
+    feature = "openapi",
+    derive(utoipa::ToSchema),
+    schema(rename_all = "snake_case")
+)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, ::prost::Enumeration)]
 #[repr(i32)]
 pub enum FixQuantity {

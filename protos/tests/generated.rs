@@ -28,6 +28,11 @@ const JSON: [&str; 20] = [
     "Scan",
 ];
 
+/// Of these, what has no schema: the bodies of the HTTP interface that have them have other forms or types.
+const WITHOUT_SCHEMA: [&str; 4] = ["RobotPose", "MapChanged", "Odometry", "Scan"];
+/// Enumerations that are words in these messages.
+const WORDS: [&str; 5] = ["QuadKind", "Verdict", "Sighting", "FixQuantity", "PartAgreement"];
+
 #[test]
 fn committed_rust_matches_the_proto() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
@@ -39,7 +44,29 @@ fn committed_rust_matches_the_proto() {
         let path = format!(".waymark.v1.{message}");
         config.type_attribute(&path, "#[derive(::serde::Serialize, ::serde::Deserialize)]");
         config.type_attribute(&path, "#[serde(default)]");
+        if !WITHOUT_SCHEMA.contains(&message) {
+            config.type_attribute(&path, "#[cfg_attr(feature = \"openapi\", derive(utoipa::ToSchema))]");
+        }
     }
+    for words in WORDS {
+        let schema = "#[cfg_attr(feature = \"openapi\", derive(utoipa::ToSchema), schema(rename_all = \"snake_case\"))]";
+        config.type_attribute(format!(".waymark.v1.{words}"), schema);
+    }
+    for (field, words) in [
+        ("Answer.status", "crate::api::AnswerStatus"),
+        ("QuadAnswer.kind", "QuadKind"),
+        ("QuadAnswer.verdict", "Verdict"),
+        ("QuadAnswer.sighting", "Sighting"),
+        ("PoseRefusalCause.quantity", "FixQuantity"),
+    ] {
+        let schema = format!("schema(value_type = {words}, default = json!(\"unspecified\"))");
+        let attribute = format!("#[cfg_attr(feature = \"openapi\", {schema})]");
+        config.field_attribute(format!(".waymark.v1.{field}"), attribute);
+    }
+    config.field_attribute(
+        ".waymark.v1.PointEvidence.agreement",
+        "#[cfg_attr(feature = \"openapi\", schema(value_type = Vec<PartAgreement>))]",
+    );
     for (field, module) in [
         ("Answer.status", "status"),
         ("QuadAnswer.kind", "quad_kind"),

@@ -89,7 +89,11 @@ async fn the_client_asks_for_a_revision_where_the_document_does() {
     for operation in operations() {
         let method = operation.method.as_str().to_lowercase();
         let parameters = &document["paths"][format!("/api/v1{}", operation.path)][method]["parameters"];
-        let asks = parameters.as_array().into_iter().flatten().any(|p| p["name"] == "If-Match");
+        let asks = parameters
+            .as_array()
+            .into_iter()
+            .flatten()
+            .any(|p| p["$ref"] == "#/components/parameters/header.If-Match");
         assert_eq!(operation.takes_revision(), asks, "{} {}", operation.method, operation.path);
     }
     inside.server.stop().await;

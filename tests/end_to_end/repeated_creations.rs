@@ -127,7 +127,10 @@ async fn the_client_sends_a_key_where_the_document_says_so() {
     let (_, document) = call(&inside, Method::GET, "/openapi.json", None).await;
     let takes_key = |path: &str, method: &str| {
         let parameters = document["paths"][format!("/api/v1{path}")][method]["parameters"].as_array();
-        parameters.into_iter().flatten().any(|p| p["name"] == "Idempotency-Key" && p["in"] == "header")
+        parameters
+            .into_iter()
+            .flatten()
+            .any(|p| p["$ref"] == "#/components/parameters/header.Idempotency-Key")
     };
     for operation in operations() {
         let described = takes_key(operation.path, &operation.method.as_str().to_lowercase());

@@ -218,12 +218,12 @@ def test_refused_photographs_say_what_to_do(server: Server) -> None:
 
 
 def test_jobs_that_do_not_end_well_are_errors(server: Server) -> None:
-    failed = Job(3, "learn", "hall", "failed", 0.5, "the disk is full", "kim", 1)
+    failed = Job(3, "learn", "hall", "failed", 0.5, "the disk is full", by="kim", created_ms=1)
     with pytest.raises(JobFailed, match="the disk is full"):
         job_ended(failed)
     with server.maps() as maps:
         hall(maps, "slow")
-        running = Job(3, "learn", "slow", "running", 0.5, "", "kim", 1)
+        running = Job(3, "learn", "slow", "running", 0.5, "", by="kim", created_ms=1)
         with pytest.raises(JobTimeout):
             maps.wait_for_job(running, 0.0)
 
@@ -306,7 +306,7 @@ def uploaded_views() -> UploadedViews:
             right = x * math.cos(yaw) + away * math.sin(yaw)
             depth = 2.0 - x * math.sin(yaw) + away * math.cos(yaw)
             corners.append((500.0 * right / depth + 319.5, 500.0 * down / depth + 239.5))
-        return UploadedView(tuple(corners))
+        return UploadedView((corners[0], corners[1], corners[2], corners[3]))
 
     angles = [(0.0, 0.7), (0.0, -0.7), (0.7, 0.0), (-0.7, 0.0), (0.5, 0.5)]
     return UploadedViews(640, 480, 0.6, 0.8, tuple(view(*each) for each in angles))

@@ -1,4 +1,5 @@
-"""Writes the generated files: the messages of `waymark.proto`, and the blocking client from that of asyncio.
+"""Writes the generated files: the messages of `waymark.proto`, the bodies of the OpenAPI document, and the blocking
+client from that of asyncio.
 
     python tools/generate.py           writes them
     python tools/generate.py --check   says which are out of date
@@ -15,8 +16,11 @@ import sys
 import tempfile
 from pathlib import Path
 
+from bodies import bodies
+
 PACKAGE = Path(__file__).resolve().parent.parent / "src" / "waymark"
 PROTOS = PACKAGE.parents[3] / "protos"
+DOCUMENT = PACKAGE.parents[3] / "docs" / "openapi.json"
 PROTO = "waymark/v1/waymark.proto"
 HEAD = "# Made by tools/generate.py from {source}. Do not edit.\n"
 
@@ -54,6 +58,8 @@ def generated() -> dict[Path, str]:
     for source in sorted((PACKAGE / "_async").glob("*.py")):
         text = HEAD.format(source=f"_async/{source.name}") + blocking(source.read_text())
         files[PACKAGE / "_sync" / source.name] = formatted(text)
+    made = HEAD.format(source="docs/openapi.json") + bodies(DOCUMENT, PACKAGE / "wire.py")
+    files[PACKAGE / "api" / "bodies.py"] = formatted(made)
     files.update(messages())
     return files
 

@@ -10,7 +10,6 @@ pub struct Camera {
     /// `[a-z0-9_-]{1,64}`, unique on the robot.
     pub name: String,
     /// As its frames say.
-    #[cfg_attr(feature = "openapi", schema(value_type = Object))]
     pub intrinsics: v1::Intrinsics,
     /// Of its frames.
     pub width_px: u32,
@@ -21,12 +20,12 @@ pub struct Camera {
     /// Views of landmarks from different sides that are kept for calibration.
     pub views: usize,
     /// What the residuals of its fixes say: `suspicion` is set when the intrinsics seem off, with the reason and its number.
-    #[cfg_attr(feature = "openapi", schema(value_type = Object))]
     pub intrinsics_monitor: IntrinsicsMonitorBody,
 }
 
 /// What is known of a camera's intrinsics from its use.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct IntrinsicsMonitorBody {
     /// Frames counted.
     pub tries: u32,
@@ -46,6 +45,7 @@ pub struct IntrinsicsMonitorBody {
 
 /// Why the intrinsics of a camera seem wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(tag = "reason", rename_all = "snake_case")]
 pub enum IntrinsicsSuspicionBody {
     /// The true focal length seems longer than stated by this share (shorter: negative), with standard deviation.
@@ -81,6 +81,7 @@ pub struct Cameras {
 #[serde(deny_unknown_fields)]
 pub struct UploadedView {
     /// Top-left, top-right, bottom-right, bottom-left, in pixels as seen.
+    #[cfg_attr(feature = "openapi", schema(value_type = super::arrays::Corners))]
     pub corners: [[f64; 2]; 4],
 }
 
@@ -155,7 +156,6 @@ fn null_is_infinite<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error>
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct CalibrationReport {
     /// As frames carry it, with the standard deviations below: what is not known of the camera is then in the poses.
-    #[cfg_attr(feature = "openapi", schema(value_type = Object))]
     pub intrinsics: v1::Intrinsics,
     /// Width of the pictures that it was calibrated with.
     pub width_px: u32,
@@ -163,12 +163,15 @@ pub struct CalibrationReport {
     pub height_px: u32,
     /// Standard deviation of the focal length.
     #[serde(deserialize_with = "null_is_infinite")]
+    #[cfg_attr(feature = "openapi", schema(value_type = Option<f64>, required))]
     pub fx_sigma_px: f64,
     /// Standard deviation of the principal point, to the right.
     #[serde(deserialize_with = "null_is_infinite")]
+    #[cfg_attr(feature = "openapi", schema(value_type = Option<f64>, required))]
     pub cx_sigma_px: f64,
     /// Standard deviation of the principal point, down.
     #[serde(deserialize_with = "null_is_infinite")]
+    #[cfg_attr(feature = "openapi", schema(value_type = Option<f64>, required))]
     pub cy_sigma_px: f64,
     /// Focal length of the linear solution, where there was one.
     pub linear_fx_px: Option<f64>,

@@ -11,8 +11,8 @@ use serde::{Deserialize, Serialize};
 pub struct EventQuery {
     /// Only those about this map.
     pub map: Option<String>,
-    /// Only those of these kinds, with commas between: `map_changed`, `landmark_changed`, `landmarks_changed`, `job`,
-    /// `presence`, `gathering`, `backup`, `tokens_changed`.
+    /// Only those of these kinds, with commas between.
+    #[cfg_attr(feature = "openapi", param(value_type = Option<Vec<EventKind>>, style = Form, explode = false))]
     pub kind: Option<String>,
     /// The id of the last event that was received; the header `Last-Event-ID` says the same and counts more.
     pub last_event_id: Option<String>,
@@ -114,6 +114,29 @@ pub enum ServerEventBody {
         state: BackupState,
     },
     /// Tokens were made or revoked. For administrators.
+    TokensChanged,
+}
+
+/// A kind of events that a reader can choose, for the document: [`ServerEventBody::KINDS`].
+#[cfg(feature = "openapi")]
+#[derive(Debug, utoipa::ToSchema)]
+#[schema(rename_all = "snake_case")]
+pub enum EventKind {
+    /// A map has a new version, or is gone.
+    MapChanged,
+    /// A landmark was added, changed or removed.
+    LandmarkChanged,
+    /// Many landmarks changed at once.
+    LandmarksChanged,
+    /// A job is queued, runs or has ended.
+    Job,
+    /// A robot came or went.
+    Presence,
+    /// A gathering began or ended, or its tracks were decided about.
+    Gathering,
+    /// A backup is being made, is complete or has failed.
+    Backup,
+    /// Tokens were made or revoked.
     TokensChanged,
 }
 

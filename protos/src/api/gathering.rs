@@ -97,6 +97,7 @@ pub struct EstimatedPlace {
     /// Views that agree on it.
     pub views: usize,
     /// How far off the normal the camera looked: least and most.
+    #[cfg_attr(feature = "openapi", schema(value_type = super::arrays::Pair))]
     pub angle_rad: [f64; 2],
 }
 
@@ -120,6 +121,7 @@ pub struct TrackSummary {
     /// The view that stands best for all.
     pub best_view: Option<i64>,
     /// Smallest and largest side of the quad in the picture.
+    #[cfg_attr(feature = "openapi", schema(value_type = super::arrays::Pair))]
     pub side_px: [f64; 2],
     /// How far apart the views are (the gate `visibility_confidence`).
     pub v_c: f64,

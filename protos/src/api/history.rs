@@ -134,6 +134,7 @@ pub struct WallsDifference {
     /// Segments that are gone.
     pub removed: u64,
     /// The box round both (map frame, m): least x, least y, greatest x, greatest y.
+    #[cfg_attr(feature = "openapi", schema(value_type = Option<super::arrays::Bounds>))]
     pub bounds_m: Option<[f64; 4]>,
 }
 

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 /// Where a robot was lately, by source; oldest first, at most 2000 of each.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct TrajectoriesBody {
     /// Fused poses.
     pub pose: Vec<Pose2>,
@@ -34,6 +35,26 @@ pub enum LiveEventBody {
     Missed(u64),
 }
 
+/// The data of an event of a map's stream, for the document: the name of the event says which of these it is. `odometry` and
+/// `truth` are positions; `missed` is the number of events that a slow reader has missed.
+#[cfg(feature = "openapi")]
+#[derive(Debug, Serialize, utoipa::ToSchema)]
+#[serde(untagged)]
+pub enum LiveEventData {
+    /// `answer`.
+    Answer(Box<LiveAnswer>),
+    /// `pose`.
+    Pose(LivePose),
+    /// `odometry` and `truth`.
+    Position(LivePosition),
+    /// `presence`.
+    Presence(LivePresence),
+    /// `map_changed`.
+    MapChanged(MapChangeBody),
+    /// `missed`.
+    Missed(u64),
+}
+
 impl LiveEventBody {
     /// Reads an event by its name; `None` for a name that is not known here.
     pub fn read(name: &str, data: &str) -> Result<Option<Self>, serde_json::Error> {
@@ -52,6 +73,7 @@ impl LiveEventBody {
 
 /// The answer to a frame.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct LiveAnswer {
     /// Name of the robot.
     pub robot: String,
@@ -63,6 +85,7 @@ pub struct LiveAnswer {
 
 /// A fused pose, as it was published.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct LivePose {
     /// Name of the robot.
     pub robot: String,
@@ -82,6 +105,7 @@ pub struct LivePose {
 
 /// A pose without covariance.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct LivePosition {
     /// Name of the robot.
     pub robot: String,
@@ -93,6 +117,7 @@ pub struct LivePosition {
 
 /// A robot came or went.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct LivePresence {
     /// Name of the robot.
     pub robot: String,
@@ -104,6 +129,7 @@ pub struct LivePresence {
 
 /// A map has a new version, or is gone.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct MapChangeBody {
     /// Name of the map.
     pub map: String,

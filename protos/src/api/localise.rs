@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 /// A planar laser scan: the part `scan`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct ScanBody {
     /// Pose of the laser on the robot.
@@ -53,7 +54,6 @@ pub enum LocaliseStatus {
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct LocaliseHypothesisBody {
     /// The pose with its covariance.
-    #[cfg_attr(feature = "openapi", schema(value_type = Object))]
     pub map_from_robot: Pose2Covariance,
     /// All hypotheses sum to 1.
     pub probability: f64,
@@ -77,11 +77,9 @@ pub struct LocaliseResult {
     /// `undetermined` (the walls leave a direction open), `few_points`, `poor_match`, `map_too_large`, `stopped`.
     pub reason: Option<String>,
     /// The pose; null unless `located`.
-    #[cfg_attr(feature = "openapi", schema(value_type = Option<Object>))]
     pub map_from_robot: Option<Pose2Covariance>,
     /// Where the robot may be, most probable first, at most 16.
     pub hypotheses: Vec<LocaliseHypothesisBody>,
     /// The answer to the picture: `Answer` of protos/waymark/v1/waymark.proto as JSON.
-    #[cfg_attr(feature = "openapi", schema(value_type = Option<Object>))]
     pub answer: Option<Answer>,
 }

@@ -11,6 +11,7 @@ pub struct NewMapping {
     pub robot: String,
     /// Where on the map its first pose is: x, y in metres, heading in radians. The origin, if absent.
     #[serde(default)]
+    #[cfg_attr(feature = "openapi", schema(value_type = super::arrays::Triple))]
     pub origin: [f64; 3],
 }
 
@@ -49,6 +50,7 @@ pub struct MappingProgressBody {
     /// Way driven, metres.
     pub distance_m: f64,
     /// Where the robot is in the map so far: x, y, theta; absent before the first scan.
+    #[cfg_attr(feature = "openapi", schema(value_type = Option<super::arrays::Triple>))]
     pub pose: Option<[f64; 3]>,
     /// Walls, once it is done.
     pub segments: Option<usize>,

@@ -100,6 +100,7 @@ pub struct Parent {
     #[serde(default)]
     pub level_m: f64,
     /// Over (x, y, theta), row-major; absent for 5 cm and half a degree.
+    #[cfg_attr(feature = "openapi", schema(value_type = Option<super::arrays::Covariance>))]
     pub covariance: Option<[f64; 9]>,
 }
 
@@ -208,6 +209,7 @@ pub struct TransformedPose {
     /// Heading in the other map.
     pub theta_rad: f64,
     /// Over (x, y, theta), row-major.
+    #[cfg_attr(feature = "openapi", schema(value_type = super::arrays::Covariance))]
     pub covariance: [f64; 9],
 }
 

@@ -7,6 +7,8 @@
 //! A body of a request refuses unknown fields. A body that is only answered ignores them, so that a newer server can say
 //! more. With the feature `openapi` every type has a schema; the server makes its OpenAPI document of them.
 
+#[cfg(feature = "openapi")]
+pub mod arrays;
 pub mod audit;
 pub mod backups;
 pub mod cameras;

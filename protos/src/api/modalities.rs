@@ -28,6 +28,7 @@ impl fmt::Display for FusionModeBody {
 
 /// What estimates poses by itself.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum ModalityBody {
     /// Odometry alone.
@@ -50,6 +51,7 @@ impl fmt::Display for ModalityBody {
 
 /// Whose runs an advice rests on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum StatsScopeBody {
     /// Those through the cell itself.
@@ -71,6 +73,7 @@ pub struct AreaBody {
     /// Unique, 1 to 64 bytes.
     pub name: String,
     /// Its corners in order, x and y in metres: 3 to 64.
+    #[cfg_attr(feature = "openapi", schema(value_type = Vec<super::arrays::Pair>))]
     pub corners_m: Vec<[f64; 2]>,
 }
 
@@ -93,11 +96,12 @@ pub struct ModalityMapPatch {
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct ModalityStatsBody {
     /// `odometry`, `laser` or `landmarks`.
-    #[cfg_attr(feature = "openapi", schema(value_type = String))]
     pub modality: ModalityBody,
     /// Mean error of its own position.
+    #[cfg_attr(feature = "openapi", schema(value_type = super::arrays::Triple))]
     pub mean: [f64; 3],
     /// Standard deviations about that.
+    #[cfg_attr(feature = "openapi", schema(value_type = super::arrays::Triple))]
     pub sigma: [f64; 3],
     /// Share of the way on which it knew something lately.
     pub availability: f64,
@@ -118,14 +122,11 @@ pub struct ModalityStatsBody {
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct AdviceBody {
     /// The best modality; absent where too little is known, and everything is fused.
-    #[cfg_attr(feature = "openapi", schema(value_type = Option<String>))]
     pub best: Option<ModalityBody>,
     /// What is fused.
-    #[cfg_attr(feature = "openapi", schema(value_type = Vec<String>))]
     pub used: Vec<ModalityBody>,
     /// Whose runs say so: those through the `cell`, those through it and the eight around it (`neighbourhood`), those through
     /// the named `area`, or all of the `map`.
-    #[cfg_attr(feature = "openapi", schema(value_type = String))]
     pub scope: StatsScopeBody,
     /// What each modality gets wrong there beyond what it claims.
     pub error_models: Vec<ErrorModelBody>,
@@ -136,11 +137,12 @@ pub struct AdviceBody {
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct ErrorModelBody {
     /// `odometry`, `laser` or `landmarks`.
-    #[cfg_attr(feature = "openapi", schema(value_type = String))]
     pub modality: ModalityBody,
     /// Subtracted from what it says: metres, metres, radians; of odometry for each metre.
+    #[cfg_attr(feature = "openapi", schema(value_type = super::arrays::Triple))]
     pub bias: [f64; 3],
     /// Added to each variance, as a share of what it claims.
+    #[cfg_attr(feature = "openapi", schema(value_type = super::arrays::Triple))]
     pub variance_inflation: [f64; 3],
 }
 
@@ -155,10 +157,8 @@ pub struct CellBody {
     /// 0, pi/2, pi or -pi/2, each for a quarter of the circle about it.
     pub heading_rad: f64,
     /// The best modality; absent where too little is known.
-    #[cfg_attr(feature = "openapi", schema(value_type = Option<String>))]
     pub best: Option<ModalityBody>,
     /// What is fused.
-    #[cfg_attr(feature = "openapi", schema(value_type = Vec<String>))]
     pub used: Vec<ModalityBody>,
 }
 
@@ -169,6 +169,7 @@ pub struct NamedAreaBody {
     /// Unique, 1 to 64 bytes.
     pub name: String,
     /// Its corners in order, x and y in metres.
+    #[cfg_attr(feature = "openapi", schema(value_type = Vec<super::arrays::Pair>))]
     pub corners_m: Vec<[f64; 2]>,
     /// By heading: 0, pi/2, pi, -pi/2.
     pub headings: Vec<AreaStatsBody>,

@@ -19,6 +19,7 @@ pub struct RecordingStatusBody {
     /// Way driven by odometry, metres.
     pub distance_m: f64,
     /// Time of the first and the last reading of odometry, ns of the robot's clock; absent before the first.
+    #[cfg_attr(feature = "openapi", schema(value_type = Option<super::arrays::Span>))]
     pub span_ns: Option<[i64; 2]>,
     /// Readings of odometry that were kept.
     pub odometry: usize,

@@ -15,6 +15,7 @@ pub struct PoseHypothesisBody {
     /// Heading in the map.
     pub theta_rad: f64,
     /// Over (x, y, theta), row-major.
+    #[cfg_attr(feature = "openapi", schema(value_type = super::arrays::Covariance))]
     pub covariance: [f64; 9],
 }
 

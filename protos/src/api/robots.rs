@@ -51,6 +51,7 @@ pub struct RobotPose {
     /// Heading in the map.
     pub theta_rad: f64,
     /// Over (x, y, theta), row-major.
+    #[cfg_attr(feature = "openapi", schema(value_type = super::arrays::Covariance))]
     pub covariance: [f64; 9],
     /// Since the capture of the newest odometry or fix that supports it; at most 2000.
     pub age_ms: f64,
@@ -186,7 +187,6 @@ pub struct CorrectionsBody {
     /// For each modality how many fixes came to which end. For the laser also why scans gave no fix: `no_pose` (there is
     /// none to correct), `no_walls` (the map has none), `few_points`, `poor_match` (it shows something else than the
     /// map), `gate_prior` (it contradicts the pose), `ambiguous` (several poses fit), `superseded` (a newer one came first).
-    #[cfg_attr(feature = "openapi", schema(value_type = Object))]
     pub totals: BTreeMap<String, BTreeMap<String, u64>>,
     /// The latest 200 of each modality, oldest first; without `repeated` ones, which tell nothing new.
     pub corrections: Vec<CorrectionBody>,

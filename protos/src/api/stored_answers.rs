@@ -96,8 +96,10 @@ pub struct LandmarkIcon {
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct PointMatch {
     /// Place in the quad's icon: (0, 0) is its top-left corner, (1, 1) its bottom-right one; a little outside is possible.
+    #[cfg_attr(feature = "openapi", schema(value_type = super::arrays::Pair))]
     pub seen: [f64; 2],
     /// Place in the landmark's icon, likewise.
+    #[cfg_attr(feature = "openapi", schema(value_type = super::arrays::Pair))]
     pub taught: [f64; 2],
     /// Whether it agrees with the others on where the landmark is.
     pub agrees: bool,
@@ -131,11 +133,9 @@ pub struct PriorCheck {
     /// Whose pose it is.
     pub source: PriorSource,
     /// The pose without the picture, map frame, with covariance.
-    #[cfg_attr(feature = "openapi", schema(value_type = Object))]
     pub prior: Pose2Covariance,
     /// The pose by the landmarks of the picture: of several solutions the nearest to the prior, also where it was refused;
     /// null where the picture gives none.
-    #[cfg_attr(feature = "openapi", schema(value_type = Option<Object>))]
     pub seen: Option<Pose2Covariance>,
     /// Squared Mahalanobis distance of the two, under the sum of their covariances.
     pub distance2: Option<f64>,
@@ -165,7 +165,6 @@ pub struct StoredAnswer {
     /// In brief.
     pub summary: StoredAnswerSummary,
     /// `Answer` of protos/waymark/v1/waymark.proto as JSON: quads with candidates, distances and thresholds, poses.
-    #[cfg_attr(feature = "openapi", schema(value_type = Object))]
     pub answer: Answer,
     /// The pictures of its quads, in the order of `answer.quads`.
     pub quads: Vec<StoredQuad>,

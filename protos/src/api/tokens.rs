@@ -88,6 +88,7 @@ pub struct Token {
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct CreatedToken {
     /// `wmk_{id}_{secret}`, sent as `Authorization: Bearer`. It is shown this once: only its digest is stored.
+    #[cfg_attr(feature = "openapi", schema(format = Password))]
     pub text: String,
     /// What it is.
     pub token: Token,
@@ -120,6 +121,7 @@ pub struct Whoami {
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct PageLink {
     /// Path and query, to be put after the server's address: `/open?code=...`.
+    #[cfg_attr(feature = "openapi", schema(format = Password))]
     pub path: String,
     /// Seconds for which it is valid.
     pub valid_s: u64,

@@ -9,10 +9,16 @@ pub struct UnderlayPlace {
     /// Side of a pixel, 0.0001 to 10.
     pub metres_per_pixel: f64,
     /// Lower left corner of the lower left pixel, x.
+    #[serde(default)]
+    #[cfg_attr(feature = "openapi", schema(default = 0.0))]
     pub x_m: f64,
     /// Lower left corner of the lower left pixel, y.
+    #[serde(default)]
+    #[cfg_attr(feature = "openapi", schema(default = 0.0))]
     pub y_m: f64,
     /// Direction of the picture's rows in the map, counter-clockwise from map x.
+    #[serde(default)]
+    #[cfg_attr(feature = "openapi", schema(default = 0.0))]
     pub theta_rad: f64,
 }
 

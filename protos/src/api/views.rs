@@ -10,6 +10,7 @@ pub struct TrainingView {
     /// Its number, never used again.
     pub id: i64,
     /// The landmark's corners in the picture: top-left, top-right, bottom-right, bottom-left, in pixels.
+    #[cfg_attr(feature = "openapi", schema(value_type = super::arrays::Corners))]
     pub corners: [[f64; 2]; 4],
     /// Of the picture, as a viewer shows it.
     pub width_px: u32,
@@ -121,6 +122,7 @@ pub struct PlacementReportBody {
 /// How a picture was taken: the part `capture` of an upload. With it the server places the landmark itself, on the map's
 /// walls or under a ceiling, unless it was placed by hand.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct CaptureMetadata {
     /// The camera.
@@ -135,6 +137,7 @@ pub struct CaptureMetadata {
     /// Covariance of each corner by the noise of its edges: (uu, uv, vv), top-left, top-right, bottom-right, bottom-left.
     /// Absent: 1 px, or the detector's where the server finds the corners.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "openapi", schema(value_type = Option<super::arrays::CornerCovariances>))]
     pub corner_covariance_px2: Option<[[f64; 3]; 4]>,
 }
 

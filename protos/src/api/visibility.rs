@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 /// The floor area from which a landmark is seen: a GeoJSON `Feature` in metres of the map, not degrees.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct VisibilityAreaBody {
     /// `Feature`.
     #[serde(rename = "type")]
@@ -22,22 +23,26 @@ pub struct VisibilityAreaBody {
 /// A GeoJSON `MultiPolygon`: polygons of rings of points, m in the map; the outer ring counter-clockwise, that of a hole
 /// clockwise, the first point repeated.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct MultiPolygon {
     /// `MultiPolygon`.
     #[serde(rename = "type")]
     pub kind: String,
     /// By polygon, ring and point: x, y in metres.
+    #[cfg_attr(feature = "openapi", schema(value_type = Vec<Vec<Vec<super::arrays::Pair>>>))]
     pub coordinates: Vec<Vec<Vec<[f64; 2]>>>,
 }
 
 /// Figures of a visibility area.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct VisibilityAreaProperties {
     /// Name of the landmark.
     pub landmark: String,
     /// Square metres.
     pub area_m2: f64,
     /// Centre of gravity, where there is an area.
+    #[cfg_attr(feature = "openapi", schema(value_type = Option<super::arrays::Pair>))]
     pub centroid_m: Option<[f64; 2]>,
     /// Furthest possible distance from the landmark.
     pub reach_m: f64,
@@ -55,6 +60,7 @@ pub struct PoseBody {
     /// Heading in the map.
     pub theta_rad: f64,
     /// Over (x, y, theta), row-major; absent for a pose that is exactly known.
+    #[cfg_attr(feature = "openapi", schema(value_type = Option<super::arrays::Covariance>))]
     pub covariance: Option<[f64; 9]>,
 }
 
@@ -98,6 +104,7 @@ pub struct VisibleResponse {
 #[serde(deny_unknown_fields)]
 pub struct CoverageRequest {
     /// Its points: x, y in metres.
+    #[cfg_attr(feature = "openapi", schema(value_type = Vec<super::arrays::Pair>))]
     pub path: Vec<[f64; 2]>,
     /// How often to look: 0.01 to 10 m.
     #[serde(default = "step_m")]

@@ -8,13 +8,16 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct WallBody {
     /// First end: x, y in metres.
+    #[cfg_attr(feature = "openapi", schema(value_type = super::arrays::Pair))]
     pub a: [f64; 2],
     /// Second end: x, y in metres.
+    #[cfg_attr(feature = "openapi", schema(value_type = super::arrays::Pair))]
     pub b: [f64; 2],
     /// How well it is known, about its middle: variance of its direction (rad^2), covariance of direction and offset to its
     /// free side (rad m), variance of the offset (m^2), relative to the map frame. A map made of scans has it. Absent: measured
     /// by hand, to 1 cm.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "openapi", schema(value_type = Option<super::arrays::Triple>))]
     pub covariance: Option<[f64; 3]>,
 }
 

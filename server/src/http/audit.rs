@@ -16,7 +16,7 @@ pub(super) fn router() -> OpenApiRouter<AppState> {
 }
 
 /// Lists changes, newest first: who, when, what. An entry is written in the transaction of its change.
-#[utoipa::path(get, path = "/audit", tag = "audit", params(AuditQuery),
+#[utoipa::path(get, path = "/audit", operation_id = "listAuditEntries", tag = "audit", params(AuditQuery),
     responses((status = 200, body = Page<AuditEntry>),
     (status = 422, body = Problem, description = "out_of_range, invalid_value")))]
 async fn list(
@@ -34,7 +34,7 @@ async fn list(
 
 /// Computes the digest of every entry anew. `seq` and `sha256` of an earlier `head`, noted outside of the server, are
 /// compared as well: whoever can write the database could write another chain, but not one with that digest.
-#[utoipa::path(get, path = "/audit/check", tag = "audit", params(AuditHeadQuery),
+#[utoipa::path(get, path = "/audit/check", operation_id = "checkAudit", tag = "audit", params(AuditHeadQuery),
     responses((status = 200, body = AuditCheck), (status = 422, body = Problem, description = "invalid_value")))]
 async fn check(
     State(app): State<AppState>,

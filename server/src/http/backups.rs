@@ -29,7 +29,8 @@ pub(super) fn router() -> OpenApiRouter<AppState> {
 
 /// Begins a backup: one file with one committed state, and a manifest of its digests. Writes go on meanwhile. The oldest
 /// backups beyond `backup.keep` are removed when it is complete.
-#[utoipa::path(post, path = "/backups", tag = "backups", responses((status = 202, body = Backup),
+#[utoipa::path(post, path = "/backups", operation_id = "createBackup",
+    tag = "backups", responses((status = 202, body = Backup),
     (status = 409, body = Problem, description = "in_use: another one is being made")))]
 async fn create(State(app): State<AppState>) -> Result<(StatusCode, Json<Backup>), ApiError> {
     // It goes on without the request.
@@ -38,7 +39,8 @@ async fn create(State(app): State<AppState>) -> Result<(StatusCode, Json<Backup>
 }
 
 /// Lists the backups in the data directory by time, with the one in work and a failed last attempt.
-#[utoipa::path(get, path = "/backups", tag = "backups", params(PageQuery), responses((status = 200, body = Page<Backup>)))]
+#[utoipa::path(get, path = "/backups", operation_id = "listBackups",
+    tag = "backups", params(PageQuery), responses((status = 200, body = Page<Backup>)))]
 async fn list(
     State(app): State<AppState>,
     QueryParams(query): QueryParams<PageQuery>,
@@ -54,7 +56,8 @@ async fn list(
 }
 
 /// One backup: how far it is, and what it holds.
-#[utoipa::path(get, path = "/backups/{backup}", tag = "backups", params(("backup" = String, Path)),
+#[utoipa::path(get, path = "/backups/{backup}", operation_id = "getBackup",
+    tag = "backups", params(("backup" = String, Path)),
     responses((status = 200, body = Backup), (status = 404, body = Problem)))]
 async fn get(
     State(app): State<AppState>,
@@ -64,7 +67,8 @@ async fn get(
 }
 
 /// The file of a complete backup, for `waymark restore`.
-#[utoipa::path(get, path = "/backups/{backup}/file", tag = "backups", params(("backup" = String, Path)),
+#[utoipa::path(get, path = "/backups/{backup}/file", operation_id = "getBackupFile",
+    tag = "backups", params(("backup" = String, Path)),
     responses((status = 200, content_type = "application/octet-stream"), (status = 404, body = Problem)))]
 async fn file(
     State(app): State<AppState>,
@@ -92,7 +96,8 @@ async fn file(
 }
 
 /// Deletes a complete backup.
-#[utoipa::path(delete, path = "/backups/{backup}", tag = "backups", params(("backup" = String, Path)),
+#[utoipa::path(delete, path = "/backups/{backup}", operation_id = "deleteBackup",
+    tag = "backups", params(("backup" = String, Path)),
     responses((status = 204), (status = 404, body = Problem)))]
 async fn delete(
     State(app): State<AppState>,

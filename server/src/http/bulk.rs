@@ -31,7 +31,8 @@ fn within_bound(count: usize) -> Result<(), ApiError> {
 }
 
 /// Creates landmarks without views: all, or none. The field of a refusal has the number of the landmark at fault, from 0.
-#[utoipa::path(post, path = "/maps/{map}/bulk/create-landmarks", tag = "landmarks", params(("map" = String, Path)),
+#[utoipa::path(post, path = "/maps/{map}/bulk/create-landmarks", operation_id = "createLandmarks",
+    tag = "landmarks", params(("map" = String, Path)),
     request_body = NewLandmarks, responses((status = 201, body = BulkOutcome), (status = 404, body = Problem),
     (status = 409, body = Problem, description = "exists, too_many"),
     (status = 422, body = Problem, description = "bad_name, invalid_value, out_of_range")))]
@@ -67,7 +68,8 @@ async fn create(
 
 /// Deletes landmarks with their views and models: all, or none. The field of a refusal has the number of the landmark at
 /// fault, from 0.
-#[utoipa::path(post, path = "/maps/{map}/bulk/delete-landmarks", tag = "landmarks", params(("map" = String, Path)),
+#[utoipa::path(post, path = "/maps/{map}/bulk/delete-landmarks", operation_id = "deleteLandmarks",
+    tag = "landmarks", params(("map" = String, Path)),
     request_body = LandmarkDeletions, responses((status = 200, body = BulkOutcome), (status = 404, body = Problem),
     (status = 412, body = Problem, description = "changed_meanwhile: a landmark has another revision than the one given"),
     (status = 422, body = Problem, description = "out_of_range")))]

@@ -48,7 +48,8 @@ impl From<BundleError> for ApiError {
 }
 
 /// The whole map as one file, a bundle: a zip with JSON, GeoJSON, pictures and models (docs/BUNDLE.md).
-#[utoipa::path(get, path = "/maps/{map}/bundle", tag = "maps", params(("map" = String, Path)),
+#[utoipa::path(get, path = "/maps/{map}/bundle", operation_id = "saveBundle",
+    tag = "maps", params(("map" = String, Path)),
     responses((status = 200, content_type = "application/zip"), (status = 404, body = Problem),
     (status = 409, body = Problem, description = "too_many: bytes of one map, or files of a bundle"),
     (status = 500, body = Problem, description = "picture_damaged")))]
@@ -78,7 +79,7 @@ async fn save(
 
 /// Makes a new map of a bundle: with landmarks, views, models, walls, underlay, reference runs and settings, as one commit. A
 /// bundle of which anything is wrong is refused as a whole, with the file in it as `field`.
-#[utoipa::path(post, path = "/bundles", tag = "maps", params(BundleQuery),
+#[utoipa::path(post, path = "/bundles", operation_id = "loadBundle", tag = "maps", params(BundleQuery),
     request_body(content = Vec<u8>, content_type = "application/zip"), responses((status = 201, body = Map),
     (status = 404, body = Problem, description = "unknown_map: the map that it lies in"),
     (status = 409, body = Problem, description = "exists, too_many, too_deep"), (status = 413, body = Problem),

@@ -58,7 +58,8 @@ fn camera_shown((name, state): (String, CameraState)) -> Camera {
 }
 
 /// Lists the cameras of a robot in whose frames landmarks of known size were recognised.
-#[utoipa::path(get, path = "/robots/{robot}/cameras", tag = "robots", params(("robot" = String, Path)),
+#[utoipa::path(get, path = "/robots/{robot}/cameras", operation_id = "listCameras",
+    tag = "robots", params(("robot" = String, Path)),
     responses((status = 200, body = Cameras), (status = 404, body = Problem)))]
 async fn list(
     State(app): State<AppState>,
@@ -71,7 +72,8 @@ async fn list(
 
 /// Calibrates a camera, from uploaded corners or from the views of landmarks kept of its own frames. Nothing is changed:
 /// a robot sends its intrinsics with its frames.
-#[utoipa::path(post, path = "/robots/{robot}/cameras/{camera}/calibrate", tag = "robots",
+#[utoipa::path(post, path = "/robots/{robot}/cameras/{camera}/calibrate", operation_id = "calibrateCamera",
+    tag = "robots",
     params(("robot" = String, Path), ("camera" = String, Path)), request_body = CalibrationRequest,
     responses((status = 200, body = CalibrationReport), (status = 404, body = Problem),
     (status = 409, body = Problem, description = "not_determined: too few views, too few orientations, or views that do not fit"),

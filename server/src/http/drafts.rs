@@ -36,7 +36,8 @@ fn shown(row: DraftRow) -> Draft {
 }
 
 /// Begins a draft of a map: a map of its own that no robot sees, with all that the map has.
-#[utoipa::path(post, path = "/maps/{map}/drafts", tag = "history", params(("map" = String, Path)), request_body = NewDraft,
+#[utoipa::path(post, path = "/maps/{map}/drafts", operation_id = "createDraft",
+    tag = "history", params(("map" = String, Path)), request_body = NewDraft,
     responses((status = 201, body = Draft), (status = 404, body = Problem),
     (status = 409, body = Problem, description = "exists: the name; too_many: drafts of a map, or bytes of one map; \
      in_use: it is a draft itself"), (status = 422, body = Problem, description = "bad_name")))]
@@ -51,7 +52,8 @@ async fn begin(
 }
 
 /// Lists the drafts of a map, by name: all on one page.
-#[utoipa::path(get, path = "/maps/{map}/drafts", tag = "history", params(("map" = String, Path)),
+#[utoipa::path(get, path = "/maps/{map}/drafts", operation_id = "listDrafts",
+    tag = "history", params(("map" = String, Path)),
     responses((status = 200, body = Page<Draft>), (status = 404, body = Problem)))]
 async fn list(
     State(app): State<AppState>,
@@ -63,7 +65,7 @@ async fn list(
 }
 
 /// Deletes a draft with all that is in it. The map stays as it is.
-#[utoipa::path(delete, path = "/maps/{map}/drafts/{draft}", tag = "history",
+#[utoipa::path(delete, path = "/maps/{map}/drafts/{draft}", operation_id = "deleteDraft", tag = "history",
     params(("map" = String, Path), ("draft" = String, Path)), responses((status = 204),
     (status = 404, body = Problem, description = "unknown_draft"),
     (status = 409, body = Problem, description = "in_use: a job works on it")))]
@@ -77,7 +79,8 @@ async fn discard(
 }
 
 /// What publishing a draft would change of its map, and what is in the way.
-#[utoipa::path(get, path = "/maps/{map}/drafts/{draft}/difference", tag = "history",
+#[utoipa::path(get, path = "/maps/{map}/drafts/{draft}/difference", operation_id = "getDraftDifference",
+    tag = "history",
     params(("map" = String, Path), ("draft" = String, Path), PageQuery), responses((status = 200, body = DraftDifference),
     (status = 404, body = Problem, description = "unknown_draft"),
     (status = 409, body = Problem, description = "too_many: bytes of one map"),
@@ -106,7 +109,7 @@ async fn difference(
 
 /// Publishes a draft: what it has changed of the map, by one commit; then the draft is gone. A roll back of that commit makes
 /// the map what it was.
-#[utoipa::path(post, path = "/maps/{map}/drafts/{draft}/publish", tag = "history",
+#[utoipa::path(post, path = "/maps/{map}/drafts/{draft}/publish", operation_id = "publishDraft", tag = "history",
     params(("map" = String, Path), ("draft" = String, Path)), responses((status = 200, body = RollbackOutcome),
     (status = 404, body = Problem, description = "unknown_draft"),
     (status = 409, body = Problem, description = "conflict: map and draft have both changed what `conflicts` lists; in_use: a \

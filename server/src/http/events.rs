@@ -109,7 +109,7 @@ impl Reader {
 /// and tokens, too. The first event is `ready`. A reader that was cut off gives the id of its last event (`Last-Event-ID`)
 /// and gets what it has missed; where that is more than is remembered (1024 events), an event `reset` says to read anew.
 /// Only what the token may see is sent.
-#[utoipa::path(get, path = "/events", tag = "maps", params(EventQuery,
+#[utoipa::path(get, path = "/events", operation_id = "followEvents", tag = "maps", params(EventQuery,
     ("Last-Event-ID" = Option<String>, Header, description = "Id of the last event that was received.")),
     responses((status = 200, content_type = "text/event-stream", body = ServerEvent),
     (status = 404, body = Problem, description = "unknown_map"),

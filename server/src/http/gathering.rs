@@ -82,7 +82,8 @@ fn with_counts(row: GatheringRow, counts: Option<GatheringCounts>) -> Gathering 
 
 /// Begins to gather views with a robot: while it drives, flat four-sided things are followed from frame to frame, and of
 /// each the views that say something new are kept, until it is stopped. Nothing becomes a landmark by itself.
-#[utoipa::path(post, path = "/maps/{map}/gatherings", tag = "gathering", params(("map" = String, Path)),
+#[utoipa::path(post, path = "/maps/{map}/gatherings", operation_id = "startGathering",
+    tag = "gathering", params(("map" = String, Path)),
     request_body = NewGatheringBody, responses((status = 201, body = Gathering),
     (status = 404, body = Problem, description = "unknown_map, unknown_robot, unknown_landmark"),
     (status = 409, body = Problem, description = "in_use: it gathers already or stands on another map; not_learnt; too_many"),
@@ -117,7 +118,8 @@ async fn begin(
 }
 
 /// Lists gatherings by number, ended ones included.
-#[utoipa::path(get, path = "/maps/{map}/gatherings", tag = "gathering", params(("map" = String, Path), PageQuery),
+#[utoipa::path(get, path = "/maps/{map}/gatherings", operation_id = "listGatherings",
+    tag = "gathering", params(("map" = String, Path), PageQuery),
     responses((status = 200, body = Page<Gathering>), (status = 404, body = Problem)))]
 async fn list(
     State(app): State<AppState>,
@@ -132,7 +134,7 @@ async fn list(
 }
 
 /// One gathering.
-#[utoipa::path(get, path = "/maps/{map}/gatherings/{gathering}", tag = "gathering",
+#[utoipa::path(get, path = "/maps/{map}/gatherings/{gathering}", operation_id = "getGathering", tag = "gathering",
     params(("map" = String, Path), ("gathering" = i64, Path)),
     responses((status = 200, body = Gathering), (status = 404, body = Problem)))]
 async fn get(
@@ -144,7 +146,8 @@ async fn get(
 }
 
 /// Stops; what was gathered waits for a decision. One that has ended stays as it is.
-#[utoipa::path(post, path = "/maps/{map}/gatherings/{gathering}/stop", tag = "gathering",
+#[utoipa::path(post, path = "/maps/{map}/gatherings/{gathering}/stop", operation_id = "stopGathering",
+    tag = "gathering",
     params(("map" = String, Path), ("gathering" = i64, Path)),
     responses((status = 200, body = Gathering), (status = 404, body = Problem)))]
 async fn stop(
@@ -156,7 +159,8 @@ async fn stop(
 }
 
 /// Stops, and throws away all that nobody has accepted.
-#[utoipa::path(delete, path = "/maps/{map}/gatherings/{gathering}", tag = "gathering",
+#[utoipa::path(delete, path = "/maps/{map}/gatherings/{gathering}", operation_id = "deleteGathering",
+    tag = "gathering",
     params(("map" = String, Path), ("gathering" = i64, Path)),
     responses((status = 204), (status = 404, body = Problem)))]
 async fn delete(
@@ -168,7 +172,8 @@ async fn delete(
 }
 
 /// What waits for a decision, with all that helps to decide. Also while the robot still drives.
-#[utoipa::path(get, path = "/maps/{map}/gatherings/{gathering}/tracks", tag = "gathering",
+#[utoipa::path(get, path = "/maps/{map}/gatherings/{gathering}/tracks", operation_id = "listTracks",
+    tag = "gathering",
     params(("map" = String, Path), ("gathering" = i64, Path)),
     responses((status = 200, body = TrackList), (status = 404, body = Problem)))]
 async fn list_tracks(
@@ -187,7 +192,8 @@ async fn list_tracks(
 }
 
 /// Discards a track. While the gathering goes on, no more views of it are kept.
-#[utoipa::path(delete, path = "/maps/{map}/gatherings/{gathering}/tracks/{track}", tag = "gathering",
+#[utoipa::path(delete, path = "/maps/{map}/gatherings/{gathering}/tracks/{track}", operation_id = "deleteTrack",
+    tag = "gathering",
     params(("map" = String, Path), ("gathering" = i64, Path), ("track" = u32, Path)),
     responses((status = 204), (status = 404, body = Problem)))]
 async fn discard(
@@ -200,6 +206,7 @@ async fn discard(
 
 /// The rectified picture of a view of a track, as PNG.
 #[utoipa::path(get, path = "/maps/{map}/gatherings/{gathering}/tracks/{track}/views/{view}/icon",
+    operation_id = "getTrackIcon",
     tag = "gathering", params(("map" = String, Path), ("gathering" = i64, Path), ("track" = u32, Path),
     ("view" = i64, Path)), responses((status = 200, content_type = "image/png"),
     (status = 304, description = "`If-None-Match` has it"), (status = 404, body = Problem)))]
@@ -223,7 +230,8 @@ async fn show_icon(
 const MAX_PICKS: usize = 64;
 
 /// Makes landmarks of tracks, or adds views to the landmarks they show; places them; and learns them. All or nothing.
-#[utoipa::path(post, path = "/maps/{map}/gatherings/{gathering}/accept", tag = "gathering",
+#[utoipa::path(post, path = "/maps/{map}/gatherings/{gathering}/accept", operation_id = "acceptTracks",
+    tag = "gathering",
     params(("map" = String, Path), ("gathering" = i64, Path)), request_body = AcceptRequest,
     responses((status = 202, body = AcceptanceBody), (status = 200, body = AcceptanceBody, description = "without a lesson"),
     (status = 404, body = Problem, description = "unknown_gathering, unknown_track"),

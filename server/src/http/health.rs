@@ -23,7 +23,8 @@ pub(super) fn router() -> OpenApiRouter<AppState> {
 }
 
 /// Liveness check.
-#[utoipa::path(get, path = "/healthz", tag = "health", responses((status = 200, body = Health)))]
+#[utoipa::path(get, path = "/healthz", operation_id = "getHealth",
+    tag = "health", responses((status = 200, body = Health)))]
 async fn healthz() -> Json<Health> {
     Json(Health { status: "ok".to_owned() })
 }
@@ -34,7 +35,8 @@ async fn healthz() -> Json<Health> {
 /// Open to everybody, so that monitors need no token: without a valid one the answer has status and counts. A token or a
 /// session adds the names of what its maps contain; one for all maps the parts, the reason of a failed backup and the name
 /// of the newest.
-#[utoipa::path(get, path = "/readyz", tag = "health", responses((status = 200, body = Readiness),
+#[utoipa::path(get, path = "/readyz", operation_id = "getReadiness",
+    tag = "health", responses((status = 200, body = Readiness),
     (status = 503, body = Problem, description = "storage_failed, part_ended, part_stalled")))]
 async fn readyz(State(app): State<AppState>, parts: Parts) -> Result<Json<Readiness>, ApiError> {
     let asker = authorise::asker(&app, &parts);
@@ -138,7 +140,8 @@ fn not_ready(failure: &Failure, sees_all: bool) -> ApiError {
 }
 
 /// What runs here.
-#[utoipa::path(get, path = "/version", tag = "health", responses((status = 200, body = Version)))]
+#[utoipa::path(get, path = "/version", operation_id = "getVersion",
+    tag = "health", responses((status = 200, body = Version)))]
 async fn version(State(app): State<AppState>) -> Json<Version> {
     Json(Version {
         name: "waymark".to_owned(),

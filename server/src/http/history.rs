@@ -56,7 +56,8 @@ pub(super) fn shown(row: CommitRow) -> Commit {
 }
 
 /// Lists the kept commits of a map, newest first. `limits.kept_commits` and `limits.history_bytes` say how many are kept.
-#[utoipa::path(get, path = "/maps/{map}/commits", tag = "history", params(("map" = String, Path), PageQuery),
+#[utoipa::path(get, path = "/maps/{map}/commits", operation_id = "listCommits",
+    tag = "history", params(("map" = String, Path), PageQuery),
     responses((status = 200, body = Page<Commit>), (status = 404, body = Problem)))]
 async fn list(
     State(app): State<AppState>,
@@ -72,7 +73,7 @@ async fn list(
 }
 
 /// One kept commit of a map.
-#[utoipa::path(get, path = "/maps/{map}/commits/{commit}", tag = "history",
+#[utoipa::path(get, path = "/maps/{map}/commits/{commit}", operation_id = "getCommit", tag = "history",
     params(("map" = String, Path), ("commit" = i64, Path)), responses((status = 200, body = Commit),
     (status = 404, body = Problem, description = "unknown_commit: it never was, or is not kept any more")))]
 async fn get(
@@ -84,7 +85,8 @@ async fn get(
 }
 
 /// What differs between a map at two kept commits, or at one and now.
-#[utoipa::path(get, path = "/maps/{map}/difference", tag = "history", params(("map" = String, Path), DifferenceQuery),
+#[utoipa::path(get, path = "/maps/{map}/difference", operation_id = "getDifference",
+    tag = "history", params(("map" = String, Path), DifferenceQuery),
     responses((status = 200, body = Difference), (status = 404, body = Problem, description = "unknown_commit"),
     (status = 422, body = Problem, description = "out_of_range: `to` is before `from`")))]
 async fn difference(
@@ -151,7 +153,8 @@ fn landmark(change: LandmarkChange) -> LandmarkDifference {
 
 /// Makes a map what it was at a kept commit: landmarks with their views, pictures, models and thresholds, walls, underlay,
 /// reference runs and settings. It is a commit of its own, which can be taken back. The map keeps its name.
-#[utoipa::path(post, path = "/maps/{map}/rollback", tag = "history", params(("map" = String, Path)),
+#[utoipa::path(post, path = "/maps/{map}/rollback", operation_id = "rollBackMap",
+    tag = "history", params(("map" = String, Path)),
     request_body = Rollback, responses((status = 200, body = RollbackOutcome),
     (status = 404, body = Problem, description = "unknown_commit"),
     (status = 409, body = Problem, description = "in_use: a job works on the map, or the map that it lay in is gone; \
@@ -181,7 +184,7 @@ fn in_body(error: crate::store::StoreError) -> ApiError {
 }
 
 /// Takes one commit back, if no later one has changed the same rows. It is a commit of its own.
-#[utoipa::path(post, path = "/maps/{map}/commits/{commit}/undo", tag = "history",
+#[utoipa::path(post, path = "/maps/{map}/commits/{commit}/undo", operation_id = "undoCommit", tag = "history",
     params(("map" = String, Path), ("commit" = i64, Path)), responses((status = 200, body = RollbackOutcome),
     (status = 404, body = Problem, description = "unknown_commit"),
     (status = 409, body = Problem, description = "changed_since: `by` is the later commit that has changed the same; \

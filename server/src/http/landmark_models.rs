@@ -117,7 +117,8 @@ fn model_shown(landmark: String, learnt: &Learnt) -> LandmarkModelDetail {
 }
 
 /// What was learnt of a landmark: thresholds with their error rates, keypoints, points, saliency, sizes.
-#[utoipa::path(get, path = "/maps/{map}/landmarks/{landmark}/model", tag = "landmarks",
+#[utoipa::path(get, path = "/maps/{map}/landmarks/{landmark}/model", operation_id = "getLandmarkModel",
+    tag = "landmarks",
     params(("map" = String, Path), ("landmark" = String, Path)),
     responses((status = 200, body = LandmarkModelDetail),
     (status = 404, body = Problem, description = "unknown_map, unknown_landmark, not_learnt")))]
@@ -161,7 +162,8 @@ fn histogram(threshold: &Threshold, samples: &DistanceSamples) -> DistanceHistog
 }
 
 /// Histograms of the distances that the thresholds were fitted to: of the landmark's own views, and of everything else.
-#[utoipa::path(get, path = "/maps/{map}/landmarks/{landmark}/distances", tag = "landmarks",
+#[utoipa::path(get, path = "/maps/{map}/landmarks/{landmark}/distances", operation_id = "getLandmarkDistances",
+    tag = "landmarks",
     params(("map" = String, Path), ("landmark" = String, Path)),
     responses((status = 200, body = LandmarkDistances),
     (status = 404, body = Problem, description = "unknown_map, unknown_landmark, not_learnt")))]
@@ -212,7 +214,8 @@ fn evidence_in(answers: &[v1::Answer], landmark: String) -> LandmarkEvidence {
 }
 
 /// How strongly points spoke for a landmark in the newest stored answers: a histogram beside the threshold.
-#[utoipa::path(get, path = "/maps/{map}/landmarks/{landmark}/evidence", tag = "landmarks",
+#[utoipa::path(get, path = "/maps/{map}/landmarks/{landmark}/evidence", operation_id = "getLandmarkEvidence",
+    tag = "landmarks",
     params(("map" = String, Path), ("landmark" = String, Path)),
     responses((status = 200, body = LandmarkEvidence),
     (status = 404, body = Problem, description = "unknown_map, unknown_landmark")))]
@@ -227,7 +230,8 @@ async fn evidence(
 }
 
 /// The learnt icon of a landmark that is nearest to the mean of its views, as PNG. `ETag` is the digest of its model.
-#[utoipa::path(get, path = "/maps/{map}/landmarks/{landmark}/icon", tag = "landmarks",
+#[utoipa::path(get, path = "/maps/{map}/landmarks/{landmark}/icon", operation_id = "getLandmarkIcon",
+    tag = "landmarks",
     params(("map" = String, Path), ("landmark" = String, Path)),
     responses((status = 200, content_type = "image/png"), (status = 304, description = "`If-None-Match` has it"),
     (status = 404, body = Problem, description = "unknown_map, unknown_landmark, not_learnt")))]
@@ -263,7 +267,8 @@ fn pairs(landmarks: &[Landmark]) -> BTreeMap<(String, String), f64> {
 }
 
 /// Lists the landmarks of a map that look alike, in pairs by their names, as they were told apart in their last lessons.
-#[utoipa::path(get, path = "/maps/{map}/duplicates", tag = "landmarks", params(("map" = String, Path), DuplicateQuery),
+#[utoipa::path(get, path = "/maps/{map}/duplicates", operation_id = "listDuplicates",
+    tag = "landmarks", params(("map" = String, Path), DuplicateQuery),
     responses((status = 200, body = Page<DuplicatePair>), (status = 404, body = Problem),
     (status = 422, body = Problem, description = "out_of_range")))]
 async fn duplicates(

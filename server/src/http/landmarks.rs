@@ -196,7 +196,8 @@ pub(super) fn shown(app: &App, learning: &Learning, map: &str, row: LandmarkRow)
 }
 
 /// Creates a landmark without views.
-#[utoipa::path(post, path = "/maps/{map}/landmarks", tag = "landmarks", params(("map" = String, Path)),
+#[utoipa::path(post, path = "/maps/{map}/landmarks", operation_id = "createLandmark",
+    tag = "landmarks", params(("map" = String, Path)),
     request_body = NewLandmark, responses((status = 201, body = Landmark), (status = 404, body = Problem),
     (status = 409, body = Problem, description = "exists, too_many"),
     (status = 422, body = Problem, description = "bad_name, invalid_value, out_of_range")))]
@@ -225,7 +226,8 @@ impl Listed for LandmarkRow {
 }
 
 /// Lists the landmarks of a map.
-#[utoipa::path(get, path = "/maps/{map}/landmarks", tag = "landmarks", params(("map" = String, Path), LandmarkQuery),
+#[utoipa::path(get, path = "/maps/{map}/landmarks", operation_id = "listLandmarks",
+    tag = "landmarks", params(("map" = String, Path), LandmarkQuery),
     responses((status = 200, body = Page<Landmark>), (status = 404, body = Problem),
     (status = 422, body = Problem, description = "out_of_range, invalid_value")))]
 async fn list(
@@ -256,7 +258,7 @@ async fn list(
 }
 
 /// One landmark.
-#[utoipa::path(get, path = "/maps/{map}/landmarks/{landmark}", tag = "landmarks",
+#[utoipa::path(get, path = "/maps/{map}/landmarks/{landmark}", operation_id = "getLandmark", tag = "landmarks",
     params(("map" = String, Path), ("landmark" = String, Path)),
     responses((status = 200, body = Landmark), (status = 404, body = Problem)))]
 async fn get(
@@ -274,7 +276,7 @@ async fn get(
 
 /// Renames it; sets or forgets size and place; sets how far it is trusted. Everything that belongs to it follows the name. A size whose
 /// ratio of sides its photographs contradict is refused.
-#[utoipa::path(patch, path = "/maps/{map}/landmarks/{landmark}", tag = "landmarks",
+#[utoipa::path(patch, path = "/maps/{map}/landmarks/{landmark}", operation_id = "updateLandmark", tag = "landmarks",
     params(("map" = String, Path), ("landmark" = String, Path)), request_body = LandmarkPatch,
     responses((status = 200, body = Landmark), (status = 404, body = Problem),
     (status = 409, body = Problem, description = "exists; aspect_differs, with `stated`, `measured_aspect`, \
@@ -324,7 +326,8 @@ async fn patch(
 
 /// Makes two landmarks one: this one gets the views of `from`, and the size and place that it lacks; `from` is deleted. Its
 /// model stays until it is learnt again; the history brings both back.
-#[utoipa::path(post, path = "/maps/{map}/landmarks/{landmark}/merge", tag = "landmarks",
+#[utoipa::path(post, path = "/maps/{map}/landmarks/{landmark}/merge", operation_id = "mergeLandmarks",
+    tag = "landmarks",
     params(("map" = String, Path), ("landmark" = String, Path)), request_body = LandmarkMerge,
     responses((status = 200, body = Landmark), (status = 404, body = Problem),
     (status = 409, body = Problem, description = "too_many"),
@@ -345,7 +348,7 @@ async fn merge(
 }
 
 /// Deletes a landmark with its views and its model.
-#[utoipa::path(delete, path = "/maps/{map}/landmarks/{landmark}", tag = "landmarks",
+#[utoipa::path(delete, path = "/maps/{map}/landmarks/{landmark}", operation_id = "deleteLandmark", tag = "landmarks",
     params(("map" = String, Path), ("landmark" = String, Path)),
     responses((status = 204), (status = 404, body = Problem)))]
 async fn delete(

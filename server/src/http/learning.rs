@@ -69,7 +69,7 @@ fn check_generated(generated_views: Option<usize>) -> Result<Option<usize>, ApiE
 }
 
 /// Learns one landmark again from its views.
-#[utoipa::path(post, path = "/maps/{map}/landmarks/{landmark}/learn", tag = "lessons",
+#[utoipa::path(post, path = "/maps/{map}/landmarks/{landmark}/learn", operation_id = "learnLandmark", tag = "lessons",
     params(("map" = String, Path), ("landmark" = String, Path)), request_body = Option<LandmarkLesson>,
     responses((status = 202, body = Job), (status = 404, body = Problem),
     (status = 409, body = Problem, description = "no_views, too_many"), (status = 422, body = Problem)))]
@@ -88,7 +88,8 @@ async fn learn_one(
 }
 
 /// Learns landmarks of a map in one job: what they must be told from is worked out once.
-#[utoipa::path(post, path = "/maps/{map}/learn", tag = "lessons", params(("map" = String, Path)),
+#[utoipa::path(post, path = "/maps/{map}/learn", operation_id = "learnMap",
+    tag = "lessons", params(("map" = String, Path)),
     request_body = Option<MapLesson>, responses((status = 202, body = Job), (status = 404, body = Problem),
     (status = 409, body = Problem, description = "no_views, too_many"), (status = 422, body = Problem)))]
 async fn learn_map(
@@ -139,7 +140,7 @@ async fn read(app: &AppState, id: i64) -> Result<Job, StoreError> {
 }
 
 /// Lists jobs, newest first: those that wait or run, and the last that have ended.
-#[utoipa::path(get, path = "/jobs", tag = "lessons", params(JobQuery),
+#[utoipa::path(get, path = "/jobs", operation_id = "listJobs", tag = "lessons", params(JobQuery),
     responses((status = 200, body = Page<Job>), (status = 422, body = Problem, description = "out_of_range, invalid_value")))]
 async fn list(
     State(app): State<AppState>,
@@ -156,14 +157,14 @@ async fn list(
 }
 
 /// One job.
-#[utoipa::path(get, path = "/jobs/{job}", tag = "lessons", params(("job" = i64, Path)),
+#[utoipa::path(get, path = "/jobs/{job}", operation_id = "getJob", tag = "lessons", params(("job" = i64, Path)),
     responses((status = 200, body = Job), (status = 404, body = Problem)))]
 async fn get(State(app): State<AppState>, PathParams(id): PathParams<i64>) -> Result<Json<Job>, ApiError> {
     Ok(Json(read(&app, id).await?))
 }
 
 /// Asks a job to stop: one that waits is cancelled at once. One that has ended stays as it is.
-#[utoipa::path(delete, path = "/jobs/{job}", tag = "lessons", params(("job" = i64, Path)),
+#[utoipa::path(delete, path = "/jobs/{job}", operation_id = "cancelJob", tag = "lessons", params(("job" = i64, Path)),
     responses((status = 200, body = Job), (status = 404, body = Problem)))]
 async fn cancel(State(app): State<AppState>, PathParams(id): PathParams<i64>) -> Result<Json<Job>, ApiError> {
     app.jobs.cancel(id).await?;
@@ -171,7 +172,8 @@ async fn cancel(State(app): State<AppState>, PathParams(id): PathParams<i64>) ->
 }
 
 /// Follows a job: an event `job` with each change, the last one with its end.
-#[utoipa::path(get, path = "/jobs/{job}/events", tag = "lessons", params(("job" = i64, Path)),
+#[utoipa::path(get, path = "/jobs/{job}/events", operation_id = "followJob",
+    tag = "lessons", params(("job" = i64, Path)),
     responses((status = 200, content_type = "text/event-stream", body = Job), (status = 404, body = Problem),
     (status = 503, body = Problem, description = "too_many_streams")))]
 async fn events(

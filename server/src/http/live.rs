@@ -22,7 +22,7 @@ use futures::{Stream, StreamExt};
 use map::pose2::Pose2;
 use protos::{
     Name,
-    api::{Problem, TrajectoriesBody},
+    api::{LiveEventData, Problem, TrajectoriesBody},
     convert::geometry::pose2_wire,
     v1,
 };
@@ -48,7 +48,7 @@ async fn last(app: &AppState, robot: String, camera: String) -> Result<LiveFrame
 }
 
 /// The last answered frame of a camera, as a picture.
-#[utoipa::path(get, path = "/robots/{robot}/cameras/{camera}/frame", tag = "robots",
+#[utoipa::path(get, path = "/robots/{robot}/cameras/{camera}/frame", operation_id = "getCameraFrame", tag = "robots",
     params(("robot" = String, Path), ("camera" = String, Path)),
     responses((status = 200, content_type = "image/jpeg"), (status = 404, body = Problem)))]
 async fn frame(
@@ -63,9 +63,10 @@ async fn frame(
 }
 
 /// The answer to that frame.
-#[utoipa::path(get, path = "/robots/{robot}/cameras/{camera}/answer", tag = "robots",
+#[utoipa::path(get, path = "/robots/{robot}/cameras/{camera}/answer", operation_id = "getCameraAnswer",
+    tag = "robots",
     params(("robot" = String, Path), ("camera" = String, Path)),
-    responses((status = 200, body = Object, description = "`Answer` of protos/waymark/v1/waymark.proto as JSON"),
+    responses((status = 200, body = protos::v1::Answer),
     (status = 404, body = Problem)))]
 async fn answer(
     State(app): State<AppState>,
@@ -77,8 +78,9 @@ async fn answer(
 
 /// Where a robot was lately, by source: fused poses, odometry alone, and the truth where a simulator tells it. Oldest
 /// first, at most 2000 of each; empty for a robot that has not moved since the server started.
-#[utoipa::path(get, path = "/robots/{robot}/trajectories", tag = "robots", params(("robot" = String, Path)),
-    responses((status = 200, body = Object, description = "lists `pose`, `odometry`, `truth` of {x_m, y_m, theta_rad}"),
+#[utoipa::path(get, path = "/robots/{robot}/trajectories", operation_id = "getTrajectories",
+    tag = "robots", params(("robot" = String, Path)),
+    responses((status = 200, body = TrajectoriesBody),
     (status = 404, body = Problem)))]
 async fn trajectories(
     State(app): State<AppState>,
@@ -98,8 +100,9 @@ async fn trajectories(
 /// word of its `trust`: `unspecified`, `unsupported`, `supported`, `stale` or `contradicted`, as in the list of robots. In an
 /// `answer`, `sighting` of a quad says whether the picture alone names its landmark (`global`) or the pose known before
 /// (`guided`). A reader that is too slow misses events and gets `missed` with their number.
-#[utoipa::path(get, path = "/maps/{map}/live", tag = "maps", params(("map" = String, Path)),
-    responses((status = 200, content_type = "text/event-stream"), (status = 404, body = Problem),
+#[utoipa::path(get, path = "/maps/{map}/live", operation_id = "followMap",
+    tag = "maps", params(("map" = String, Path)),
+    responses((status = 200, content_type = "text/event-stream", body = LiveEventData), (status = 404, body = Problem),
     (status = 503, body = Problem, description = "too_many_streams")))]
 async fn events(
     State(app): State<AppState>,

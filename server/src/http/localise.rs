@@ -56,7 +56,8 @@ struct Sensed {
 /// Finds where a robot is by one picture, one laser scan or both, without knowing anything of it before. A picture needs the
 /// camera's intrinsics and its mounting. "No match" is an answer, with its reason; nothing is stored and no robot's pose
 /// changes. A scan alone is searched for in the whole map, for at most 10 s.
-#[utoipa::path(post, path = "/maps/{map}/localise", tag = "recognition", params(("map" = String, Path)),
+#[utoipa::path(post, path = "/maps/{map}/localise", operation_id = "localiseRobot",
+    tag = "recognition", params(("map" = String, Path)),
     request_body(content = LocaliseForm, content_type = "multipart/form-data"),
     responses((status = 200, body = LocaliseResult), (status = 404, body = Problem), (status = 413, body = Problem),
     (status = 422, body = Problem, description = "missing, bad_image, wrong_encoding, too_large, out_of_range, not_finite, \

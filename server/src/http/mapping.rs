@@ -65,7 +65,8 @@ fn shown(progress: MappingProgress) -> MappingProgressBody {
 /// Begins to make the walls of a map from the scans of a robot. While it lasts, they are mapped and localise nothing. The map
 /// stays as it is until the mapping is finished. The scans are kept on disk until then: after a restart of the server the
 /// mapping goes on by itself (`resuming`), with a robot whose software went on; `journal_error` says if they cannot be.
-#[utoipa::path(post, path = "/maps/{map}/mapping", tag = "maps", params(("map" = String, Path)),
+#[utoipa::path(post, path = "/maps/{map}/mapping", operation_id = "startMapping",
+    tag = "maps", params(("map" = String, Path)),
     request_body = NewMapping, responses((status = 201, body = MappingProgressBody),
     (status = 404, body = Problem, description = "unknown_map, unknown_robot"),
     (status = 409, body = Problem, description = "in_use: it is being made already, or the robot makes or stands on another; too_many"),
@@ -94,7 +95,8 @@ async fn begin(
 }
 
 /// How far it has come: the mapping that goes on, or the last since the server started.
-#[utoipa::path(get, path = "/maps/{map}/mapping", tag = "maps", params(("map" = String, Path)),
+#[utoipa::path(get, path = "/maps/{map}/mapping", operation_id = "getMapping",
+    tag = "maps", params(("map" = String, Path)),
     responses((status = 200, body = MappingProgressBody), (status = 404, body = Problem, description = "unknown_map, not_mapping")))]
 async fn get(
     State(app): State<AppState>,
@@ -105,7 +107,8 @@ async fn get(
 }
 
 /// Gives it up, or forgets one that failed: the map stays as it is, what was kept of the scans is removed.
-#[utoipa::path(delete, path = "/maps/{map}/mapping", tag = "maps", params(("map" = String, Path)),
+#[utoipa::path(delete, path = "/maps/{map}/mapping", operation_id = "cancelMapping",
+    tag = "maps", params(("map" = String, Path)),
     responses((status = 204), (status = 404, body = Problem, description = "unknown_map, not_mapping")))]
 async fn cancel(
     State(app): State<AppState>,
@@ -118,7 +121,8 @@ async fn cancel(
 
 /// Ends the drive: everything is fitted once more, and the walls replace those of the map in one transaction. Answers at once;
 /// `stage` says when they are stored.
-#[utoipa::path(post, path = "/maps/{map}/mapping/finish", tag = "maps", params(("map" = String, Path)),
+#[utoipa::path(post, path = "/maps/{map}/mapping/finish", operation_id = "finishMapping",
+    tag = "maps", params(("map" = String, Path)),
     responses((status = 202, body = MappingProgressBody), (status = 404, body = Problem, description = "unknown_map, not_mapping")))]
 async fn finish(
     State(app): State<AppState>,

@@ -99,7 +99,7 @@ pub(super) fn unknown_parent(error: ApiError) -> ApiError {
 }
 
 /// Creates an empty map.
-#[utoipa::path(post, path = "/maps", tag = "maps", request_body = NewMap, responses(
+#[utoipa::path(post, path = "/maps", operation_id = "createMap", tag = "maps", request_body = NewMap, responses(
     (status = 201, body = Map), (status = 404, body = Problem, description = "unknown_map: the parent"),
     (status = 409, body = Problem, description = "exists, too_many, too_deep"),
     (status = 422, body = Problem, description = "bad_name, invalid_value, out_of_range")))]
@@ -139,7 +139,8 @@ impl Listed for MapRow {
 }
 
 /// Lists maps, without their drafts.
-#[utoipa::path(get, path = "/maps", tag = "maps", params(ListQuery), responses((status = 200, body = Page<Map>),
+#[utoipa::path(get, path = "/maps", operation_id = "listMaps",
+    tag = "maps", params(ListQuery), responses((status = 200, body = Page<Map>),
     (status = 422, body = Problem, description = "out_of_range, invalid_value")))]
 async fn list(
     State(app): State<AppState>,
@@ -160,7 +161,8 @@ async fn list(
 }
 
 /// One map.
-#[utoipa::path(get, path = "/maps/{map}", tag = "maps", params(("map" = String, Path)), responses(
+#[utoipa::path(get, path = "/maps/{map}", operation_id = "getMap",
+    tag = "maps", params(("map" = String, Path)), responses(
     (status = 200, body = Map), (status = 404, body = Problem)))]
 async fn get(
     State(app): State<AppState>,
@@ -173,7 +175,8 @@ async fn get(
 }
 
 /// Changes a map's name, site, building, floor or position.
-#[utoipa::path(patch, path = "/maps/{map}", tag = "maps", params(("map" = String, Path)), request_body = MapPatch,
+#[utoipa::path(patch, path = "/maps/{map}", operation_id = "updateMap",
+    tag = "maps", params(("map" = String, Path)), request_body = MapPatch,
     responses((status = 200, body = Map), (status = 404, body = Problem),
     (status = 409, body = Problem, description = "cycle: it would lie in itself; too_deep; exists: the new name; \
      in_use: a robot, an open job or an open gathering has the present name"),
@@ -214,7 +217,8 @@ async fn patch(
 }
 
 /// Deletes a map and all that is in it.
-#[utoipa::path(delete, path = "/maps/{map}", tag = "maps", params(("map" = String, Path)), responses(
+#[utoipa::path(delete, path = "/maps/{map}", operation_id = "deleteMap",
+    tag = "maps", params(("map" = String, Path)), responses(
     (status = 204), (status = 404, body = Problem),
     (status = 409, body = Problem, description = "in_use: a robot stands on it, another map lies in it, or it has a draft")))]
 async fn delete(
@@ -234,7 +238,8 @@ async fn delete(
 
 /// Makes a new map of all that a map has: landmarks with their views, photographs and models, walls, underlay, reference runs
 /// and settings. Robots stay where they are, and the copy begins a history of its own.
-#[utoipa::path(post, path = "/maps/{map}/copies", tag = "maps", params(("map" = String, Path)), request_body = NewCopy,
+#[utoipa::path(post, path = "/maps/{map}/copies", operation_id = "copyMap",
+    tag = "maps", params(("map" = String, Path)), request_body = NewCopy,
     responses((status = 201, body = Map), (status = 404, body = Problem),
     (status = 409, body = Problem, description = "exists, too_many: maps, or bytes of one map"),
     (status = 422, body = Problem, description = "bad_name")))]
@@ -257,7 +262,8 @@ fn pose_shown(p: &Pose2Covariance) -> TransformedPose {
 }
 
 /// How a map lies in another, by the links of both up to a map that both hang on; and a pose in that other map's frame.
-#[utoipa::path(get, path = "/maps/{map}/transform", tag = "maps", params(("map" = String, Path), TransformQuery),
+#[utoipa::path(get, path = "/maps/{map}/transform", operation_id = "getMapTransform",
+    tag = "maps", params(("map" = String, Path), TransformQuery),
     responses((status = 200, body = TransformResponse), (status = 400, body = Problem, description = "bad_query"),
     (status = 404, body = Problem), (status = 409, body = Problem, description = "not_related"),
     (status = 422, body = Problem, description = "missing, out_of_range")))]

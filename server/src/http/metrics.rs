@@ -32,7 +32,7 @@ pub(crate) fn alone(app: &Arc<App>) -> Router {
 }
 
 /// Metrics in the text format of Prometheus 0.0.4, or of `OpenMetrics` 1.0 where `Accept` names it. Also at `/metrics`.
-#[utoipa::path(get, path = "/metrics", tag = "health",
+#[utoipa::path(get, path = "/metrics", operation_id = "getMetrics", tag = "health",
     responses((status = 200, content((String = "text/plain"), (String = "application/openmetrics-text")))))]
 async fn metrics(State(app): State<AppState>, headers: HeaderMap) -> Result<Response, ApiError> {
     let format = Format::of(headers.get(header::ACCEPT).and_then(|accept| accept.to_str().ok()));

@@ -10,6 +10,7 @@ mod backups;
 mod bulk;
 mod bundles;
 mod cameras;
+mod components;
 mod cookie;
 mod creation;
 mod documented;

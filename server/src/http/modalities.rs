@@ -160,7 +160,8 @@ fn revised(areas: &ModalityMap) -> Revised<ModalityMapBody> {
 }
 
 /// Which modality is best where, as runs have shown, and what is fused.
-#[utoipa::path(get, path = "/maps/{map}/modalities", tag = "maps", params(("map" = String, Path)),
+#[utoipa::path(get, path = "/maps/{map}/modalities", operation_id = "getModalities",
+    tag = "maps", params(("map" = String, Path)),
     responses((status = 200, body = ModalityMapBody), (status = 404, body = Problem)))]
 async fn get(
     State(app): State<AppState>,
@@ -190,7 +191,8 @@ fn checked(areas: Vec<AreaBody>) -> Result<Vec<NamedArea>, ApiError> {
 }
 
 /// Sets what is fused, and the areas that have names.
-#[utoipa::path(put, path = "/maps/{map}/modalities", tag = "maps", params(("map" = String, Path)), request_body = ModalityMapPatch,
+#[utoipa::path(put, path = "/maps/{map}/modalities", operation_id = "setModalities",
+    tag = "maps", params(("map" = String, Path)), request_body = ModalityMapPatch,
     responses((status = 200, body = ModalityMapBody), (status = 404, body = Problem),
     (status = 422, body = Problem, description = "out_of_range, exists, too_many")))]
 async fn put(
@@ -217,7 +219,8 @@ async fn put(
 }
 
 /// What is known where a robot would be: what runs have found there, and what follows.
-#[utoipa::path(get, path = "/maps/{map}/modalities/at", tag = "maps", params(("map" = String, Path), ModalityQuery),
+#[utoipa::path(get, path = "/maps/{map}/modalities/at", operation_id = "getModalitiesAt",
+    tag = "maps", params(("map" = String, Path), ModalityQuery),
     responses((status = 200, body = AreaStatsBody), (status = 404, body = Problem),
     (status = 422, body = Problem, description = "out_of_range")))]
 async fn at(

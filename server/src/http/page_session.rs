@@ -61,7 +61,8 @@ pub(super) fn router() -> Router<AppState> {
 }
 
 /// Makes a link that opens the page once, within ten minutes, with the rights of the one who asks.
-#[utoipa::path(post, path = "/session/links", tag = "identity", responses((status = 201, body = PageLink)))]
+#[utoipa::path(post, path = "/session/links", operation_id = "createPageLink",
+    tag = "identity", responses((status = 201, body = PageLink)))]
 async fn link(
     State(app): State<AppState>,
     Extension(principal): Extension<Principal>,

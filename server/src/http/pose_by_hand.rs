@@ -54,7 +54,8 @@ fn not_heard(robot: &Name) -> ApiError {
 /// Puts a robot where a person says it is on its map, in place of the pose that it may have. The pose is unsupported until
 /// a landmark that the picture alone names agrees with it; landmarks that contradict it replace it as they would any other
 /// pose. The robot has to send odometry, which carries the pose on.
-#[utoipa::path(put, path = "/robots/{robot}/pose", tag = "robots", params(("robot" = String, Path)),
+#[utoipa::path(put, path = "/robots/{robot}/pose", operation_id = "setRobotPose",
+    tag = "robots", params(("robot" = String, Path)),
     request_body = PoseByHand, responses((status = 200, body = RobotPose), (status = 404, body = Problem),
     (status = 409, body = Problem, description = "no_odometry: none was heard for 2 s"),
     (status = 422, body = Problem, description = "out_of_range")))]

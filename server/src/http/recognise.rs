@@ -25,9 +25,10 @@ pub(super) fn router(upload_bytes: usize) -> OpenApiRouter<AppState> {
 }
 
 /// Recognises the landmarks of a photograph.
-#[utoipa::path(post, path = "/maps/{map}/recognise", tag = "recognition", params(("map" = String, Path)),
+#[utoipa::path(post, path = "/maps/{map}/recognise", operation_id = "recogniseLandmarks",
+    tag = "recognition", params(("map" = String, Path)),
     request_body(content = PhotographForm, content_type = "multipart/form-data"),
-    responses((status = 200, body = Object, description = "`Answer` of protos/waymark/v1/waymark.proto as JSON"),
+    responses((status = 200, body = protos::v1::Answer),
     (status = 404, body = Problem), (status = 413, body = Problem),
     (status = 422, body = Problem, description = "bad_image, wrong_encoding, too_large, out_of_range, not_finite, \
      size_mismatch")))]

@@ -51,7 +51,8 @@ fn refused(error: RecordingError) -> ApiError {
 
 /// Begins to record a run of a robot on its map: odometry, and what landmarks and the laser say. It lies in memory until
 /// the path is told.
-#[utoipa::path(post, path = "/robots/{robot}/recording", tag = "robots", params(("robot" = String, Path)),
+#[utoipa::path(post, path = "/robots/{robot}/recording", operation_id = "startRecording",
+    tag = "robots", params(("robot" = String, Path)),
     responses((status = 201, body = RecordingStatusBody), (status = 404, body = Problem),
     (status = 409, body = Problem, description = "in_use: one is recorded already; too_many")))]
 async fn begin(
@@ -64,7 +65,8 @@ async fn begin(
 }
 
 /// What was recorded so far.
-#[utoipa::path(get, path = "/robots/{robot}/recording", tag = "robots", params(("robot" = String, Path)),
+#[utoipa::path(get, path = "/robots/{robot}/recording", operation_id = "getRecording",
+    tag = "robots", params(("robot" = String, Path)),
     responses((status = 200, body = RecordingStatusBody), (status = 404, body = Problem, description = "unknown_robot, not_recording")))]
 async fn get(
     State(app): State<AppState>,
@@ -76,7 +78,8 @@ async fn get(
 }
 
 /// Gives the recording up.
-#[utoipa::path(delete, path = "/robots/{robot}/recording", tag = "robots", params(("robot" = String, Path)),
+#[utoipa::path(delete, path = "/robots/{robot}/recording", operation_id = "cancelRecording",
+    tag = "robots", params(("robot" = String, Path)),
     responses((status = 204), (status = 404, body = Problem, description = "unknown_robot, not_recording")))]
 async fn cancel(
     State(app): State<AppState>,
@@ -147,7 +150,8 @@ fn reference_of(path: ReferenceTrajectoryBody) -> Result<ReferenceTrajectory, Ap
 /// Ends the recording by telling the path, once what it shows is stored; until then it stays, whatever becomes of the request.
 /// What each modality was off by, and claimed, is kept by square metre and heading,
 /// and robots on this map are fused by it from now on.
-#[utoipa::path(post, path = "/robots/{robot}/recording/reference", tag = "robots", params(("robot" = String, Path)),
+#[utoipa::path(post, path = "/robots/{robot}/recording/reference", operation_id = "finishRecording",
+    tag = "robots", params(("robot" = String, Path)),
     request_body = ReferenceTrajectoryBody, responses((status = 201, body = ReferenceRunBody),
     (status = 404, body = Problem, description = "unknown_robot, not_recording, unknown_map"),
     (status = 409, body = Problem, description = "too_many; in_use: it is being learnt from already"),
@@ -186,7 +190,8 @@ async fn reference(
 }
 
 /// The runs that the map's areas have learnt from.
-#[utoipa::path(get, path = "/maps/{map}/reference-runs", tag = "maps", params(("map" = String, Path)),
+#[utoipa::path(get, path = "/maps/{map}/reference-runs", operation_id = "listReferenceRuns",
+    tag = "maps", params(("map" = String, Path)),
     responses((status = 200, body = ReferenceRuns), (status = 404, body = Problem)))]
 async fn list(
     State(app): State<AppState>,
@@ -198,7 +203,7 @@ async fn list(
 }
 
 /// Forgets a run and what it showed.
-#[utoipa::path(delete, path = "/maps/{map}/reference-runs/{run}", tag = "maps",
+#[utoipa::path(delete, path = "/maps/{map}/reference-runs/{run}", operation_id = "deleteReferenceRun", tag = "maps",
     params(("map" = String, Path), ("run" = i64, Path)),
     responses((status = 204), (status = 404, body = Problem, description = "unknown_map, unknown_reference_run")))]
 async fn forget(

@@ -143,7 +143,8 @@ fn shown(at: &str, row: RefusedViewRow) -> RefusedView {
 
 /// Lists the photographs of a landmark that uploads refused or its last lesson left out, newest first, each with the reason
 /// and what to do. The newest 50 stay.
-#[utoipa::path(get, path = "/maps/{map}/landmarks/{landmark}/refused-views", tag = "landmarks",
+#[utoipa::path(get, path = "/maps/{map}/landmarks/{landmark}/refused-views", operation_id = "listRefusedViews",
+    tag = "landmarks",
     params(("map" = String, Path), ("landmark" = String, Path)),
     responses((status = 200, body = Page<RefusedView>), (status = 404, body = Problem)))]
 async fn list(
@@ -159,7 +160,8 @@ async fn list(
 }
 
 /// A small picture of a refused photograph, PNG. `ETag` is the digest of its grey levels.
-#[utoipa::path(get, path = "/maps/{map}/landmarks/{landmark}/refused-views/{refused}/icon", tag = "landmarks",
+#[utoipa::path(get, path = "/maps/{map}/landmarks/{landmark}/refused-views/{refused}/icon",
+    operation_id = "getRefusedViewIcon", tag = "landmarks",
     params(("map" = String, Path), ("landmark" = String, Path), ("refused" = i64, Path)),
     responses((status = 200, content_type = "image/png"), (status = 304, description = "`If-None-Match` has it"),
     (status = 404, body = Problem)))]

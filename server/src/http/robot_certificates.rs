@@ -41,7 +41,8 @@ pub(super) fn router() -> OpenApiRouter<AppState> {
 /// Signs a robot's request for a certificate, with which it connects to the encrypted listener. The robot's private key stays
 /// where it was made. Other connections of robots are interrupted for about a second. A repeat without a key makes another
 /// certificate.
-#[utoipa::path(post, path = "/robots/{robot}/certificates", tag = "identity", params(("robot" = String, Path)),
+#[utoipa::path(post, path = "/robots/{robot}/certificates", operation_id = "createCertificate",
+    tag = "identity", params(("robot" = String, Path)),
     request_body = CertificateRequest, responses((status = 201, body = EnrolledRobot),
     (status = 404, body = Problem, description = "unknown_robot"),
     (status = 409, body = Problem, description = "not_encrypted, other_authority, too_many"),
@@ -100,7 +101,7 @@ async fn enrol(
 }
 
 /// Lists a robot's certificates, the oldest first, with those that were revoked or have expired.
-#[utoipa::path(get, path = "/robots/{robot}/certificates", tag = "identity",
+#[utoipa::path(get, path = "/robots/{robot}/certificates", operation_id = "listCertificates", tag = "identity",
     params(("robot" = String, Path), PageQuery), responses((status = 200, body = Page<RobotCertificate>),
     (status = 404, body = Problem, description = "unknown_robot")))]
 async fn list(
@@ -120,7 +121,8 @@ async fn list(
 }
 
 /// Revokes a certificate: messages of the robot are refused at once if it has no other, and its connection is closed.
-#[utoipa::path(delete, path = "/robots/{robot}/certificates/{serial}", tag = "identity",
+#[utoipa::path(delete, path = "/robots/{robot}/certificates/{serial}", operation_id = "revokeCertificate",
+    tag = "identity",
     params(("robot" = String, Path), ("serial" = String, Path)), responses((status = 204),
     (status = 404, body = Problem, description = "unknown_robot, unknown_certificate")))]
 async fn revoke(

@@ -89,7 +89,8 @@ fn corrections_shown(found: Corrections) -> CorrectionsBody {
 }
 
 /// Registers a robot, or moves it to another map.
-#[utoipa::path(put, path = "/robots/{robot}", tag = "robots", params(("robot" = String, Path)),
+#[utoipa::path(put, path = "/robots/{robot}", operation_id = "setRobot",
+    tag = "robots", params(("robot" = String, Path)),
     request_body = RobotAssignment, responses((status = 200, body = Robot),
     (status = 404, body = Problem, description = "unknown_map"), (status = 409, body = Problem),
     (status = 422, body = Problem, description = "bad_name")))]
@@ -111,7 +112,7 @@ async fn put(
 
 /// Lists robots by name, with what is known of each: whether its software is connected, whether a second program uses its
 /// name, its pose, how old that is and how far it is trusted.
-#[utoipa::path(get, path = "/robots", tag = "robots", params(ListQuery),
+#[utoipa::path(get, path = "/robots", operation_id = "listRobots", tag = "robots", params(ListQuery),
     responses((status = 200, body = Page<Robot>),
     (status = 422, body = Problem, description = "out_of_range, invalid_value: it is sorted by name only")))]
 async fn list(
@@ -129,7 +130,8 @@ async fn list(
 }
 
 /// One robot.
-#[utoipa::path(get, path = "/robots/{robot}", tag = "robots", params(("robot" = String, Path)),
+#[utoipa::path(get, path = "/robots/{robot}", operation_id = "getRobot",
+    tag = "robots", params(("robot" = String, Path)),
     responses((status = 200, body = Robot), (status = 404, body = Problem)))]
 async fn get(
     State(app): State<AppState>,
@@ -139,7 +141,8 @@ async fn get(
 }
 
 /// Forgets a robot; its frames are rejected from now on.
-#[utoipa::path(delete, path = "/robots/{robot}", tag = "robots", params(("robot" = String, Path)),
+#[utoipa::path(delete, path = "/robots/{robot}", operation_id = "deleteRobot",
+    tag = "robots", params(("robot" = String, Path)),
     responses((status = 204), (status = 404, body = Problem)))]
 async fn delete(
     State(app): State<AppState>,
@@ -168,7 +171,8 @@ async fn delete(
 /// (`landmarks`), by landmarks that were named by the pose (`guided`), and by laser scans laid on the map's walls (`laser`).
 /// A guided fix corrects a pose that the others support; it never starts, supports or replaces one. Since the server
 /// started; the latest 200 of each modality.
-#[utoipa::path(get, path = "/robots/{robot}/corrections", tag = "robots", params(("robot" = String, Path)),
+#[utoipa::path(get, path = "/robots/{robot}/corrections", operation_id = "listCorrections",
+    tag = "robots", params(("robot" = String, Path)),
     responses((status = 200, body = CorrectionsBody), (status = 404, body = Problem)))]
 async fn corrections(
     State(app): State<AppState>,

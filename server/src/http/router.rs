@@ -1,7 +1,9 @@
 //! Every route, with what is around them and the OpenAPI document made from them.
 
 use super::{
-    API, AppState, audit, authorise, backups, bulk, bundles, cameras, creation, documented, drafts,
+    API, AppState, audit, authorise, backups, bulk, bundles, cameras,
+    components::with_components,
+    creation, documented, drafts,
     error::{ApiError, method_not_allowed},
     events,
     examples::with_examples,
@@ -30,7 +32,14 @@ use utoipa_swagger_ui::SwaggerUi;
 
 #[derive(OpenApi)]
 #[openapi(
-    components(schemas(protos::api::LandmarkDifference, protos::api::ListOrder, protos::api::NumberOrder)),
+    components(schemas(
+        protos::api::CaptureMetadata,
+        protos::api::EventKind,
+        protos::api::LandmarkDifference,
+        protos::api::ListOrder,
+        protos::api::NumberOrder,
+        protos::api::ScanBody
+    )),
     info(
         title = "Waymark",
         description = "Maps, landmarks, lessons and robots. Errors are application/problem+json with a stable `code` and \
@@ -86,8 +95,8 @@ pub(super) fn parts(limits: &Limits) -> (Router<AppState>, openapi::OpenApi) {
     let (routes, document) =
         OpenApiRouter::with_openapi(Document::openapi()).nest(API, api(limits)).split_for_parts();
     let document = creation::with_keys(with_examples(document, API));
-    let document = documented::with_errors(revision::with_revisions(history::with_reasons(document)));
-    (routes, with_security(document, API))
+    let document = with_security(revision::with_revisions(history::with_reasons(document)), API);
+    (routes, with_components(documented::with_errors(document)))
 }
 
 /// The whole service: every route, with a guard in front.

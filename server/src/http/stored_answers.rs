@@ -49,7 +49,7 @@ fn summary(row: AnswerRow) -> StoredAnswerSummary {
 
 /// Lists stored answers to frames, newest first. Of each camera the first answer of every kind is stored, and one in ten
 /// seconds; at most one a second. The newest `limits.stored_answers` stay.
-#[utoipa::path(get, path = "/answers", tag = "recognition", params(StoredAnswerQuery),
+#[utoipa::path(get, path = "/answers", operation_id = "listAnswers", tag = "recognition", params(StoredAnswerQuery),
     responses((status = 200, body = Page<StoredAnswerSummary>),
     (status = 422, body = Problem, description = "out_of_range, invalid_value")))]
 async fn list(
@@ -78,7 +78,8 @@ async fn list(
 
 /// One stored answer: quads, the candidates with their distances and thresholds, the gates that refused, the poses, that before
 /// the frame, too, and for each quad the paths of its icon and of those of the candidates, and matched points.
-#[utoipa::path(get, path = "/answers/{answer}", tag = "recognition", params(("answer" = i64, Path)),
+#[utoipa::path(get, path = "/answers/{answer}", operation_id = "getAnswer",
+    tag = "recognition", params(("answer" = i64, Path)),
     responses((status = 200, body = StoredAnswer), (status = 404, body = Problem)))]
 async fn get(
     State(app): State<AppState>,
@@ -117,7 +118,7 @@ fn landmark_icon(map: &str, name: &str, learnt: &BTreeMap<&str, LandmarkId>) -> 
 }
 
 /// The icon of a quad of a stored answer, as PNG. `ETag` is its digest.
-#[utoipa::path(get, path = "/answers/{answer}/quads/{quad}/icon", tag = "recognition",
+#[utoipa::path(get, path = "/answers/{answer}/quads/{quad}/icon", operation_id = "getQuadIcon", tag = "recognition",
     params(("answer" = i64, Path), ("quad" = i64, Path, description = "Index in `answer.quads`.")),
     responses((status = 200, content_type = "image/png"), (status = 304, description = "`If-None-Match` has it"), (status = 404, body = Problem)))]
 async fn icon(

@@ -25,7 +25,8 @@ pub(super) fn router() -> OpenApiRouter<AppState> {
 }
 
 /// Makes a token. Its text is in this answer and nowhere else: only a digest is stored.
-#[utoipa::path(post, path = "/tokens", tag = "identity", request_body = NewToken, responses(
+#[utoipa::path(post, path = "/tokens", operation_id = "createToken",
+    tag = "identity", request_body = NewToken, responses(
     (status = 201, body = CreatedToken), (status = 404, body = Problem, description = "unknown_map"),
     (status = 409, body = Problem, description = "too_many"),
     (status = 422, body = Problem, description = "bad_name, invalid_value, out_of_range")))]
@@ -61,7 +62,7 @@ async fn create(
 }
 
 /// Lists tokens by number, with those that were revoked or have expired.
-#[utoipa::path(get, path = "/tokens", tag = "identity", params(PageQuery),
+#[utoipa::path(get, path = "/tokens", operation_id = "listTokens", tag = "identity", params(PageQuery),
     responses((status = 200, body = Page<Token>)))]
 async fn list(
     State(app): State<AppState>,
@@ -74,7 +75,8 @@ async fn list(
 }
 
 /// Revokes a token, and ends the sessions and event streams that it opened.
-#[utoipa::path(delete, path = "/tokens/{token}", tag = "identity", params(("token" = i64, Path)),
+#[utoipa::path(delete, path = "/tokens/{token}", operation_id = "revokeToken",
+    tag = "identity", params(("token" = i64, Path)),
     responses((status = 204), (status = 404, body = Problem, description = "unknown_token")))]
 async fn revoke(
     State(app): State<AppState>,
@@ -85,7 +87,8 @@ async fn revoke(
 }
 
 /// Who asks.
-#[utoipa::path(get, path = "/whoami", tag = "identity", responses((status = 200, body = Whoami)))]
+#[utoipa::path(get, path = "/whoami", operation_id = "getWhoami",
+    tag = "identity", responses((status = 200, body = Whoami)))]
 async fn whoami(Extension(principal): Extension<Principal>) -> Json<Whoami> {
     let Principal { token, name, role, maps, expires_ms } = principal;
     let token = match token {

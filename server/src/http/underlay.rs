@@ -57,7 +57,8 @@ fn number(part: Option<&Bytes>, field: &'static str, [low, high]: [f64; 2]) -> R
 }
 
 /// Replaces the picture under the map. It changes no answer to a robot.
-#[utoipa::path(put, path = "/maps/{map}/underlay", tag = "maps", params(("map" = String, Path)),
+#[utoipa::path(put, path = "/maps/{map}/underlay", operation_id = "setUnderlay",
+    tag = "maps", params(("map" = String, Path)),
     request_body(content = UnderlayForm, content_type = "multipart/form-data"),
     responses((status = 200, body = Underlay), (status = 404, body = Problem), (status = 413, body = Problem),
     (status = 422, body = Problem, description = "bad_image, too_large, missing, out_of_range, invalid_value")))]
@@ -104,7 +105,8 @@ fn decoded(app: &App, bytes: Bytes) -> Result<(Bytes, [u32; 2]), ApiError> {
 }
 
 /// Where the picture under the map lies.
-#[utoipa::path(get, path = "/maps/{map}/underlay", tag = "maps", params(("map" = String, Path)), responses(
+#[utoipa::path(get, path = "/maps/{map}/underlay", operation_id = "getUnderlay",
+    tag = "maps", params(("map" = String, Path)), responses(
     (status = 200, body = Underlay), (status = 404, body = Problem, description = "unknown_map, unknown_underlay")))]
 async fn get(
     State(app): State<AppState>,
@@ -116,7 +118,8 @@ async fn get(
 }
 
 /// Deletes the picture under the map.
-#[utoipa::path(delete, path = "/maps/{map}/underlay", tag = "maps", params(("map" = String, Path)), responses(
+#[utoipa::path(delete, path = "/maps/{map}/underlay", operation_id = "deleteUnderlay",
+    tag = "maps", params(("map" = String, Path)), responses(
     (status = 204), (status = 404, body = Problem, description = "unknown_map, unknown_underlay")))]
 async fn delete(
     State(app): State<AppState>,
@@ -134,7 +137,8 @@ async fn delete(
 }
 
 /// The picture under the map, as it was uploaded.
-#[utoipa::path(get, path = "/maps/{map}/underlay/image", tag = "maps", params(("map" = String, Path)), responses(
+#[utoipa::path(get, path = "/maps/{map}/underlay/image", operation_id = "getUnderlayImage",
+    tag = "maps", params(("map" = String, Path)), responses(
     (status = 200, content_type = "image/png"), (status = 304, description = "`If-None-Match` has it"),
     (status = 404, body = Problem)))]
 async fn image(

@@ -101,7 +101,7 @@ enum LandmarkRegion {
 /// nothing (`outcome` says which). With `create` the landmark is made, too, if there is none of this name: nothing is made
 /// where the view is refused. A size is set where the landmark has none by hand; another one is refused, and so is one whose
 /// ratio of sides the photographs contradict.
-#[utoipa::path(post, path = "/maps/{map}/landmarks/{landmark}/views", tag = "landmarks",
+#[utoipa::path(post, path = "/maps/{map}/landmarks/{landmark}/views", operation_id = "createView", tag = "landmarks",
     params(("map" = String, Path), ("landmark" = String, Path)),
     request_body(content = NewViewForm, content_type = "multipart/form-data"),
     responses((status = 201, body = TrainingView), (status = 200, body = TrainingView), (status = 404, body = Problem),
@@ -320,7 +320,7 @@ fn cut(image: &GrayImage, corners: &Corners, p: &Algorithm) -> Result<Icon, ApiE
 }
 
 /// Lists the views of a landmark, the oldest or the newest first.
-#[utoipa::path(get, path = "/maps/{map}/landmarks/{landmark}/views", tag = "landmarks",
+#[utoipa::path(get, path = "/maps/{map}/landmarks/{landmark}/views", operation_id = "listViews", tag = "landmarks",
     params(("map" = String, Path), ("landmark" = String, Path), ViewQuery),
     responses((status = 200, body = Page<TrainingView>), (status = 404, body = Problem),
     (status = 422, body = Problem, description = "out_of_range, invalid_value")))]
@@ -342,7 +342,8 @@ async fn list(
 }
 
 /// Deletes a view. The model stays until the landmark is learnt again.
-#[utoipa::path(delete, path = "/maps/{map}/landmarks/{landmark}/views/{view}", tag = "landmarks",
+#[utoipa::path(delete, path = "/maps/{map}/landmarks/{landmark}/views/{view}", operation_id = "deleteView",
+    tag = "landmarks",
     params(("map" = String, Path), ("landmark" = String, Path), ("view" = i64, Path)),
     responses((status = 204), (status = 404, body = Problem)))]
 async fn delete(
@@ -358,7 +359,8 @@ async fn delete(
 }
 
 /// The rectified picture that is learnt from, as PNG. `ETag` is the digest of its grey levels.
-#[utoipa::path(get, path = "/maps/{map}/landmarks/{landmark}/views/{view}/icon", tag = "landmarks",
+#[utoipa::path(get, path = "/maps/{map}/landmarks/{landmark}/views/{view}/icon", operation_id = "getViewIcon",
+    tag = "landmarks",
     params(("map" = String, Path), ("landmark" = String, Path), ("view" = i64, Path)),
     responses((status = 200, content_type = "image/png"), (status = 304, description = "`If-None-Match` has it"),
     (status = 404, body = Problem)))]
@@ -374,7 +376,8 @@ async fn show_icon(
 }
 
 /// The photograph as it was uploaded, PNG or JPEG. `ETag` is its SHA-256.
-#[utoipa::path(get, path = "/maps/{map}/landmarks/{landmark}/views/{view}/image", tag = "landmarks",
+#[utoipa::path(get, path = "/maps/{map}/landmarks/{landmark}/views/{view}/image", operation_id = "getViewImage",
+    tag = "landmarks",
     params(("map" = String, Path), ("landmark" = String, Path), ("view" = i64, Path)),
     responses((status = 200, content_type = "image/jpeg"), (status = 304, description = "`If-None-Match` has it"),
     (status = 404, body = Problem), (status = 500, body = Problem, description = "picture_damaged")))]

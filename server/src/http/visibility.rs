@@ -51,9 +51,10 @@ fn name_of(map: &MapSnapshot, id: LandmarkId) -> String {
 
 /// The area on the floor from which a landmark is seen, as a GeoJSON feature in map metres: by the map's camera
 /// (`/maps/{map}/visibility-settings`), or by another for this question.
-#[utoipa::path(get, path = "/maps/{map}/landmarks/{landmark}/visibility", tag = "landmarks",
+#[utoipa::path(get, path = "/maps/{map}/landmarks/{landmark}/visibility", operation_id = "getLandmarkVisibility",
+    tag = "landmarks",
     params(("map" = String, Path), ("landmark" = String, Path), VisibilitySettingsBody), responses(
-    (status = 200, body = Object, description = "GeoJSON `Feature` of a `MultiPolygon`; properties landmark, area_m2, centroid_m, reach_m"),
+    (status = 200, body = VisibilityAreaBody),
     (status = 400, body = Problem, description = "bad_query"), (status = 404, body = Problem),
     (status = 409, body = Problem, description = "not_placed"),
     (status = 422, body = Problem, description = "out_of_range")))]
@@ -98,7 +99,8 @@ fn checked(pose: &PoseBody) -> Result<Pose2Covariance, ApiError> {
 }
 
 /// Which landmarks a robot may see from an uncertain pose.
-#[utoipa::path(post, path = "/maps/{map}/visible", tag = "maps", params(("map" = String, Path)),
+#[utoipa::path(post, path = "/maps/{map}/visible", operation_id = "listVisibleLandmarks",
+    tag = "maps", params(("map" = String, Path)),
     request_body = VisibleRequest, responses((status = 200, body = VisibleResponse), (status = 404, body = Problem),
     (status = 422, body = Problem, description = "out_of_range, invalid_value")))]
 async fn visible(
@@ -136,7 +138,8 @@ fn visible_from(
 }
 
 /// Which landmarks are seen along a path, and where none is. The robot drives forward and pans its camera.
-#[utoipa::path(post, path = "/maps/{map}/coverage", tag = "maps", params(("map" = String, Path)),
+#[utoipa::path(post, path = "/maps/{map}/coverage", operation_id = "computeCoverage",
+    tag = "maps", params(("map" = String, Path)),
     request_body = CoverageRequest, responses((status = 200, body = CoverageResponse), (status = 404, body = Problem),
     (status = 422, body = Problem, description = "out_of_range, invalid_value")))]
 async fn along(
@@ -194,7 +197,8 @@ fn aim(map: &MapSnapshot, c: &GazeTarget) -> GazeTargetBody {
 
 /// Which landmarks are worth looking at from a pose, best first, with the pan and tilt that centre them. Robots ask over
 /// zenoh (`rpc/gaze`) and are kept to one landmark until another is clearly better; this question leaves no trace.
-#[utoipa::path(post, path = "/maps/{map}/gaze", tag = "maps", params(("map" = String, Path)),
+#[utoipa::path(post, path = "/maps/{map}/gaze", operation_id = "rankGaze",
+    tag = "maps", params(("map" = String, Path)),
     request_body = GazeQueryBody, responses((status = 200, body = GazeRankingBody), (status = 404, body = Problem),
     (status = 422, body = Problem, description = "out_of_range, invalid_value")))]
 async fn gaze(

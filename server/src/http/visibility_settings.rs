@@ -101,7 +101,8 @@ fn refused(error: &OutOfRange, outer: &str) -> ApiError {
 }
 
 /// The camera for which the areas of a map's landmarks are made, and what counts as seen.
-#[utoipa::path(get, path = "/maps/{map}/visibility-settings", tag = "maps", params(("map" = String, Path)), responses(
+#[utoipa::path(get, path = "/maps/{map}/visibility-settings", operation_id = "getVisibilitySettings",
+    tag = "maps", params(("map" = String, Path)), responses(
     (status = 200, body = VisibilitySettingsBody), (status = 404, body = Problem)))]
 async fn get(
     State(app): State<AppState>,
@@ -116,7 +117,8 @@ async fn get(
 
 /// Says which camera looks for a map's landmarks; what is absent is that of a usual robot. The areas of all landmarks are
 /// made anew and are those of the map's next version.
-#[utoipa::path(put, path = "/maps/{map}/visibility-settings", tag = "maps", params(("map" = String, Path)), request_body = VisibilitySettingsBody,
+#[utoipa::path(put, path = "/maps/{map}/visibility-settings", operation_id = "setVisibilitySettings",
+    tag = "maps", params(("map" = String, Path)), request_body = VisibilitySettingsBody,
     responses((status = 200, body = VisibilitySettingsBody), (status = 404, body = Problem),
     (status = 422, body = Problem, description = "out_of_range, invalid_value")))]
 async fn put(

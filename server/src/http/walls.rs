@@ -30,7 +30,8 @@ fn shown(StoredWall { ends: [ax, ay, bx, by], covariance }: StoredWall) -> WallB
 }
 
 /// Replaces the walls.
-#[utoipa::path(put, path = "/maps/{map}/walls", tag = "maps", params(("map" = String, Path)), request_body = WallsBody,
+#[utoipa::path(put, path = "/maps/{map}/walls", operation_id = "setWalls",
+    tag = "maps", params(("map" = String, Path)), request_body = WallsBody,
     responses((status = 200, body = WallsBody), (status = 404, body = Problem),
     (status = 422, body = Problem, description = "out_of_range, too_many")))]
 async fn put(
@@ -56,7 +57,8 @@ async fn put(
 }
 
 /// The walls.
-#[utoipa::path(get, path = "/maps/{map}/walls", tag = "maps", params(("map" = String, Path)), responses(
+#[utoipa::path(get, path = "/maps/{map}/walls", operation_id = "getWalls",
+    tag = "maps", params(("map" = String, Path)), responses(
     (status = 200, body = WallsBody), (status = 404, body = Problem)))]
 async fn get(
     State(app): State<AppState>,

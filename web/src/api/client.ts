@@ -1,5 +1,7 @@
-// Requests to the server. In: a path below /api/v1. Out: the body, or an ApiError whose text a person can act on.
+// Requests to the server. In: a path below /api/v1. Out: the body of its operation, or an ApiError whose text a person can
+// act on.
 import { heard, missed } from "./connection.svelte";
+import type { Answer, At, Below, Body, Item, Names, OpPath, Path, PathIn, Query, Rest } from "./operations";
 
 const ROOT = "/api/v1";
 /** Time until a request is given up, ms. Lessons and backups run as jobs, so no request takes long. */
@@ -26,9 +28,12 @@ export interface Revised<T> {
   revision: string;
 }
 
-export interface Options {
-  query?: Record<string, string | number | boolean | null | undefined>;
-  body?: unknown;
+/** A query of any operation. */
+export type AnyQuery = Record<string, string | number | boolean | readonly string[] | null | undefined>;
+
+export interface Options<B = unknown, Q = AnyQuery> {
+  query?: Q | undefined;
+  body?: B;
   form?: FormData;
   /** A file as it is, with the time that it may take, ms. */
   file?: { content: Blob; kind: string; deadline_ms: number };
@@ -53,16 +58,24 @@ export function whenSignedOut(then: () => void): void {
 }
 
 /** The address of a read: for pictures and downloads. */
-export function address(path: string, query: Options["query"] = {}): string {
+export function address(path: string, query: AnyQuery = {}): string {
   const pairs = Object.entries(query).filter(([, value]) => value !== undefined && value !== null && value !== "");
   const text = new URLSearchParams(pairs.map(([name, value]) => [name, String(value)])).toString();
   return ROOT + path + (text ? `?${text}` : "");
 }
 
-/** A path with its names escaped: path`/maps/${map}`. */
-export function path(parts: TemplateStringsArray, ...names: (string | number)[]): string {
-  return parts.reduce((made, part, i) => made + encodeURIComponent(String(names[i - 1])) + part);
+/** The path of an operation with its names, which are escaped: path("/maps/{map}", { map }). Or any other: path`/maps/${map}`. */
+export function path<P extends OpPath>(of: P, names: Names<P>): Path<P>;
+export function path(parts: TemplateStringsArray, ...names: (string | number)[]): string;
+export function path(of: string | TemplateStringsArray, ...names: unknown[]): string {
+  const escaped = (name: unknown) => encodeURIComponent(String(name));
+  if (typeof of !== "string") return of.reduce((made, part, i) => made + escaped(names[i - 1]) + part);
+  const [given] = names as [Record<string, unknown>];
+  return of.replace(/\{(\w+)\}/g, (_, name: string) => escaped(given[name]));
 }
+
+/** A path below another one: below(at, "/icon"). */
+export const below = <P extends OpPath, S extends Rest<P>>(at: Path<P>, rest: S) => `${at}${rest}` as Path<Below<P, S>>;
 
 function request(method: Method, options: Options): RequestInit {
   const headers = new Headers({ accept: "application/json" });
@@ -121,14 +134,14 @@ function sentence(text: string): string {
 /** The revision of an answer, without quotes. */
 const revisionOf = (answer: Response) => (answer.headers.get("etag") ?? "").replace(/^"|"$/g, "");
 
-/** Reads a body. */
-export async function get<T>(at: string, query?: Options["query"], signal?: AbortSignal): Promise<T> {
-  const answer = await send("GET", at, { ...(query && { query }), ...(signal && { signal }) });
-  return (await answer.json()) as T;
+/** Reads what an operation answers. */
+export async function get<A extends At<"GET">>(at: A, query?: Query<"GET", PathIn<A>>, signal?: AbortSignal): Promise<Answer<"GET", PathIn<A>>> {
+  const answer = await send("GET", at, { query: query as AnyQuery, ...(signal && { signal }) });
+  return (await answer.json()) as Answer<"GET", PathIn<A>>;
 }
 
 /** Reads a body whose status is a part of what it says. An error is one only where no JSON came. */
-export async function getAnyway<T>(at: string): Promise<{ status: number; body: T }> {
+export async function getAnyway<T>(at: At<"GET">): Promise<{ status: number; body: T }> {
   const answer = await send("GET", at, { alsoTakes: 503 });
   const body = (await answer.json().catch(() => undefined)) as T | undefined;
   if (body === undefined) throw await refusal(answer);
@@ -136,26 +149,43 @@ export async function getAnyway<T>(at: string): Promise<{ status: number; body: 
 }
 
 /** Reads a body with its revision. */
-export async function getRevised<T>(at: string): Promise<Revised<T>> {
+export async function getRevised<A extends At<"GET">>(at: A): Promise<Revised<Answer<"GET", PathIn<A>>>> {
   const answer = await send("GET", at, {});
-  return { revision: revisionOf(answer), body: (await answer.json()) as T };
+  return { revision: revisionOf(answer), body: (await answer.json()) as Answer<"GET", PathIn<A>> };
 }
 
 /** Changes something. `undefined` for an answer without a body. */
-export async function change<T>(method: Exclude<Method, "GET">, at: string, options: Options = {}): Promise<T> {
-  const answer = await send(method, at, options);
-  return (answer.status === 204 ? undefined : await answer.json()) as T;
+export async function change<M extends Exclude<Method, "GET">, A extends At<M>>(
+  method: M,
+  at: A,
+  options: Options<Body<M, PathIn<A>>, Query<M, PathIn<A>>> = {},
+): Promise<Answer<M, PathIn<A>>> {
+  const answer = await send(method, at, options as Options);
+  return (answer.status === 204 ? undefined : await answer.json()) as Answer<M, PathIn<A>>;
 }
 
 /** A key for one creation. */
 export const newKey = () => crypto.randomUUID?.() ?? Array.from(crypto.getRandomValues(new Uint8Array(16)), (byte) => byte.toString(16).padStart(2, "0")).join("");
 
+/** A page of a list. */
+export interface Page<T> {
+  items: T[];
+  /** Where the next page begins; absent on the last one. */
+  next?: string | null;
+  total?: number | null;
+}
+
+/** Reads a page of any list. */
+export async function getPage<A extends At<"GET">>(at: A, query: AnyQuery): Promise<Page<Item<A>>> {
+  return (await (await send("GET", at, { query })).json()) as Page<Item<A>>;
+}
+
 /** All items of a list, page by page, at most `max`. */
-export async function all<T>(at: string, query: Options["query"] = {}, max = 5000): Promise<T[]> {
-  const items: T[] = [];
+export async function all<A extends At<"GET">>(at: A, query?: Query<"GET", PathIn<A>>, max = 5000): Promise<Item<A>[]> {
+  const items: Item<A>[] = [];
   let cursor: string | null | undefined;
   do {
-    const page: { items: T[]; next?: string | null } = await get(at, { limit: 500, ...query, cursor });
+    const page: Page<Item<A>> = await getPage(at, { limit: 500, ...query, cursor });
     items.push(...page.items);
     cursor = page.next;
   } while (cursor && items.length < max);

@@ -25,7 +25,7 @@ export function may(operation: Operation): boolean {
 /** Asks who is signed in. While the server does not answer, whoever was signed in stays so. */
 export async function ask(signal?: AbortSignal): Promise<void> {
   try {
-    const who = await get<Whoami>("/whoami", undefined, signal);
+    const who = await get("/whoami", undefined, signal);
     // The same one leaves the pages as they are.
     if (JSON.stringify(who) !== JSON.stringify(session.who)) session.who = who;
     session.state = "signed-in";

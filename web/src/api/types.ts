@@ -10,19 +10,15 @@ export type Corrections = Schemas["CorrectionsBody"];
 export type MappingProgress = Schemas["MappingProgressBody"];
 export type ModalityMap = Schemas["ModalityMapBody"];
 export type Recording = Schemas["RecordingStatusBody"];
+export type ReferencePath = Schemas["ReferenceTrajectoryBody"];
 export type ReferenceRun = Schemas["ReferenceRunBody"];
 export type Relocalisation = Schemas["RelocalisationStatus"];
-export type VisibilitySettings = Schemas["VisibilitySettingsBody"];
 export type Commit = Schemas["Commit"];
 export type Draft = Schemas["Draft"];
-export type DraftDifference = Schemas["DraftDifference"];
 export type DistanceHistogram = Schemas["DistanceHistogram"];
 export type DuplicatePair = Schemas["DuplicatePair"];
 export type Job = Schemas["Job"];
 export type Landmark = Schemas["Landmark"];
-export type LandmarkDistances = Schemas["LandmarkDistances"];
-export type LandmarkEvidence = Schemas["LandmarkEvidence"];
-export type LandmarkModelDetail = Schemas["LandmarkModelDetail"];
 export type MapBody = Schemas["Map"];
 export type Place = Schemas["Place"];
 export type PriorCheck = Schemas["PriorCheck"];
@@ -33,13 +29,11 @@ export type Replay = Schemas["Replay"];
 export type Robot = Schemas["Robot"];
 export type RobotActivity = Schemas["RobotActivity"];
 export type RobotInput = Schemas["RobotInput"];
-export type RefusedView = Schemas["RefusedView"];
 export type Role = Schemas["Role"];
 export type ServerEvent = Schemas["ServerEvent"];
 export type Servers = Schemas["Servers"];
 export type Size = Schemas["Size"];
 export type StorageHealth = Schemas["StorageHealth"];
-export type StoredAnswer = Schemas["StoredAnswer"];
 export type StoredAnswerSummary = Schemas["StoredAnswerSummary"];
 export type Token = Schemas["Token"];
 export type TrainingView = Schemas["TrainingView"];
@@ -48,11 +42,3 @@ export type VisibleResponse = Schemas["VisibleResponse"];
 export type CoverageResponse = Schemas["CoverageResponse"];
 export type Walls = Schemas["WallsBody"];
 export type Whoami = Schemas["Whoami"];
-
-/** A page of a list. */
-export interface Listed<T> {
-  items: T[];
-  /** Where the next page begins; absent on the last one. */
-  next?: string | null;
-  total?: number | null;
-}

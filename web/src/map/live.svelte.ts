@@ -100,7 +100,7 @@ export class LiveMap {
   }
 
   async #readRobots(map: string): Promise<void> {
-    const { items } = await get<{ items: Robot[] }>("/robots", { limit: 500 }).catch(() => ({ items: [] as Robot[] }));
+    const { items } = await get("/robots", { limit: 500 }).catch(() => ({ items: [] as Robot[] }));
     const here = items.filter((robot) => robot.map === map);
     for (const { name, alive, pose, activity } of here) {
       const robot = this.#of(name);
@@ -118,7 +118,7 @@ export class LiveMap {
 
   /** Puts what was driven before the page was opened in front of what was heard since. */
   async #readTracks(name: string): Promise<void> {
-    const before = await get<Record<"odometry" | "truth", SpotEvent["pose"][]>>(path`/robots/${name}/trajectories`).catch(() => undefined);
+    const before = await get(path("/robots/{robot}/trajectories", { robot: name })).catch(() => undefined);
     if (!before) return;
     const robot = this.#of(name);
     for (const track of ["odometry", "truth"] as const) {

@@ -171,10 +171,10 @@ export class WallEditor {
     }
     const { wall: was, moves } = this.#held;
     const [dx, dy] = [to[0] - from[0], to[1] - from[1]];
-    const moved = ([x = 0, y = 0]: number[]): number[] => [x + dx, y + dy];
+    const moved = ([x, y]: Point): Point => [x + dx, y + dy];
     const others = new WallEditor(this.segments.filter((_, i) => i !== chosen), "");
     others.from = (moves === "a" ? was.b : was.a) as Point;
-    const end = (at: number[]) => [...others.snapped(moved(at) as Point, px_m)];
+    const end = (at: Point): Point => [...others.snapped(moved(at), px_m)];
     const now = moves === "both" ? { a: moved(was.a), b: moved(was.b) } : moves === "a" ? { a: end(was.a), b: was.b } : { a: was.a, b: end(was.b) };
     this.segments = this.segments.map((one, i) => (i === chosen ? now : one));
     if (is_done) this.#held = undefined;

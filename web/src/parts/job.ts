@@ -7,7 +7,7 @@ const LOOK_MS = 400;
 
 export async function follow(id: number, tell: (job: Job) => void): Promise<Job> {
   for (;;) {
-    const job = await get<Job>(path`/jobs/${id}`);
+    const job = await get(path("/jobs/{job}", { job: id }));
     if (job.state !== "queued" && job.state !== "running") return job;
     tell(job);
     await new Promise((then) => setTimeout(then, LOOK_MS));

@@ -17,8 +17,8 @@ export interface LiveAnswer {
   status: string;
   quads: LiveQuad[];
   latency_ms: number;
-  rejection?: { code: string; field: string; detail: string };
-  pose_refusal_detail?: { sentence: string };
+  rejection?: { code: string; field: string; detail: string } | null;
+  pose_refusal_detail?: { sentence: string } | null;
 }
 
 /** The landmark that a quad is, and whether the pose known before named it. */

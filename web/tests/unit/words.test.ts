@@ -38,7 +38,7 @@ test("every reason for no position has words", () => {
 });
 
 test("the gate of the known position is told with its number and limit", () => {
-  const check = { prior: {}, seen: {}, distance2: 20.25, limit: 11.34, source: "robot" as const, refused: true };
+  const check = { prior: { pose: null, covariance: [] }, distance2: 20.25, limit: 11.34, source: "robot" as const, refused: true };
   expect(priorText(check)).toBe("Disagrees: the position by the picture and the one that the robot sent are 4.5 sigma apart; at most 3.4 sigma is let pass.");
   expect(priorText({ ...check, distance2: 1, refused: false })).toMatch(/^Agrees: .* 1\.0 sigma apart/);
   expect(priorText({ ...check, distance2: 1, refused: false, source: "server" })).toMatch(/refuses nothing.* within 3\.4 sigma\.$/);

@@ -13,9 +13,10 @@ from waymark.api import (
     LiveEvent,
     LiveMapChange,
     LiveMissed,
+    LiveOdometry,
     LivePose,
-    LivePosition,
     LivePresence,
+    LiveTruth,
     ServerEvent,
 )
 from waymark.errors import Unexpected
@@ -26,8 +27,8 @@ MAX_EVENT_BYTES = 4 << 20
 _EVENTS: dict[str, Any] = {
     "answer": LiveAnswer,
     "pose": LivePose,
-    "odometry": LivePosition,
-    "truth": LivePosition,
+    "odometry": LiveOdometry,
+    "truth": LiveTruth,
     "presence": LivePresence,
     "map_changed": LiveMapChange,
     "missed": LiveMissed,
@@ -42,8 +43,6 @@ def live_event(name: str, data: str) -> LiveEvent | None:
     value = json.loads(data)
     if kind is LiveMissed:
         return LiveMissed(int(value))
-    if kind is LivePosition:
-        value["source"] = name
     event: LiveEvent = from_json(kind, value)
     return event
 

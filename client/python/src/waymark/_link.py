@@ -23,7 +23,7 @@ from waymark._messages import HEAD_BYTES, Sent, frame_message, localise_request,
 from waymark._servers import Servers
 from waymark._session import Delivery, in_words, open_session
 from waymark._values import fill, from_message
-from waymark.api.localise import LocaliseResult
+from waymark.api import LocaliseResult
 from waymark.errors import InvalidInput, NoAnswer, NotAdmitted, TlsRefused, Unexpected, Unreachable
 from waymark.image import Capture, Picture
 from waymark.quads import Quads

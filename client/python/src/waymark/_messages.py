@@ -6,7 +6,7 @@ import dataclasses
 from dataclasses import dataclass
 
 from waymark._values import fill, from_message
-from waymark.api.localise import LocaliseHypothesisBody, LocaliseResult, LocaliseStatus
+from waymark.api import LocaliseHypothesisBody, LocaliseResult, LocaliseStatus
 from waymark.errors import Refused
 from waymark.image import Capture, Encoding, Image, Picture, as_image
 from waymark.quads import FoundQuad, Quads

@@ -59,7 +59,7 @@ def from_message(kind: type[T], message: Message) -> T:
 def to_json(value: Any) -> Any:
     """Dataclasses to what `json` writes; fields that are `None` are left out."""
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        fields = ((f.name, getattr(value, f.name)) for f in dataclasses.fields(value))
+        fields = ((f.metadata.get(NAME, f.name), getattr(value, f.name)) for f in dataclasses.fields(value))
         return {name: to_json(each) for name, each in fields if each is not None}
     if isinstance(value, Mapping):
         return {name: to_json(each) for name, each in value.items()}

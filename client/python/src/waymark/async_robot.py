@@ -13,7 +13,7 @@ from weakref import WeakSet
 from waymark._link import INBOX, Link, Listener, Subscription, name
 from waymark._servers import LOOK_EVERY_S
 from waymark._session import Delivery
-from waymark.api.localise import LocaliseResult
+from waymark.api import LocaliseResult
 from waymark.errors import NoAnswer
 from waymark.image import Capture, Picture
 from waymark.quads import Quads

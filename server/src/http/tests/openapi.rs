@@ -5,7 +5,7 @@ use crate::store::{landmark_placement::tests::seen_from, track_acceptance::tests
 use serde_json::json;
 use std::{
     collections::{BTreeMap, BTreeSet},
-    fs,
+    fs, io,
     path::{Path, PathBuf},
 };
 
@@ -160,11 +160,53 @@ async fn every_body_has_an_example_and_the_server_takes_it() {
 
 /// Where the document is kept, for programs that make clients of it.
 const KEPT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/openapi.json");
+/// Largest size of the document, in bytes: as it is kept and as it is served.
+const MAX_BYTES: usize = 270_000;
+
+/// JSON with one line for every operation and every part of `components`, so that a change shows what it changes.
+#[derive(Default)]
+struct Lines {
+    depth: usize,
+}
+
+impl Lines {
+    /// Objects down to this depth have a line for each key.
+    const DEPTH: usize = 3;
+
+    fn end(&self, to: &mut (impl io::Write + ?Sized)) -> io::Result<()> {
+        write!(to, "\n{:1$}", "", self.depth)
+    }
+}
+
+impl serde_json::ser::Formatter for Lines {
+    fn begin_object<W: io::Write + ?Sized>(&mut self, to: &mut W) -> io::Result<()> {
+        self.depth += 1;
+        to.write_all(b"{")
+    }
+
+    fn begin_object_key<W: io::Write + ?Sized>(&mut self, to: &mut W, first: bool) -> io::Result<()> {
+        if !first {
+            to.write_all(b",")?;
+        }
+        if self.depth <= Self::DEPTH { self.end(to) } else { Ok(()) }
+    }
+
+    fn end_object<W: io::Write + ?Sized>(&mut self, to: &mut W) -> io::Result<()> {
+        self.depth -= 1;
+        if self.depth < Self::DEPTH {
+            self.end(to)?;
+        }
+        to.write_all(b"}")
+    }
+}
 
 #[test]
 fn the_document_in_docs_is_that_of_the_code() {
     let (_, document) = crate::http::router::parts(&Limits::default());
-    let text = serde_json::to_string_pretty(&document).unwrap() + "\n";
+    let mut text = Vec::new();
+    let mut to = serde_json::Serializer::with_formatter(&mut text, Lines::default());
+    serde::Serialize::serialize(&document, &mut to).unwrap();
+    let text = String::from_utf8(text).unwrap() + "\n";
     if std::env::var_os("WAYMARK_REFRESH").is_some() {
         fs::write(KEPT, &text).unwrap();
     }
@@ -173,40 +215,153 @@ fn the_document_in_docs_is_that_of_the_code() {
         kept == text,
         "docs/openapi.json is stale: WAYMARK_REFRESH=1 cargo test -p server the_document_in_docs"
     );
+    let served = serde_json::to_vec(&document).unwrap();
+    assert!(kept.len().max(served.len()) <= MAX_BYTES, "{} and {} bytes", kept.len(), served.len());
+}
+
+/// The document as JSON.
+fn document() -> Value {
+    serde_json::to_value(crate::http::router::parts(&Limits::default()).1).unwrap()
+}
+
+/// Every operation of a document: method, path, and what is said of it.
+pub(super) fn operations(document: &Value) -> impl Iterator<Item = (&str, &str, &Value)> {
+    let paths = document["paths"].as_object().unwrap().iter();
+    paths.flat_map(|(path, item)| {
+        item.as_object().unwrap().iter().map(move |(method, said)| (method.as_str(), path.as_str(), said))
+    })
+}
+
+/// Whether an operation takes this parameter of `components`.
+pub(super) fn takes(operation: &Value, parameter: &str) -> bool {
+    let reference = format!("#/components/parameters/{parameter}");
+    operation["parameters"].as_array().into_iter().flatten().any(|p| p["$ref"] == reference)
 }
 
 #[test]
 fn every_operation_names_what_guard_extractors_and_store_may_answer() {
-    let (_, document) = crate::http::router::parts(&Limits::default());
-    let document = serde_json::to_value(document).unwrap();
+    let document = document();
     let mut count = 0;
-    for (path, item) in document["paths"].as_object().unwrap() {
-        for (method, operation) in item.as_object().unwrap() {
-            count += 1;
-            let responses = operation["responses"].as_object().unwrap();
-            let mut needed = vec!["400", "403", "408", "500", "503"];
-            if path.contains('{') {
-                needed.push("404");
-            }
-            if !operation["requestBody"].is_null() {
-                needed.extend(["413", "415", "422"]);
-            }
-            if method != "get" {
-                needed.push("507");
-            }
-            for status in needed {
-                let response =
-                    responses.get(status).unwrap_or_else(|| panic!("{method} {path}: no {status}"));
-                assert!(
-                    response["description"].as_str().is_some_and(|d| !d.is_empty()),
-                    "{method} {path} {status}"
-                );
-            }
-            for (status, response) in responses.iter().filter(|(status, _)| status.as_str() >= "400") {
-                let kinds: Vec<_> = response["content"].as_object().unwrap().keys().collect();
-                assert_eq!(kinds, ["application/problem+json"], "{method} {path} {status}");
+    for (method, path, operation) in operations(&document) {
+        count += 1;
+        let responses = operation["responses"].as_object().unwrap();
+        let mut needed = vec!["default"];
+        if path.contains('{') {
+            needed.push("404");
+        }
+        if !operation["requestBody"].is_null() {
+            needed.extend(["413", "415", "422"]);
+        }
+        for status in needed {
+            assert!(responses.contains_key(status), "{method} {path}: no {status}");
+        }
+        for (status, response) in responses {
+            if status.as_str() < "400" {
+                let said = response["description"].as_str().unwrap_or_default();
+                assert!(!said.is_empty(), "{method} {path} {status}: no description");
+            } else {
+                let reference = response["$ref"].as_str().unwrap_or_default();
+                let at = reference.strip_prefix('#').unwrap_or("/none");
+                let shared =
+                    document.pointer(at).unwrap_or_else(|| panic!("{method} {path} {status}: {response}"));
+                let kinds: Vec<_> = shared["content"].as_object().unwrap().keys().collect();
+                assert_eq!(kinds, ["application/problem+json"], "{reference}");
+                assert!(shared["description"].as_str().is_some_and(|d| !d.is_empty()), "{reference}");
             }
         }
     }
     assert!(count > 60, "{count}");
+}
+
+/// Verbs that an operation's id begins with.
+const VERBS: [&str; 28] = [
+    "accept",
+    "calibrate",
+    "cancel",
+    "check",
+    "compute",
+    "copy",
+    "create",
+    "delete",
+    "finish",
+    "follow",
+    "get",
+    "learn",
+    "list",
+    "load",
+    "localise",
+    "merge",
+    "publish",
+    "rank",
+    "recognise",
+    "replay",
+    "revoke",
+    "rollBack",
+    "save",
+    "set",
+    "start",
+    "stop",
+    "undo",
+    "update",
+];
+
+#[test]
+fn every_operation_has_an_id_of_its_own_named_by_action_and_thing() {
+    let document = document();
+    let mut seen = BTreeMap::new();
+    for (method, path, operation) in operations(&document) {
+        let id = operation["operationId"].as_str().unwrap_or_default();
+        let thing = VERBS.iter().find_map(|verb| id.strip_prefix(verb)).unwrap_or_default();
+        let is_named = thing.starts_with(|c: char| c.is_ascii_uppercase())
+            && thing.chars().all(|c| c.is_ascii_alphanumeric());
+        assert!(is_named, "{method} {path}: `{id}` is no verb with a thing, as listMaps");
+        if let Some(other) = seen.insert(id.to_owned(), path) {
+            panic!("{id} is both {other} and {path}");
+        }
+    }
+    assert!(seen.len() > 100, "{}", seen.len());
+}
+
+/// Everything that `value` refers to, directly or not.
+fn reached<'a>(document: &'a Value, value: &'a Value, found: &mut BTreeSet<&'a str>) {
+    if let Some(reference) = value["$ref"].as_str().filter(|reference| !found.contains(reference)) {
+        found.insert(reference);
+        let target = document.pointer(reference.strip_prefix('#').unwrap_or("/none"));
+        reached(document, target.unwrap_or_else(|| panic!("{reference} leads nowhere")), found);
+    }
+    match value {
+        Value::Object(fields) => fields.values().for_each(|value| reached(document, value, found)),
+        Value::Array(items) => items.iter().for_each(|value| reached(document, value, found)),
+        _ => {}
+    }
+}
+
+#[test]
+fn every_part_of_components_is_used_and_nothing_shared_is_said_twice() {
+    let document = document();
+    let mut found = BTreeSet::new();
+    reached(&document, &document["paths"], &mut found);
+    for kind in ["schemas", "responses", "parameters", "headers"] {
+        let parts = document["components"][kind].as_object().unwrap();
+        for name in parts.keys() {
+            let reference = format!("#/components/{kind}/{name}");
+            assert!(found.contains(reference.as_str()), "{reference} is used by nothing");
+        }
+    }
+    let mut said = BTreeMap::new();
+    for (method, path, operation) in operations(&document) {
+        for parameter in operation["parameters"].as_array().into_iter().flatten() {
+            if parameter["$ref"].is_null()
+                && let Some(other) = said.insert(parameter.to_string(), path)
+            {
+                panic!("{method} {path} says again what {other} does: {parameter}");
+            }
+        }
+    }
+}
+
+#[test]
+fn kinds_of_events_are_those_that_a_reader_can_choose() {
+    let kinds = protos::api::ServerEventBody::KINDS;
+    assert_eq!(document()["components"]["schemas"]["EventKind"]["enum"], json!(kinds));
 }

@@ -1,6 +1,10 @@
 //! Changes say which revision they are meant for; what somebody else has changed meanwhile is not overwritten.
 
-use super::{openapi::read_long, teaching::blocks, *};
+use super::{
+    openapi::{read_long, takes},
+    teaching::blocks,
+    *,
+};
 use crate::{http::revision::REVISED, store::landmarks};
 use axum::http::HeaderMap;
 use map::landmark_health::LandmarkHealth;
@@ -161,8 +165,7 @@ async fn the_document_asks_for_revisions_where_the_server_does() {
     let mut found = 0;
     for (path, item) in document["paths"].as_object().unwrap() {
         for (method, operation) in item.as_object().unwrap() {
-            let asks =
-                operation["parameters"].as_array().into_iter().flatten().any(|p| p["name"] == "If-Match");
+            let asks = takes(operation, "header.If-Match");
             let below = path.trim_start_matches("/api/v1");
             let listed =
                 REVISED.iter().any(|(at, changes)| *at == below && changes.contains(&method.as_str()));

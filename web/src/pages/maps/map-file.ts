@@ -10,7 +10,7 @@ export const LOAD_MS = 1_800_000;
 
 /** Loads a map from a file. */
 export const loadMap = (content: Blob, query: { name?: string | undefined; without_link?: boolean | undefined } = {}) =>
-  change<MapBody>("POST", "/bundles", { file: { content, kind: "application/zip", deadline_ms: LOAD_MS }, query, key: newKey() });
+  change("POST", "/bundles", { file: { content, kind: "application/zip", deadline_ms: LOAD_MS }, query, key: newKey() });
 
 /** The file of a map; `undefined` if it is too large, or may not be loaded again. */
 async function kept(map: string): Promise<Blob | undefined> {
@@ -35,6 +35,6 @@ async function kept(map: string): Promise<Blob | undefined> {
 /** Deletes a map. Returns the way back, or `undefined` if the map could not be kept. */
 export async function deleteMap(map: MapBody): Promise<(() => Promise<unknown>) | undefined> {
   const file = await kept(map.name).catch(() => undefined);
-  await change("DELETE", path`/maps/${map.name}`, { ifMatch: map.revision ?? "*" });
+  await change("DELETE", path("/maps/{map}", { map: map.name }), { ifMatch: map.revision ?? "*" });
   return file && (() => loadMap(file));
 }

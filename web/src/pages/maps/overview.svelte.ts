@@ -39,7 +39,7 @@ async function drawn({ name: map, version, revision }: MapBody): Promise<[string
   const present = `${version} ${revision}`;
   const known = read.get(map);
   if (known?.version === present) return [map, known.drawn];
-  const [{ segments }, landmarks] = await Promise.all([get<Walls>(path`/maps/${map}/walls`), all<Landmark>(path`/maps/${map}/landmarks`)]);
+  const [{ segments }, landmarks] = await Promise.all([get(path("/maps/{map}/walls", { map })), all(path("/maps/{map}/landmarks", { map }))]);
   const each = Math.max(1, Math.ceil(segments.length / MOST_WALLS));
   const made = { walls: segments.filter((_, i) => i % each === 0), has_walls: segments.length > 0, landmarks };
   read.set(map, { version: present, drawn: made });
@@ -74,12 +74,12 @@ async function serverNeeds(): Promise<Need[]> {
 
 async function knocking(): Promise<Need[]> {
   if (!may("GET /unknown-robots")) return [];
-  const { robots } = await get<{ robots: { name: string }[] }>("/unknown-robots");
+  const { robots } = await get("/unknown-robots");
   return robots.length ? [{ text: `${count(robots.length, "robot knocks", "robots knock")} and ${robots.length === 1 ? "is" : "are"} not registered.`, button: "Admit", to: "/robots", is_grave: false }] : [];
 }
 
 export async function overview(): Promise<Overview> {
-  const [maps, robots] = await Promise.all([all<MapBody>("/maps"), all<Robot>("/robots")]);
+  const [maps, robots] = await Promise.all([all("/maps"), all("/robots")]);
   const [server, knocks, pictures] = await Promise.all([
     serverNeeds().catch(() => []),
     knocking().catch(() => []),

@@ -1,60 +1,23 @@
-"""Events of a map as they come."""
+"""What is no body of JSON by itself: events of a map as they come, and the last frame of a camera."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TypeAlias
 
-from waymark.wire import Answer, Pose2, PoseTrust
+from waymark.api.bodies import LiveAnswer, LiveMapChange, LivePose, LivePosition, LivePresence
+
+__all__ = ["CameraFrame", "LiveEvent", "LiveMissed", "LiveOdometry", "LiveTruth"]
 
 
 @dataclass(frozen=True, slots=True)
-class LiveAnswer:
-    """A frame was answered."""
-
-    robot: str
-    camera: str
-    answer: Answer
+class LiveOdometry(LivePosition):
+    """Where odometry alone says that a robot is."""
 
 
 @dataclass(frozen=True, slots=True)
-class LivePose:
-    """A fused pose, as it was published; covariance over (x, y, theta)."""
-
-    robot: str
-    map: str
-    pose: Pose2
-    covariance: tuple[float, ...]
-    corrections: int
-    age_ms: float
-    trust: PoseTrust
-
-
-@dataclass(frozen=True, slots=True)
-class LivePosition:
-    """A pose without covariance: `odometry` alone, or a simulator's `truth`."""
-
-    source: str
-    robot: str
-    map: str
-    pose: Pose2
-
-
-@dataclass(frozen=True, slots=True)
-class LivePresence:
-    """A robot came or went."""
-
-    robot: str
-    map: str
-    alive: bool
-
-
-@dataclass(frozen=True, slots=True)
-class LiveMapChange:
-    """A map has a new version; `None`: it was deleted."""
-
-    map: str
-    version: int | None = None
+class LiveTruth(LivePosition):
+    """Where a robot really is, told by a simulator."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,4 +27,13 @@ class LiveMissed:
     events: int
 
 
-LiveEvent: TypeAlias = LiveAnswer | LivePose | LivePosition | LivePresence | LiveMapChange | LiveMissed
+LiveEvent: TypeAlias = LiveAnswer | LivePose | LiveOdometry | LiveTruth | LivePresence | LiveMapChange | LiveMissed
+
+
+@dataclass(frozen=True, slots=True)
+class CameraFrame:
+    """The last answered frame of a camera: the number of its answer, `image/jpeg` or `image/png`, and the file."""
+
+    seq: int
+    media_type: str
+    image: bytes = field(repr=False)
