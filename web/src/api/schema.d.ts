@@ -1086,8 +1086,8 @@ export interface paths {
         get?: never;
         put?: never;
         /**
-         * Ends the drive: everything is fitted once more, and the walls replace those of the map in one transaction. Answers at once;
-         *     `stage` says when they are stored.
+         * Ends the drive: everything is fitted once more, and the walls replace those of the map in one transaction, or are held until
+         *     this is asked again. Answers at once; `stage` says when they are stored or held.
          */
         post: operations["finish"];
         delete?: never;
@@ -3341,16 +3341,18 @@ export interface components {
              * @description Scans that were taken.
              */
             scans: number;
-            /** @description Walls, once it is done. */
+            /** @description Number of walls, once they are found. */
             segments?: number | null;
             /** @description How far it has come. */
             stage: components["schemas"]["MappingStageBody"];
+            /** @description The walls that are held: what would replace those of the map. Absent at every other stage. */
+            walls?: components["schemas"]["WallBody"][] | null;
         };
         /**
          * @description How far a mapping has come.
          * @enum {string}
          */
-        MappingStageBody: "resuming" | "mapping" | "finishing" | "done" | "failed";
+        MappingStageBody: "resuming" | "mapping" | "finishing" | "found" | "done" | "failed";
         /** @description Memory of a model for one purpose. */
         MemoryPart: {
             /** @description Bytes. */
@@ -14382,7 +14384,13 @@ export interface operations {
     };
     finish: {
         parameters: {
-            query?: never;
+            query?: {
+                /**
+                 * @description Hold the walls (`stage` is `found` then), so that somebody may look at them: asked once more without it, they replace
+                 *     those of the map; `DELETE` gives them up.
+                 */
+                hold?: boolean;
+            };
             header?: {
                 /** @description The reason of a change, for the history of the map: one line of at most 200 characters, percent-encoded where it is not ASCII. */
                 "Waymark-Why"?: string;
@@ -14402,7 +14410,7 @@ export interface operations {
                     "application/json": components["schemas"]["MappingProgressBody"];
                 };
             };
-            /** @description repeated_header, foreign_authority */
+            /** @description repeated_header, foreign_authority, bad_query */
             400: {
                 headers: {
                     [name: string]: unknown;

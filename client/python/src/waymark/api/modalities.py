@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from waymark.api.maps import Point2
+from waymark.api.maps import Point2, WallBody
 
 FusionMode = Literal["all", "near_best", "best"]
 Modality = Literal["odometry", "laser", "landmarks"]
 StatsScope = Literal["cell", "neighbourhood", "area", "map"]
-MappingStage = Literal["resuming", "mapping", "finishing", "done", "failed"]
+MappingStage = Literal["resuming", "mapping", "finishing", "found", "done", "failed"]
 # Along, to the left, heading: m, m, rad.
 Triple = tuple[float, float, float]
 
@@ -139,3 +139,4 @@ class MappingProgressBody:
     loop_closures: int | None = None
     reason: str | None = None
     journal_error: str | None = None
+    walls: tuple[WallBody, ...] | None = None
