@@ -1,1 +1,0 @@
-import{an as i,t as o,a as n,s as d,m as l,k as v,L as m,j as c,o as f}from"./index-wyK3DIoz.js";var h=l('<div class="card empty svelte-1fpw1hr"><p> </p> <!></div>');function x(s,a){var t=h(),e=v(t),r=f(e,!0),p=d(e,2);i(p,()=>a.children??m),o(()=>c(r,a.what)),n(s,t)}export{x as E};

@@ -1,1 +1,0 @@
-import{av as t,aw as e,W as f,aj as c}from"./index-wyK3DIoz.js";function u(n){t===null&&e(),f(()=>{const o=c(n);if(typeof o=="function")return o})}function i(n){t===null&&e(),u(()=>()=>c(n))}export{i as o};

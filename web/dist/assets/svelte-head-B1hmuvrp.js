@@ -1,1 +1,0 @@
-import{aB as s,aC as t,aD as d,aE as l,aF as r}from"./index-wyK3DIoz.js";function i(o,n){var a;a=document.head.appendChild(s()),t(()=>{var e=d(()=>n(a));e.f|=l,r||(e.nodes===null?e.nodes={start:a,end:a,a:null,t:null}:e.nodes.end=a)})}export{i as h};
