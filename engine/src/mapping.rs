@@ -38,8 +38,10 @@ pub enum MappingStage {
     Resuming,
     /// Scans are mapped as they come.
     Mapping,
-    /// The pose graph is optimised; then the walls are stored.
+    /// The pose graph is optimised; then the walls are held or stored.
     Finishing,
+    /// The walls are held until somebody accepts them or cancels; the map is as before.
+    Found,
     /// The map has the new walls.
     Done,
     /// See `reason`; the map is as before.
@@ -63,7 +65,7 @@ pub struct MappingProgress {
     pub distance_m: f64,
     /// `map_from_robot`: x, y (m), theta (rad); absent before the first scan.
     pub pose: Option<[f64; 3]>,
-    /// Walls, once it is done.
+    /// Walls, once they are found.
     pub segments: Option<usize>,
     /// Loop closures, once the pose graph is optimised.
     pub loop_closures: Option<usize>,
@@ -175,14 +177,14 @@ impl MappingSessions {
         }
     }
 
-    /// Takes no more scans; the walls come once the pose graph is optimised. Their fate is reported to
-    /// [`MappingSessions::stored`].
+    /// Takes no more scans; the walls come once the pose graph is optimised, or at once where they are held already. Their fate
+    /// is reported to [`MappingSessions::stored`] or [`MappingSessions::hold`].
     pub fn finish(
         &self,
         map: &str,
     ) -> Result<(MappingProgress, oneshot::Receiver<Result<Walls, String>>), MappingError> {
         let mut all = self.lock();
-        let session = all.get_mut(map).filter(|s| s.takes()).ok_or(MappingError::None)?;
+        let session = all.get_mut(map).filter(|s| s.can_finish()).ok_or(MappingError::None)?;
         let walls = session.finish().ok_or(MappingError::None)?;
         Ok((session.progress(), walls))
     }
@@ -196,6 +198,19 @@ impl MappingSessions {
             }
             session.end(stored);
         }
+    }
+
+    /// Holds the walls until somebody accepts them with [`MappingSessions::finish`], or says why there are none. The journal
+    /// stays: after a restart the mapping resumes, and is finished once more.
+    pub fn hold(&self, map: &str, walls: Result<Walls, String>) {
+        if let Some(session) = self.lock().get_mut(map) {
+            session.hold(walls);
+        }
+    }
+
+    /// The walls that are held.
+    pub fn held(&self, map: &str) -> Option<Walls> {
+        self.lock().get(map).and_then(|session| session.held.clone())
     }
 
     /// Cancels a mapping: the map stays as it is. False if there is none.

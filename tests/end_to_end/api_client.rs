@@ -323,7 +323,7 @@ async fn drives_are_recorded_mapped_and_gathered() {
     maps.delete_reference_run("hall", run.id).await.expect("deleted");
     assert_eq!(maps.reference_runs("hall").await.expect("runs"), []);
 
-    // A mapping that is cancelled, and one without any wall.
+    // A mapping that is cancelled, one without any wall, and one whose walls were to be held.
     let new = NewMapping { robot: "r1".into(), origin: [1.0, 2.0, 0.0] };
     assert_eq!(maps.start_mapping("hall", &new).await.expect("begun").stage, MappingStageBody::Mapping);
     maps.cancel_mapping("hall").await.expect("given up");
@@ -333,6 +333,9 @@ async fn drives_are_recorded_mapped_and_gathered() {
         (maps.mapping("hall").await.expect("mapping").stage == MappingStageBody::Failed).then_some(())
     };
     eventually("nothing to store", failed).await;
+    maps.start_mapping("hall", &new).await.expect("begun");
+    maps.hold_mapping("hall").await.expect("finished");
+    eventually("nothing to hold", failed).await;
     assert_eq!(maps.walls("hall").await.expect("walls"), walls());
 
     // A gathering without tracks.

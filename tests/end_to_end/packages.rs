@@ -77,6 +77,14 @@ fn the_container_file_has_pinned_bases_existing_sources_a_user_and_a_health_chec
     {
         assert!(text.contains(&format!("\nCOPY {member} {member}\n")), "{member} is not copied");
     }
+    // What is embedded in the server, too.
+    let embedding = fs::read_to_string(root().join("server/build.rs")).expect("the build script");
+    let embedded: Vec<&str> =
+        embedding.split("root.join(\"").skip(1).filter_map(|rest| rest.split('"').next()).collect();
+    assert!(embedded.len() > 1, "{embedded:?}");
+    for folder in embedded {
+        assert!(text.contains(&format!("\nCOPY {folder} {folder}\n")), "{folder} is not copied");
+    }
     let ignored = fs::read_to_string(root().join(".dockerignore")).expect("the file");
     for word in ["target", ".git", "node_modules"] {
         assert!(ignored.contains(word), "{word} is sent to the build");

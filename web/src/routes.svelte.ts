@@ -10,15 +10,17 @@ export type Names = Record<string, string>;
 type Page = () => Promise<{ default: Component<any> }>;
 
 interface Route {
+  /** As it is written below, such as `/maps/:map`. */
+  address: string;
   pattern: RegExp;
   page: Page;
   /** What the page is for; whoever may not do it is told so. */
   needs?: Operation | undefined;
 }
 
-function route(pattern: string, page: Page, needs?: Operation): Route {
-  const text = pattern.replace(/:(\w+)/g, "(?<$1>[^/]+)");
-  return { pattern: new RegExp(`^${text}/?$`), page, needs };
+function route(address: string, page: Page, needs?: Operation): Route {
+  const text = address.replace(/:(\w+)/g, "(?<$1>[^/]+)");
+  return { address, pattern: new RegExp(`^${text}/?$`), page, needs };
 }
 
 const ROUTES: Route[] = [
@@ -38,18 +40,20 @@ const ROUTES: Route[] = [
   route("/answers", () => import("./pages/answers/Answers.svelte")),
   route("/answers/:answer", () => import("./pages/answers/OneAnswer.svelte")),
   route("/admin", () => import("./pages/admin/Admin.svelte"), "GET /jobs"),
+  route("/help", () => import("./pages/help/Guides.svelte")),
+  route("/help/:guide", () => import("./pages/help/OneGuide.svelte")),
 ];
 
 export const here = $state({ path: location.pathname, query: new URLSearchParams(location.search) });
 
 /** The page of an address and the names in it; `undefined` if there is none. */
-export function find(path: string): { page: Page; names: Names; needs: Operation | undefined } | undefined {
-  for (const { pattern, page, needs } of ROUTES) {
+export function find(path: string): { address: string; page: Page; names: Names; needs: Operation | undefined } | undefined {
+  for (const { address, pattern, page, needs } of ROUTES) {
     const found = pattern.exec(path);
     if (!found) continue;
     try {
       const pairs = Object.entries(found.groups ?? {}).map(([name, value]) => [name, decodeURIComponent(value)]);
-      return { page, names: Object.fromEntries(pairs), needs };
+      return { address, page, names: Object.fromEntries(pairs), needs };
     } catch {
       // A name that is badly escaped is none.
       return undefined;
@@ -114,6 +118,8 @@ export function followLinks(): void {
   addEventListener("popstate", ({ state }) => {
     clearTimeout(left);
     read();
+    // A place within the page, which the browser shows by itself.
+    if (state === null && location.hash) return;
     void scrollBack((state as { scroll_px?: number } | null)?.scroll_px ?? 0);
   });
   document.addEventListener("click", (event) => {
@@ -122,7 +128,8 @@ export function followLinks(): void {
     if (event.metaKey || event.ctrlKey || event.shiftKey || link.target || link.hasAttribute("download")) return;
     const to = new URL(link.href);
     if (to.origin !== location.origin || !find(to.pathname)) return;
+    if (to.hash && to.pathname === location.pathname) return;
     event.preventDefault();
-    go(to.pathname + to.search);
+    go(to.pathname + to.search + to.hash);
   });
 }

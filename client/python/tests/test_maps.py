@@ -349,6 +349,12 @@ def test_drives_are_recorded_mapped_and_gathered(server: Server) -> None:
             while maps.mapping("drives").stage != "failed" and time.monotonic() < until:
                 time.sleep(0.1)
             assert maps.mapping("drives").reason
+            # One that is to be held has no wall to hold, either.
+            maps.start_mapping("drives", "driver")
+            maps.finish_mapping("drives", hold=True)
+            while maps.mapping("drives").stage != "failed" and time.monotonic() < until:
+                time.sleep(0.1)
+            assert maps.mapping("drives").walls is None
 
             gathering = maps.start_gathering("drives", "driver", known=True)
             assert maps.gathering("drives", gathering.id).open and gathering.known

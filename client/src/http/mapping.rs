@@ -2,7 +2,7 @@
 
 use super::{map_client::MapClient, operation::operations};
 use crate::ClientError;
-use protos::api::{MappingProgressBody, NewMapping};
+use protos::api::{FinishMappingQuery, MappingProgressBody, NewMapping};
 
 operations! {
     START: POST "/maps/{map}/mapping" => start_mapping,
@@ -34,5 +34,11 @@ impl MapClient {
     /// Ends the drive: the walls are fitted once more and stored. [`MapClient::mapping`] says when they are.
     pub async fn finish_mapping(&self, map: &str) -> Result<MappingProgressBody, ClientError> {
         self.send(self.ask(&FINISH, &[&map])?).await
+    }
+
+    /// Ends the drive, and holds the walls: [`MapClient::mapping`] has them once they are found. Then
+    /// [`MapClient::finish_mapping`] stores them, and [`MapClient::cancel_mapping`] gives them up.
+    pub async fn hold_mapping(&self, map: &str) -> Result<MappingProgressBody, ClientError> {
+        self.send(self.ask_query(&FINISH, &[&map], &FinishMappingQuery { hold: true })?).await
     }
 }

@@ -54,6 +54,8 @@ pub(super) struct Session {
     /// Epoch of the first scan: another epoch has another odometry.
     epoch: Option<u64>,
     commands: Option<SyncSender<Command>>,
+    /// Walls that wait to be accepted.
+    pub(super) held: Option<Walls>,
     progress: Shared,
 }
 
@@ -97,15 +99,12 @@ impl Session {
         };
         let thread = threads::spawn(Class::Background, "mapping", work);
         thread.inspect_err(|error| tracing::error!(%error, "mapping_thread_failed")).ok()?;
-        Some(Self { robot: head.robot, epoch, commands: Some(commands), progress })
+        Some(Self { robot: head.robot, epoch, commands: Some(commands), held: None, progress })
     }
 
-    /// Whether it is open: resuming, mapping, or waiting to be stored.
+    /// Whether it is open: resuming, mapping, or waiting to be accepted or stored.
     pub(super) fn is_open(&self) -> bool {
-        matches!(
-            lock(&self.progress).stage,
-            MappingStage::Resuming | MappingStage::Mapping | MappingStage::Finishing
-        )
+        !matches!(lock(&self.progress).stage, MappingStage::Done | MappingStage::Failed)
     }
 
     pub(super) fn has_failed(&self) -> bool {
@@ -115,6 +114,11 @@ impl Session {
     /// Whether it takes scans.
     pub(super) fn takes(&self) -> bool {
         matches!(lock(&self.progress).stage, MappingStage::Resuming | MappingStage::Mapping)
+    }
+
+    /// Whether there are walls, or will be once it is finished.
+    pub(super) fn can_finish(&self) -> bool {
+        self.takes() || self.held.is_some()
     }
 
     pub(super) fn progress(&self) -> MappingProgress {
@@ -131,13 +135,30 @@ impl Session {
         }
     }
 
-    /// Asks for the walls; the scans that wait are mapped first. `None` if the queue is full or the thread has ended.
+    /// Asks for the walls: those that are held, or those of all scans, after the scans that wait. `None` if the queue is full or
+    /// the thread has ended.
     pub(super) fn finish(&mut self) -> Option<oneshot::Receiver<Result<Walls, String>>> {
         let (reply, walls) = oneshot::channel();
+        if let Some(held) = self.held.take() {
+            lock(&self.progress).stage = MappingStage::Finishing;
+            return reply.send(Ok(held)).is_ok().then_some(walls);
+        }
         self.commands.as_ref()?.try_send(Command::Finish(reply)).ok()?;
         self.commands = None;
         lock(&self.progress).stage = MappingStage::Finishing;
         Some(walls)
+    }
+
+    /// Holds the walls until they are asked for again.
+    pub(super) fn hold(&mut self, walls: Result<Walls, String>) {
+        let mut progress = lock(&self.progress);
+        match walls {
+            Ok(walls) => {
+                (progress.stage, progress.segments) = (MappingStage::Found, Some(walls.len()));
+                self.held = Some(walls);
+            }
+            Err(reason) => (progress.stage, progress.reason) = (MappingStage::Failed, Some(reason)),
+        }
     }
 
     /// Records whether the walls were stored.

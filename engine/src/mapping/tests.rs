@@ -59,6 +59,14 @@ async fn scans_become_the_walls_that_mapping_them_gives() {
         let (was, is) = (wall.covariance_about_middle(), got.covariance_about_middle());
         assert!(was[(1, 1)] > 0.0 && (was - is).norm() < 1e-9 * (1.0 + was.norm()), "{was} {is}");
     }
+    mappings.hold("hall", Ok(walls.clone()));
+    let held = mappings.progress("hall").unwrap();
+    assert_eq!((held.stage, held.segments), (MappingStage::Found, Some(walls.len())));
+    assert_eq!(mappings.held("hall").as_ref(), Some(&walls));
+    assert_eq!(mappings.begin(&name("hall"), &name("r1"), origin), Err(MappingError::AlreadyMapping));
+    let (_, again) = mappings.finish("hall").unwrap();
+    assert_eq!(again.await.unwrap().unwrap(), walls);
+    assert_eq!(mappings.held("hall"), None);
     mappings.stored("hall", Ok(walls.len()));
     assert_eq!(mappings.progress("hall").unwrap().stage, MappingStage::Done);
     assert_eq!(mappings.finish("hall").unwrap_err(), MappingError::None);

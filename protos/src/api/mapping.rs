@@ -1,5 +1,6 @@
 //! `/maps/{map}/mapping`: the walls of a map made by a robot that drives.
 
+use super::WallBody;
 use serde::{Deserialize, Serialize};
 
 /// Who makes the map.
@@ -25,8 +26,10 @@ pub enum MappingStageBody {
     Resuming,
     /// Scans are taken.
     Mapping,
-    /// Everything is fitted once more; then the walls are stored.
+    /// Everything is fitted once more; then the walls are held or stored.
     Finishing,
+    /// The walls are held, see `walls`; the map is as before.
+    Found,
     /// The walls are those of the map.
     Done,
     /// See `reason`; the map is as before.
@@ -52,7 +55,7 @@ pub struct MappingProgressBody {
     /// Where the robot is in the map so far: x, y, theta; absent before the first scan.
     #[cfg_attr(feature = "openapi", schema(value_type = Option<super::arrays::Triple>))]
     pub pose: Option<[f64; 3]>,
-    /// Walls, once it is done.
+    /// Number of walls, once they are found.
     pub segments: Option<usize>,
     /// Loop closures, once fitted.
     pub loop_closures: Option<usize>,
@@ -60,4 +63,19 @@ pub struct MappingProgressBody {
     pub reason: Option<String>,
     /// Why further scans are not kept on disk: a restart of the server would lose them. Absent while they are.
     pub journal_error: Option<String>,
+    /// The walls that are held: what would replace those of the map. Absent at every other stage.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub walls: Option<Vec<WallBody>>,
+}
+
+/// What becomes of the walls of a drive that ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::IntoParams))]
+#[cfg_attr(feature = "openapi", into_params(parameter_in = Query))]
+#[serde(deny_unknown_fields)]
+pub struct FinishMappingQuery {
+    /// Hold the walls (`stage` is `found` then), so that somebody may look at them: asked once more without it, they replace
+    /// those of the map; `DELETE` gives them up.
+    #[serde(default)]
+    pub hold: bool,
 }

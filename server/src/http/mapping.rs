@@ -4,7 +4,7 @@ use super::{
     App, AppState,
     authorise::check_robot,
     error::ApiError,
-    extract::{Body, PathParams, name},
+    extract::{Body, PathParams, QueryParams, name},
 };
 use crate::{
     identity::Principal,
@@ -21,7 +21,7 @@ use engine::{
 };
 use futures::FutureExt;
 use map::pose2::Pose2;
-use protos::api::{MappingProgressBody, MappingStageBody, NewMapping, Problem};
+use protos::api::{FinishMappingQuery, MappingProgressBody, MappingStageBody, NewMapping, Problem, WallBody};
 use std::panic::AssertUnwindSafe;
 use tokio::sync::oneshot;
 use utoipa_axum::{router::OpenApiRouter, routes};
@@ -48,6 +48,7 @@ fn shown(progress: MappingProgress) -> MappingProgressBody {
             MappingStage::Resuming => MappingStageBody::Resuming,
             MappingStage::Mapping => MappingStageBody::Mapping,
             MappingStage::Finishing => MappingStageBody::Finishing,
+            MappingStage::Found => MappingStageBody::Found,
             MappingStage::Done => MappingStageBody::Done,
             MappingStage::Failed => MappingStageBody::Failed,
         },
@@ -59,6 +60,7 @@ fn shown(progress: MappingProgress) -> MappingProgressBody {
         loop_closures: progress.loop_closures,
         reason: progress.reason,
         journal_error: progress.journal_error,
+        walls: None,
     }
 }
 
@@ -103,7 +105,14 @@ async fn get(
     PathParams(map): PathParams<String>,
 ) -> Result<Json<MappingProgressBody>, ApiError> {
     maps::get(app.store.reads(), &map).await?;
-    app.motion.mappings().progress(&map).map(shown).map(Json).ok_or_else(|| refused(MappingError::None))
+    let mappings = app.motion.mappings();
+    let progress = mappings.progress(&map).map(shown).ok_or_else(|| refused(MappingError::None))?;
+    let wall = |wall: &StoredWall| {
+        let StoredWall { ends: [ax, ay, bx, by], covariance } = *wall;
+        WallBody { a: [ax, ay], b: [bx, by], covariance }
+    };
+    let walls = mappings.held(&map).map(|walls| walls.iter().map(|held| wall(&held.into())).collect());
+    Ok(Json(MappingProgressBody { walls, ..progress }))
 }
 
 /// Gives it up, or forgets one that failed: the map stays as it is, what was kept of the scans is removed.
@@ -119,19 +128,25 @@ async fn cancel(
     if open { Ok(StatusCode::NO_CONTENT) } else { Err(refused(MappingError::None)) }
 }
 
-/// Ends the drive: everything is fitted once more, and the walls replace those of the map in one transaction. Answers at once;
-/// `stage` says when they are stored.
+/// Ends the drive: everything is fitted once more, and the walls replace those of the map in one transaction, or are held until
+/// this is asked again. Answers at once; `stage` says when they are stored or held.
 #[utoipa::path(post, path = "/maps/{map}/mapping/finish", operation_id = "finishMapping",
-    tag = "maps", params(("map" = String, Path)),
+    tag = "maps", params(("map" = String, Path), FinishMappingQuery),
     responses((status = 202, body = MappingProgressBody), (status = 404, body = Problem, description = "unknown_map, not_mapping")))]
 async fn finish(
     State(app): State<AppState>,
     PathParams(map): PathParams<String>,
+    QueryParams(FinishMappingQuery { hold }): QueryParams<FinishMappingQuery>,
 ) -> Result<(StatusCode, Json<MappingProgressBody>), ApiError> {
     maps::get(app.store.reads(), &map).await?;
     let (progress, walls) = app.motion.mappings().finish(&map).map_err(refused)?;
     // Whoever asked may go away: it is stored all the same.
     tokio::spawn(inherited(Actor::current(), async move {
+        if hold {
+            let found = found(&app, walls).await.map(|(walls, _)| walls);
+            app.motion.mappings().hold(&map, found);
+            return;
+        }
         let storing = AssertUnwindSafe(store(&app, &map, walls)).catch_unwind().await;
         let stored = storing.unwrap_or_else(|cause| {
             let panics = app.store.vitals().panics();
@@ -146,12 +161,11 @@ async fn finish(
     Ok((StatusCode::ACCEPTED, Json(shown(progress))))
 }
 
-/// Stores the walls when they come; how many.
-async fn store(
+/// The walls when they come, as they are computed with and as they are stored, or why there are none to be stored.
+async fn found(
     app: &App,
-    map: &str,
     walls: oneshot::Receiver<Result<Walls, String>>,
-) -> Result<usize, String> {
+) -> Result<(Walls, Vec<StoredWall>), String> {
     let walls = walls.await.map_err(|_gone| "the mapping was given up".to_owned())??;
     let (count, max) = (walls.len(), app.config.limits.laser_segments);
     if count == 0 {
@@ -160,11 +174,21 @@ async fn store(
     if count > max {
         return Err(format!("{count} walls are more than {max}"));
     }
-    let walls: Vec<StoredWall> = walls.iter().map(StoredWall::from).collect();
-    if let Some(error) = walls.iter().find_map(|wall| wall.segment().err()) {
-        return Err(error.to_string());
+    let stored: Vec<StoredWall> = walls.iter().map(StoredWall::from).collect();
+    match stored.iter().find_map(|wall| wall.segment().err()) {
+        Some(error) => Err(error.to_string()),
+        None => Ok((walls, stored)),
     }
-    let map = map.to_owned();
+}
+
+/// Stores the walls when they come; how many.
+async fn store(
+    app: &App,
+    map: &str,
+    walls: oneshot::Receiver<Result<Walls, String>>,
+) -> Result<usize, String> {
+    let (_, walls) = found(app, walls).await?;
+    let (map, count) = (map.to_owned(), walls.len());
     let write = app.store.write(move |tx| Box::pin(async move { walls::replace(tx, &map, &walls).await }));
     write.await.map_err(|error| error.to_string())?;
     Ok(count)

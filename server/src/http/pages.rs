@@ -18,8 +18,17 @@ type File = (&'static str, &'static [u8], &'static [u8]);
 static FILES: &[File] = &include!(concat!(env!("OUT_DIR"), "/pages.rs"));
 const INDEX: &str = "index.html";
 /// Addresses that the pages themselves understand (`web/src/routes.svelte.ts`).
-const ADDRESSES: [&str; 7] =
-    ["/", "/maps/{*rest}", "/robots", "/robots/{*rest}", "/answers", "/answers/{*rest}", "/admin"];
+const ADDRESSES: [&str; 9] = [
+    "/",
+    "/maps/{*rest}",
+    "/robots",
+    "/robots/{*rest}",
+    "/answers",
+    "/answers/{*rest}",
+    "/admin",
+    "/help",
+    "/help/{*rest}",
+];
 /// Files with the digest of their content in their name never change.
 const FOREVER: HeaderValue = HeaderValue::from_static("public, max-age=31536000, immutable");
 /// A new program brings new pages: the browser asks again each time.
@@ -99,6 +108,7 @@ fn media_type(path: &str) -> HeaderValue {
         Some("svg") => "image/svg+xml",
         Some("woff2") => "font/woff2",
         Some("txt") => "text/plain; charset=utf-8",
+        Some("md") => "text/markdown; charset=utf-8",
         _ => "application/octet-stream",
     })
 }
@@ -184,6 +194,19 @@ mod tests {
     }
 
     #[test]
+    fn every_guide_is_served_as_text() {
+        let guides = web().join("../docs/guides");
+        for entry in fs::read_dir(guides).unwrap() {
+            let entry = entry.unwrap();
+            let name = format!("guides/{}", entry.file_name().to_str().unwrap());
+            let file = FILES.iter().find(|(path, ..)| *path == name).expect("build.rs embeds it");
+            assert_eq!(file.1, fs::read(entry.path()).unwrap(), "{name}");
+            let served = answer(file, "\"a\"", &HeaderMap::new());
+            assert_eq!(served.headers()[header::CONTENT_TYPE], "text/markdown; charset=utf-8");
+        }
+    }
+
+    #[test]
     fn every_address_of_the_pages_is_served() {
         let routes = fs::read_to_string(web().join("src/routes.svelte.ts")).unwrap();
         let patterns: Vec<&str> =
@@ -207,11 +230,11 @@ mod tests {
             assert_eq!(response.status(), StatusCode::NOT_FOUND, "{method} {path}");
             response.headers()[header::CONTENT_TYPE].to_str().unwrap().to_owned()
         };
-        assert_eq!(kind(Method::GET, "/help", &html), "text/html; charset=utf-8");
+        assert_eq!(kind(Method::GET, "/wiki", &html), "text/html; charset=utf-8");
         for (method, path, headers) in [
-            (Method::GET, "/help", &HeaderMap::new()),
-            (Method::POST, "/help", &html),
-            (Method::GET, "/api/v1/help", &html),
+            (Method::GET, "/wiki", &HeaderMap::new()),
+            (Method::POST, "/wiki", &html),
+            (Method::GET, "/api/v1/wiki", &html),
             (Method::GET, "/assets/old.js", &html),
         ] {
             assert_eq!(kind(method, path, headers), "application/problem+json");

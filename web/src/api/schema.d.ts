@@ -823,13 +823,16 @@ export interface components {
             dropped: number;
             /** Way driven, metres. */ distance_m: number;
             pose?: components["schemas"]["Triple"] | null;
-            /** Walls, once it is done. */ segments?: number | null;
+            /** Number of walls, once they are found. */ segments?: number | null;
             /** Loop closures, once fitted. */ loop_closures?: number | null;
             /** Why it failed. */ reason?: string | null;
             /** Why further scans are not kept on disk: a restart of the server would lose them. Absent while they are. */
             journal_error?: string | null;
+            /** The walls that are held: what would replace those of the map. Absent at every other stage. */
+            walls?: components["schemas"]["WallBody"][] | null;
         };
-        /** How far a mapping has come. */ MappingStageBody: "resuming" | "mapping" | "finishing" | "done" | "failed";
+        /** How far a mapping has come. */
+        MappingStageBody: "resuming" | "mapping" | "finishing" | "found" | "done" | "failed";
         /** Memory of a model for one purpose. */
         MemoryPart: {
             /** What it holds. */ purpose: string;
@@ -1882,7 +1885,7 @@ export interface Operations {
   "GET /maps/{map}/mapping": { answer: Schemas["MappingProgressBody"] };
   "POST /maps/{map}/mapping": { body: Schemas["NewMapping"]; answer: Schemas["MappingProgressBody"] };
   "DELETE /maps/{map}/mapping": { answer: undefined };
-  "POST /maps/{map}/mapping/finish": { answer: Schemas["MappingProgressBody"] };
+  "POST /maps/{map}/mapping/finish": { query: { hold?: boolean }; answer: Schemas["MappingProgressBody"] };
   "GET /maps/{map}/modalities": { answer: Schemas["ModalityMapBody"] };
   "PUT /maps/{map}/modalities": { body: Schemas["ModalityMapPatch"]; answer: Schemas["ModalityMapBody"] };
   "GET /maps/{map}/modalities/at": { query: { x_m: number; y_m: number; theta_rad?: number }; answer: Schemas["AreaStatsBody"] };

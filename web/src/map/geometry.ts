@@ -60,6 +60,18 @@ export function nearestOn(at: Point, [ax, ay]: Point, [bx, by]: Point): Point {
   return [ax + along * dx, ay + along * dy];
 }
 
+/** Where two segments meet, each made longer by `slack` at both ends; `undefined` for parallel ones. */
+export function crossing([[ax, ay], [bx, by]]: [Point, Point], [[cx, cy], [dx, dy]]: [Point, Point], slack: number): Point | undefined {
+  const [ux, uy, vx, vy] = [bx - ax, by - ay, dx - cx, dy - cy];
+  const [first, second] = [Math.hypot(ux, uy), Math.hypot(vx, vy)];
+  const area = ux * vy - uy * vx;
+  if (Math.abs(area) < 1e-9 * first * second) return undefined;
+  const along = ((cx - ax) * vy - (cy - ay) * vx) / area;
+  const other = ((cx - ax) * uy - (cy - ay) * ux) / area;
+  const within = (share: number, length: number) => share * length >= -slack && (share - 1) * length <= slack;
+  return within(along, first) && within(other, second) ? [ax + along * ux, ay + along * uy] : undefined;
+}
+
 /** Where a landmark lands that is dropped at a point: on the nearest wall within `reach_m`, facing the side it is dropped on. */
 export function onWall(at: Point, walls: readonly { a: number[]; b: number[] }[], reach_m: number, facing?: Point): Pick<Place, "x_m" | "y_m" | "theta_rad"> | undefined {
   let best: { distance: number; x: number; y: number; normal: Point } | undefined;

@@ -1,5 +1,5 @@
-// Straight dark lines of a floor plan along its edges, as walls to be offered. In: grey pixels, row by row from the top.
-// Out: lines in pixels of the picture. Oblique and curved walls are not found: a person draws them.
+// Dark lines of a floor plan. In: grey pixels, row by row from the top. Out: straight lines along the edges of the picture, as
+// walls to be offered, and the line under one point, oblique ones too, in pixels of the picture.
 
 /** A line of the picture: its ends, px from the left and the top. */
 export interface PlanLine {
@@ -67,4 +67,32 @@ export function planLines(grey: Uint8Array, width: number, height: number, short
   const upright = bands(columns, shortest_px).map(({ at, from, to }): PlanLine => ({ a: [at, from], b: [at, to] }));
   const long = ({ a, b }: PlanLine) => Math.hypot(a[0] - b[0], a[1] - b[1]);
   return [...level, ...upright].sort((one, other) => long(other) - long(one)).slice(0, MOST_LINES);
+}
+
+/** A patch of ink is a line if it is so many times longer than it is wide. */
+const LONG = 3;
+
+/**
+ * The point nearest to `at` of the middle of the dark line there; `undefined` if there is none, or no single one. It is the main
+ * axis of the dark pixels within `reach_px`.
+ */
+export function lineAt(grey: Uint8Array, width: number, height: number, at: [number, number], reach_px: number): [number, number] | undefined {
+  const reach = Math.max(reach_px, 2);
+  let [n, su, sv, suu, suv, svv] = [0, 0, 0, 0, 0, 0];
+  for (let y = Math.max(0, Math.floor(at[1] - reach)); y < Math.min(height, at[1] + reach); y++) {
+    for (let x = Math.max(0, Math.floor(at[0] - reach)); x < Math.min(width, at[0] + reach); x++) {
+      const [u, v] = [x + 0.5 - at[0], y + 0.5 - at[1]];
+      if ((grey[y * width + x] ?? 255) >= DARK || u * u + v * v > reach * reach) continue;
+      [n, su, sv, suu, suv, svv] = [n + 1, su + u, sv + v, suu + u * u, suv + u * v, svv + v * v];
+    }
+  }
+  if (n < reach) return undefined;
+  const [mu, mv] = [su / n, sv / n];
+  const [uu, uv, vv] = [suu / n - mu * mu, suv / n - mu * mv, svv / n - mv * mv];
+  const root = Math.hypot((uu - vv) / 2, uv);
+  if ((uu + vv) / 2 + root < LONG * LONG * ((uu + vv) / 2 - root)) return undefined;
+  const angle = 0.5 * Math.atan2(2 * uv, uu - vv);
+  const [du, dv] = [Math.cos(angle), Math.sin(angle)];
+  const off = mu * dv - mv * du;
+  return [at[0] + off * dv, at[1] - off * du];
 }

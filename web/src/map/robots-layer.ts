@@ -22,7 +22,8 @@ export interface RobotLayer {
 
 export function robotLayer(colours: Colours): RobotLayer {
   const source = new VectorSource();
-  const layer = new VectorLayer({ source, updateWhileInteracting: true });
+  // Names of landmarks make room for robots.
+  const layer = new VectorLayer({ source, updateWhileInteracting: true, declutter: "landmarks" });
   return {
     layer,
     show(robots, now_ms) {
@@ -54,12 +55,14 @@ export function drawn(robot: LiveRobot, now_ms: number, colours: Colours): Featu
     radius: 9,
     rotation: Math.PI / 2 - pose.theta_rad,
     rotateWithView: true,
+    declutterMode: "obstacle",
     fill: new Fill({ color: colour }),
     stroke: new Stroke({ color: colours.halo, width: 1.5 }),
   });
   const label = stale ? `${name} (${ago(now_ms - robot.posed_ms)})` : name;
   const text = new Text({
     text: label,
+    declutterMode: "obstacle",
     font: "600 12px Inter, system-ui, sans-serif",
     offsetY: -16,
     fill: new Fill({ color: colours.text }),
@@ -77,6 +80,7 @@ function possible({ probability, pose, covariance }: Hypothesis, name: string, c
   const strength = Math.round(40 + 150 * Math.min(1, probability)).toString(16).padStart(2, "0");
   const text = new Text({
     text: `${name}? ${Math.round(100 * probability)} %`,
+    declutterMode: "obstacle",
     font: "12px Inter, system-ui, sans-serif",
     fill: new Fill({ color: colours.text }),
     stroke: new Stroke({ color: colours.halo, width: 3 }),

@@ -1,11 +1,14 @@
 // Walls that are being drawn or changed. What is stored stays until they are saved.
 import type { Walls } from "../api/types";
 import { type Point, nearestOn } from "./geometry";
+import type { PlanInk } from "./plan-ink";
 
 export type Wall = Walls["segments"][number];
 
-/** A point this near to an end, or to a wall, is on it, px. */
+/** A point this near to an end, to a wall, or to a line of the plan is on it, px. */
 const SNAP_PX = 12;
+/** A right angle this near to a line of the plan is along it, px: a drawn line is as thick. */
+const SAME_PX = 4;
 /** A direction this near to a right angle is one, rad. */
 const RIGHT_RAD = (7 * Math.PI) / 180;
 /** A wall is at least so long, m. */
@@ -27,12 +30,15 @@ export class WallEditor {
   /** The revision of the walls that were read. */
   revision: string;
   #steps = $state.raw<(readonly Wall[])[]>([]);
+  /** What the plan draws; none without a plan. */
+  readonly ink: PlanInk | undefined;
   readonly #stored: readonly Wall[];
   #held: { wall: Wall; moves: "a" | "b" | "both" } | undefined;
 
-  constructor(segments: readonly Wall[], revision: string) {
+  constructor(segments: readonly Wall[], revision: string, ink?: PlanInk) {
     this.segments = this.#stored = segments;
     this.revision = revision;
+    this.ink = ink;
   }
 
   get is_changed(): boolean {
@@ -96,12 +102,14 @@ export class WallEditor {
     }
   }
 
-  /** Where a point lands: on an end, at a right angle to the wall before, on a wall. */
+  /** Where a point lands: on an end, on a corner or a line of the plan, at a right angle to the wall before, on a wall. */
   snapped(at: Point, px_m: number): Point {
     const reach = SNAP_PX * px_m;
-    const end = this.#endNear(at, reach);
+    const end = this.#endNear(at, reach) ?? this.ink?.corner(at, reach);
     if (end) return end;
     const right = this.from && this.#square(this.from, at);
+    const drawn = this.ink?.line(at, reach);
+    if (drawn && !(right && distance(drawn, right) <= SAME_PX * px_m)) return drawn;
     if (right) {
       // Along the right angle, and level with an end if there is one near.
       const level = this.segments.flatMap(ends).find((other) => distance(this.#along(this.from as Point, right, other), right) < reach && distance(this.from as Point, other) > reach);
@@ -172,7 +180,7 @@ export class WallEditor {
     const { wall: was, moves } = this.#held;
     const [dx, dy] = [to[0] - from[0], to[1] - from[1]];
     const moved = ([x, y]: Point): Point => [x + dx, y + dy];
-    const others = new WallEditor(this.segments.filter((_, i) => i !== chosen), "");
+    const others = new WallEditor(this.segments.filter((_, i) => i !== chosen), "", this.ink);
     others.from = (moves === "a" ? was.b : was.a) as Point;
     const end = (at: Point): Point => [...others.snapped(moved(at), px_m)];
     const now = moves === "both" ? { a: moved(was.a), b: moved(was.b) } : moves === "a" ? { a: end(was.a), b: was.b } : { a: was.a, b: end(was.b) };

@@ -1,6 +1,7 @@
 // The icons of the pages: one set (Lucide), one size. They stand beside words or have a label, so that they are decoration.
 export { default as Bot } from "@lucide/svelte/icons/bot";
 export { default as Camera } from "@lucide/svelte/icons/camera";
+export { default as CircleQuestionMark } from "@lucide/svelte/icons/circle-question-mark";
 export { default as Compass } from "@lucide/svelte/icons/compass";
 export { default as Expand } from "@lucide/svelte/icons/expand";
 export { default as Eye } from "@lucide/svelte/icons/eye";

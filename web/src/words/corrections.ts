@@ -15,7 +15,7 @@ const OUTCOMES: Record<string, string> = {
   applied: "applied",
   gated_out: "left out: it contradicts the position",
   reset: "replaced the position",
-  excluded_by_mode: "not used: another modality is better here",
+  excluded_by_mode: "not used: another sensor is better here",
   too_old: "left out: too old",
   waiting: "waits for odometry",
   carried_over: "carried over",

@@ -19,7 +19,7 @@ export const EVENT_KINDS: Record<string, string> = {
   landmark_changed: "Landmarks",
   job: "Jobs",
   presence: "Robots",
-  gathering: "Gatherings",
+  gathering: "Collecting while driving",
   backup: "Backups",
   tokens_changed: "Tokens",
 };
@@ -43,7 +43,7 @@ export function eventWords(event: ServerEvent): EventWords {
         link: event.map ? path`/robots/${event.robot}` : "/robots",
       };
     case "gathering":
-      return { text: `Gathering ${event.gathering} of ${event.map} ${GATHERINGS[event.change] ?? event.change}.`, link: path`/maps/${event.map}/gather` };
+      return { text: `Collection ${event.gathering} of ${event.map} ${GATHERINGS[event.change] ?? event.change}.`, link: path`/maps/${event.map}/gather` };
     case "backup":
       return { text: `The backup ${event.backup} ${BACKUPS[event.state] ?? event.state}.`, link: "/admin?part=backups" };
     case "tokens_changed":

@@ -17,12 +17,12 @@ export const isStale = (robot: Heard, now_ms: number) => !robot.is_connected || 
 
 export function robotState(robot: Heard, now_ms: number): { word: string; kind: "good" | "warn" | "bad" } {
   if (!robot.is_connected) return { word: "Not connected", kind: "bad" };
-  if (!robot.pose) return { word: "No pose", kind: "warn" };
-  return isStale(robot, now_ms) ? { word: "No fresh pose", kind: "warn" } : { word: "Live", kind: "good" };
+  if (!robot.pose) return { word: "No position", kind: "warn" };
+  return isStale(robot, now_ms) ? { word: "No fresh position", kind: "warn" } : { word: "Live", kind: "good" };
 }
 
 /** The age of its pose, or, where it has none, of its last message. */
 export function robotAge({ pose, posed_ms, heard_ms }: Heard, now_ms: number): string {
-  if (pose) return `pose ${ago(now_ms - posed_ms)}`;
+  if (pose) return `position ${ago(now_ms - posed_ms)}`;
   return heard_ms === undefined ? "not heard since the server's start" : `last seen ${ago(now_ms - heard_ms)}`;
 }

@@ -1,39 +1,25 @@
 // Journeys while the server goes away and comes back: every page says since when there is no connection, shows nothing old as
 // if it were of now, and is live again without being loaded anew. Sessions that end lead to the page to sign in.
 import assert from "node:assert/strict";
-import { mkdtempSync, rmSync } from "node:fs";
-import { tmpdir } from "node:os";
-import { join } from "node:path";
-import { after, afterEach, before, test } from "node:test";
-import { asker, browser, check, guestOf, hall, open, serve } from "./harness.js";
+import { test } from "node:test";
+import { check, guestOf, hall, journeys, open, plain } from "./harness.js";
 
 /** What docs/guides/administrator.md promises, ms. */
 const SAID_MS = 5000;
 const LIVE_MS = 10_000;
 const LOST = /No connection to the server since \d/;
 
-let folder, server, its, api;
-const args = () => ["--data", folder, "--zenoh", "tcp/127.0.0.1:0"];
-before(async () => {
-  folder = mkdtempSync(join(tmpdir(), "waymark-connection-"));
-  server = await serve(...args());
-  its = await browser(server);
-  api = asker(its, server);
-  await hall(its, server, api);
-  await api("PUT", "/robots/mower", { map: "hall" });
+const world = journeys({
+  begin: async () => {
+    await hall(world);
+    await api("PUT", "/robots/mower", { map: "hall" });
+  },
 });
-after(async () => {
-  await its?.close();
-  await server?.stop();
-  if (folder) rmSync(folder, { recursive: true, force: true });
-});
-afterEach(() => Promise.all(its.context.pages().map((page) => page.close())));
-
-const go = (address, size) => open(its.context, server.origin, address, size);
+const { api, go } = world;
 /** The same server once more, at the same address. */
 const again = async () => {
-  const { port } = new URL(server.origin);
-  server = await serve("--http", `127.0.0.1:${port}`, ...args());
+  const { port } = new URL(world.origin);
+  world.server = await plain(world.folder, "--http", `127.0.0.1:${port}`);
 };
 /** What a browser reports of a server that is away. */
 const AWAY = /ERR_CONNECTION|ERR_EMPTY_RESPONSE|ERR_INCOMPLETE|ERR_SOCKET|Failed to load resource/;
@@ -68,7 +54,7 @@ test("a server that is killed and started again: every page says so, and is live
       await page.waitForFunction(() => !document.querySelector(".loading"));
       await page.evaluate(() => (globalThis.is_the_same_page = true));
     }
-    await server.kill();
+    await world.server.kill();
     const killed = Date.now();
     await Promise.all(pages.map((page, j) => page.getByText(LOST).waitFor({ timeout: SAID_MS }).catch(() => assert.fail(`${some[j][0]} has not said within ${SAID_MS} ms that there is no connection`))));
     assert.ok(Date.now() - killed < SAID_MS + 1000);
@@ -95,7 +81,7 @@ test("what was typed stays while the server is away, and is saved when it is bac
   const page = await go("/maps/hall/landmarks/poster");
   await page.getByRole("button", { name: "Size", exact: true }).click();
   await page.getByLabel("Width, metres").fill("0.77");
-  await server.kill();
+  await world.server.kill();
   await page.getByText(LOST).waitFor({ timeout: SAID_MS });
   await check(Object.assign(page, { faults: [] }), "connection-lost");
   await page.getByRole("button", { name: "Save", exact: true }).click();
@@ -119,7 +105,7 @@ test("a health that is not known any more is not shown as good", async () => {
     return getComputedStyle(probe).color;
   });
   assert.notEqual(await colour(), faint, "green while it is known");
-  await server.kill();
+  await world.server.kill();
   await page.getByText(LOST).waitFor({ timeout: SAID_MS });
   assert.equal(await colour(), faint, "grey while it is not");
   await again();
@@ -129,12 +115,12 @@ test("a health that is not known any more is not shown as good", async () => {
 
 test("a page whose session ends elsewhere leads to the page to sign in", async () => {
   const { text } = await api("POST", "/tokens", { name: "looker", role: "viewer" });
-  const guest = await guestOf(its, server);
-  const page = await open(guest, server.origin, "/maps/hall");
+  const guest = await guestOf(world);
+  const page = await open(guest, world.origin, "/maps/hall");
   await page.getByLabel("Token").fill(text);
   await page.getByRole("button", { name: "Sign in" }).click();
   await page.getByText("· live").waitFor();
-  await guest.request.post(`${server.origin}/logout`, { headers: { "x-waymark-page": "1" } });
+  await guest.request.post(`${world.origin}/logout`, { headers: { "x-waymark-page": "1" } });
   await page.getByRole("heading", { name: "Sign in to Waymark" }).waitFor({ timeout: LIVE_MS });
   await guest.close();
 });
@@ -144,7 +130,7 @@ test("a stream that is refused for a while is opened again", async () => {
   let refused = 0;
   const full = { type: "about:blank", title: "Service Unavailable", status: 503, code: "too_many_streams", detail: "all event streams are in use" };
   await page.route("**/api/v1/maps/hall/live", (route) => (refused++ < 2 ? route.fulfill({ status: 503, contentType: "application/problem+json", body: JSON.stringify(full) }) : route.continue()));
-  await page.goto(`${server.origin}/maps/hall`);
+  await page.goto(`${world.origin}/maps/hall`);
   await page.getByText("· live").waitFor({ timeout: LIVE_MS });
   assert.ok(refused >= 2, `${refused} times refused`);
   assert.equal(await page.getByText(LOST).count(), 0, "the server is there");

@@ -1,28 +1,17 @@
 // Journeys that check what a person reads and gets where pages once did nothing, or said what was not so.
 import assert from "node:assert/strict";
-import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
-import { tmpdir } from "node:os";
+import { readFileSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
-import { after, afterEach, before, test } from "node:test";
-import { PHONE, asker, browser, check, guestOf, hall, open, serve } from "./harness.js";
+import { test } from "node:test";
+import { PHONE, check, guestOf, hall, journeys, layPlan, open, roomPlan } from "./harness.js";
 
-let folder, server, its, api, photograph;
-before(async () => {
-  folder = mkdtempSync(join(tmpdir(), "waymark-faults-"));
-  server = await serve("--data", folder, "--zenoh", "tcp/127.0.0.1:0");
-  its = await browser(server);
-  api = asker(its, server);
-  photograph = await hall(its, server, api);
-  await api("PUT", "/robots/mower", { map: "hall" });
+const world = journeys({
+  begin: async () => {
+    world.photograph = await hall(world);
+    await api("PUT", "/robots/mower", { map: "hall" });
+  },
 });
-after(async () => {
-  await its?.close();
-  await server?.stop();
-  if (folder) rmSync(folder, { recursive: true, force: true });
-});
-afterEach(() => Promise.all(its.context.pages().map((page) => page.close())));
-
-const go = (address, size) => open(its.context, server.origin, address, size);
+const { api, go } = world;
 const poster = () => api("GET", "/maps/hall/landmarks/poster");
 
 for (const [size, where] of [[undefined, "desk"], [PHONE, "phone"]]) {
@@ -43,7 +32,7 @@ for (const [size, where] of [[undefined, "desk"], [PHONE, "phone"]]) {
       for (const [other, hidden] of parts) if (other !== name) assert.equal(await hidden.count(), 0, `${name} shows ${other}`);
     }
     for (const [name, words] of [["Where it lies|Position in the building", /It lies in the map/], ["Which camera looks|Camera assumed for coverage", /Camera above the floor, m/], ["Walls from scans", /A robot with a laser is driven round once/]]) {
-      await page.goto(`${server.origin}/maps/hall/settings`);
+      await page.goto(`${world.origin}/maps/hall/settings`);
       await page.getByRole("button", { name: new RegExp(name) }).click();
       await page.getByText(words).first().waitFor({ timeout: 10_000 });
     }
@@ -66,30 +55,13 @@ test("a token for a viewer is made by clicks alone, from the first page on", asy
   assert.ok(clicks <= 4, `${clicks} clicks`);
 });
 
-/** A floor plan of 20 m by 12 m with a room: its outline is drawn 1 m inside of the picture. */
-const planPng = (page) => page.evaluate(() => {
-  const canvas = Object.assign(document.createElement("canvas"), { width: 400, height: 240 });
-  const pen = canvas.getContext("2d");
-  pen.fillStyle = "#fff";
-  pen.fillRect(0, 0, 400, 240);
-  pen.lineWidth = 4;
-  pen.strokeRect(20, 20, 360, 200);
-  return canvas.toDataURL("image/png").split(",")[1];
-}).then((base64) => Buffer.from(base64, "base64"));
-
-async function plan(map, buffer) {
-  const multipart = { image: { name: "plan.png", mimeType: "image/png", buffer }, metres_per_pixel: "0.05", x_m: "0", y_m: "0" };
-  const answer = await its.context.request.put(`${server.origin}/api/v1/maps/${map}/underlay`, { headers: { "x-waymark-page": "1", "if-match": "*" }, multipart });
-  assert.ok(answer.ok(), await answer.text());
-}
-
 for (const [size, where] of [[undefined, "desk"], [PHONE, "phone"]]) {
   test(`a landmark on a floor plan without walls is asked where it looks and how high it hangs, at the ${where}`, async () => {
     const map = `plan-${where}`;
     await api("POST", "/maps", { name: map });
     await api("POST", `/maps/${map}/landmarks`, { name: "sign", size: { width_m: 0.6, height_m: 0.8 } });
     const page = await go(`/maps/${map}?landmark=sign&view=10,6,0.05,0`, size);
-    await plan(map, await planPng(page));
+    await layPlan(world, map, await roomPlan(world));
     await page.reload();
     await page.getByRole("button", { name: "Place on the map" }).click();
     const floor = page.getByRole("application");
@@ -184,8 +156,8 @@ test("a landmark that is taken out of use says that a person did it, and is put 
 });
 
 test("a photograph of 60 MB is made smaller, and what is no picture is refused before anything is typed", async () => {
-  const large = join(folder, "large.png");
-  writeFileSync(large, Buffer.concat([photograph, Buffer.alloc(60e6)]));
+  const large = join(world.folder, "large.png");
+  writeFileSync(large, Buffer.concat([world.photograph, Buffer.alloc(60e6)]));
   const page = await go("/maps/hall/teach");
   await page.locator("input[type=file]").first().setInputFiles(large);
   await page.getByText(/The file has 60\.0 MB, more than the server takes\. It is sent smaller: 300 × 300 pixels/).waitFor({ timeout: 20_000 });
@@ -197,7 +169,7 @@ test("a photograph of 60 MB is made smaller, and what is no picture is refused b
   await page.locator("input[type=file]").first().setInputFiles(text);
   await page.getByText("This file is not a readable image. Use JPEG or PNG.").waitFor();
   assert.equal(await page.getByText(/Nothing with four corners was found/).count(), 0, "it was not looked at");
-  await page.goto(`${server.origin}/maps/hall`);
+  await page.goto(`${world.origin}/maps/hall`);
   await page.getByRole("button", { name: "Floor plan" }).click();
   await page.getByLabel("Picture (PNG or JPEG)").setInputFiles(text);
   await page.getByText("This file is not a readable image. Use JPEG or PNG.").waitFor();
@@ -207,7 +179,7 @@ test("a photograph of 60 MB is made smaller, and what is no picture is refused b
 });
 
 test("addresses that are none say so in words, without navigation of what is not there", async () => {
-  for (const address of ["/maps", "/help", "/tokens", "/map/x", "/maps/%E0%A4%A"]) {
+  for (const address of ["/maps", "/wiki", "/tokens", "/map/x", "/maps/%E0%A4%A"]) {
     const page = await go(address);
     await page.getByRole("heading", { name: "There is no such page" }).waitFor({ timeout: 10_000 });
     await page.getByRole("link", { name: "All maps" }).click();
@@ -227,13 +199,13 @@ test("addresses that are none say so in words, without navigation of what is not
 
 test("a viewer who opens what he may not do is told so", async () => {
   const { text } = await api("POST", "/tokens", { name: "onlooker", role: "viewer" });
-  const guest = await guestOf(its, server);
-  const page = await open(guest, server.origin, "/maps/hall/teach");
+  const guest = await guestOf(world);
+  const page = await open(guest, world.origin, "/maps/hall/teach");
   await page.getByLabel("Token").fill(text);
   await page.getByRole("button", { name: "Sign in" }).click();
   await page.getByText("onlooker · viewer").first().waitFor();
   for (const [address, role] of [["/maps/hall/teach", "teacher"], ["/maps/hall/gather", "teacher"]]) {
-    await page.goto(`${server.origin}${address}`);
+    await page.goto(`${world.origin}${address}`);
     await page.getByText(`This page needs the role ${role}. You are signed in as onlooker, viewer.`).waitFor({ timeout: 10_000 });
     assert.equal(await page.locator("input[type=file]").count(), 0);
   }
@@ -245,7 +217,7 @@ test("a phone shows long words, every value of a table and its buttons, and the 
   const page = await go("/", PHONE);
   await page.getByRole("link", { name: "hall", exact: true }).waitFor();
   await check(page, "long-building-phone");
-  await page.goto(`${server.origin}/robots`);
+  await page.goto(`${world.origin}/robots`);
   const remove = page.getByRole("button", { name: "Remove mower" });
   await remove.waitFor();
   const inside = async (locator) => {
@@ -255,7 +227,7 @@ test("a phone shows long words, every value of a table and its buttons, and the 
   assert.ok(await inside(remove), "the button is in sight");
   assert.ok(await inside(page.getByRole("cell", { name: "none yet" })), "so is the last landmark");
   await check(page, "robots-cards-phone");
-  await page.goto(`${server.origin}/maps/hall`);
+  await page.goto(`${world.origin}/maps/hall`);
   const floor = page.getByRole("application");
   await floor.waitFor();
   const { y } = await floor.boundingBox();
@@ -267,7 +239,7 @@ test("a floor plan that is saved is shown whole, and its form is closed", async 
   await api("POST", "/maps", { name: "fitted" });
   const page = await go("/maps/fitted?view=0,0,0.02,0");
   await page.getByRole("button", { name: "Floor plan" }).click();
-  await page.getByLabel("Picture (PNG or JPEG)").setInputFiles({ name: "plan.png", mimeType: "image/png", buffer: await planPng(page) });
+  await page.getByLabel("Picture (PNG or JPEG)").setInputFiles({ name: "plan.png", mimeType: "image/png", buffer: await roomPlan(world) });
   await page.getByLabel("A length in the picture, pixels").fill("360");
   await page.getByLabel("The same length on the floor, metres").fill("18");
   await page.getByRole("button", { name: "Save the floor plan" }).click();
@@ -302,7 +274,7 @@ test("a printed map has the names of its landmarks", async () => {
 test("the licences that the pages lead to are those of what is bundled", async () => {
   const page = await go("/admin");
   await page.getByRole("link", { name: "Licences" }).waitFor();
-  const served = await (await its.context.request.get(`${server.origin}/licences.txt`)).text();
+  const served = await (await world.context.request.get(`${world.origin}/licences.txt`)).text();
   const { dependencies } = JSON.parse(readFileSync(new URL("../../package.json", import.meta.url), "utf8"));
   for (const name of Object.keys(dependencies)) assert.ok(served.includes(`\n${name} `), name);
 });

@@ -2,8 +2,11 @@
 // the console, no request to another origin, nothing serious from axe-core, nothing wider than the screen.
 import assert from "node:assert/strict";
 import { execFile, spawn } from "node:child_process";
-import { mkdirSync, readFileSync } from "node:fs";
+import { existsSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { createRequire } from "node:module";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { after, afterEach, before } from "node:test";
 import { promisify } from "node:util";
 import { chromium } from "playwright-core";
 
@@ -12,12 +15,50 @@ const CHROMIUM = process.env.CHROMIUM ?? "/usr/bin/chromium";
 const OUTPUT = new URL("../output/", import.meta.url).pathname;
 const AXE = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
 const GUIDE = new URL("../../../docs/pictures/pages/", import.meta.url).pathname;
-const PICTURES = ["map-desk", "landmarks-desk", "landmark-desk", "teach", "answer-evidence-desk", "history", "health-desk", "walls-desk", "placing-desk", "connection-lost", "start-desk", "connect-desk"];
+/** The pictures that docs/guides/administrator.md shows. */
+const PICTURES = new Set([...readFileSync(new URL("../../../docs/guides/administrator.md", import.meta.url), "utf8").matchAll(/pictures\/pages\/([a-z-]+)\.webp/g)].map((found) => found[1]));
+/** A picture of the guide has at most so many bytes; its quality is lowered until it has. */
+const MOST_BYTES = 60_000;
 /** Time for anything that a journey waits for, ms: two cores are shared with driving robots. */
 export const SOON = 90_000;
 
 export const DESKTOP = { width: 1280, height: 800 };
 export const PHONE = { width: 390, height: 844 };
+
+/**
+ * What the journeys of a file have: a server of their own, started with a folder, a browser that is signed in, and what `begin`
+ * makes before the first. All of it is ended and removed after the last. Open pages hold streams, and a browser has six
+ * connections to a server: each journey's are closed.
+ */
+export function journeys({ start = plain, begin = async () => {} } = {}) {
+  const world = {
+    /** Asks the API as the page does, with the session of the browser. */
+    api: (...asked) => world.ask(...asked),
+    go: (address, size) => open(world.context, world.origin, address, size),
+  };
+  before(async () => {
+    world.folder = mkdtempSync(join(tmpdir(), "waymark-journeys-"));
+    world.server = await start(world.folder);
+    Object.assign(world, await signedIn(world.server));
+    await begin(world);
+  });
+  after(async () => {
+    await world.close?.();
+    await world.server?.stop();
+    if (world.folder) rmSync(world.folder, { recursive: true, force: true });
+  });
+  afterEach(() => Promise.all(world.context.pages().map((page) => page.close())));
+  return world;
+}
+
+/** A server without robots. */
+export const plain = (folder, ...args) => serve("--data", join(folder, "data"), "--zenoh", "tcp/127.0.0.1:0", ...args);
+
+/** A browser of a server: its address, how it asks the API, and how it is closed. */
+export async function signedIn(server) {
+  const its = await browser(server);
+  return { origin: server.origin, context: its.context, close: its.close, ask: asker(its, server) };
+}
 
 /** Starts `waymark demo --stay`: a corridor whose posters are taught, and robots that drive. */
 export async function demo() {
@@ -92,27 +133,32 @@ export async function browser({ link, origin }) {
 }
 
 /** Another browser of the same server, in which nobody is signed in. */
-export async function guestOf({ context }, { origin }) {
+export async function guestOf({ context, origin }) {
   const guest = await context.browser().newContext({ viewport: DESKTOP, baseURL: origin, ignoreHTTPSErrors: true });
   if (process.env.WAYMARK_PAGES) await replaced(guest, process.env.WAYMARK_PAGES);
   return guest;
 }
 
-/** Takes the pages from a folder (`dist`) instead of those in the program: while pages are changed, that spares building it. */
+/** Takes the pages from a folder (`dist`), and the guides from docs, instead of those in the program: while pages are changed, that spares building it. */
 async function replaced(context, folder) {
   const kinds = { js: "text/javascript", css: "text/css" };
   await context.route(({ pathname }) => pathname.startsWith("/assets/"), (route) => {
     const { pathname } = new URL(route.request().url());
     return route.fulfill({ body: readFileSync(folder + pathname), contentType: kinds[pathname.split(".").at(-1)] });
   });
-  await context.route(({ pathname }) => !/^\/(assets|api|open|icon)/.test(pathname), async (route) => {
+  await context.route(({ pathname }) => pathname.startsWith("/guides/"), (route) => {
+    const name = new URL(route.request().url()).pathname.replace("/guides/", "");
+    const [file] = [`guides/${name}`, name].map((path) => new URL(`../../../docs/${path}`, import.meta.url)).filter(existsSync);
+    return file ? route.fulfill({ body: readFileSync(file), contentType: "text/markdown; charset=utf-8" }) : route.fulfill({ status: 404 });
+  });
+  await context.route(({ pathname }) => !/^\/(assets|api|open|icon|guides)/.test(pathname), async (route) => {
     const headers = (await route.fetch()).headers();
     return route.fulfill({ body: readFileSync(`${folder}/index.html`), headers });
   });
 }
 
 /** A map `hall` without robots: two walls and a landmark that is learnt of one picture. */
-export async function hall({ context }, { origin }, api) {
+export async function hall({ context, origin, api }) {
   await api("POST", "/maps", { name: "hall" });
   await api("PUT", "/maps/hall/walls", { segments: [{ a: [-4, 2], b: [4, 2] }, { a: [-4, -2], b: [4, -2] }] }, { "if-match": "*" });
   const page = await context.newPage();
@@ -148,6 +194,30 @@ export const uploaded = (context, origin, landmark, buffer, parts = {}) =>
     headers: { "x-waymark-page": "1" },
     multipart: { image: { name: "photo.png", mimeType: "image/png", buffer }, ...parts },
   });
+
+/** A floor plan of 20 m by 12 m: a room, its outline drawn 1 m inside of the picture. */
+export async function roomPlan({ context, origin }) {
+  const page = await context.newPage();
+  await page.goto(origin);
+  const base64 = await page.evaluate(() => {
+    const canvas = Object.assign(document.createElement("canvas"), { width: 400, height: 240 });
+    const pen = canvas.getContext("2d");
+    pen.fillStyle = "#fff";
+    pen.fillRect(0, 0, 400, 240);
+    pen.lineWidth = 4;
+    pen.strokeRect(20, 20, 360, 200);
+    return canvas.toDataURL("image/png").split(",")[1];
+  });
+  await page.close();
+  return Buffer.from(base64, "base64");
+}
+
+/** Lays a plan of 5 cm a pixel beneath a map. */
+export async function layPlan({ context, origin }, map, buffer, [x_m, y_m] = ["0", "0"]) {
+  const multipart = { image: { name: "plan.png", mimeType: "image/png", buffer }, metres_per_pixel: "0.05", x_m, y_m };
+  const answer = await context.request.put(`${origin}/api/v1/maps/${map}/underlay`, { headers: { "x-waymark-page": "1", "if-match": "*" }, multipart });
+  assert.ok(answer.ok(), await answer.text());
+}
 
 /** How many pixels of a part of a page have about this colour, [r, g, b]. */
 export async function pixels(part, colour) {
@@ -222,7 +292,21 @@ export async function check(page, name) {
   assert.ok(beyond <= 0, `${name} is ${beyond} px wider than the screen`);
   mkdirSync(OUTPUT, { recursive: true });
   await page.screenshot({ path: `${OUTPUT}${name}.png` });
-  // The pictures of docs/guides/administrator.md, when they are to be made anew.
-  if (process.env.WAYMARK_PICTURES && PICTURES.includes(name)) await page.screenshot({ path: `${GUIDE}${name}.png` });
+  // They are made anew by `npm run pictures`.
+  if (process.env.WAYMARK_PICTURES && PICTURES.has(name)) await picture(page, `${GUIDE}${name}.webp`);
   assert.deepEqual(page.faults, [], `faults of ${name}`);
+}
+
+/** Keeps a small picture of what is in sight. */
+async function picture(page, file) {
+  mkdirSync(GUIDE, { recursive: true });
+  const cdp = await page.context().newCDPSession(page);
+  for (let quality = 80; quality > 0; quality -= 15) {
+    const { data } = await cdp.send("Page.captureScreenshot", { format: "webp", quality });
+    const bytes = Buffer.from(data, "base64");
+    if (bytes.length > MOST_BYTES) continue;
+    writeFileSync(file, bytes);
+    return;
+  }
+  assert.fail(`${file} has more than ${MOST_BYTES} bytes`);
 }

@@ -1,22 +1,11 @@
 // Journeys of landmarks: found, taught, gathered, changed, drafted; why a robot was told what it was told; and every page in
 // dark and light.
 import assert from "node:assert/strict";
-import { after, afterEach, before, test } from "node:test";
-import { PHONE, asker, browser, check, demo, eventually, open } from "./harness.js";
+import { test } from "node:test";
+import { PHONE, check, demo, eventually, journeys } from "./harness.js";
 
-let server, its, api;
-before(async () => {
-  server = await demo();
-  its = await browser(server);
-  api = asker(its, server);
-});
-after(async () => {
-  await its?.close();
-  await server?.stop();
-});
-afterEach(() => Promise.all(its.context.pages().map((page) => page.close())));
-
-const go = (address, size) => open(its.context, server.origin, address, size);
+const world = journeys({ start: demo });
+const { api, go } = world;
 const MAP = "corridor";
 const landmarksOf = async () => (await api("GET", `/maps/${MAP}/landmarks`)).items;
 
@@ -107,7 +96,7 @@ test("a landmark is taught by a robot's frame, learnt and tried", async () => {
   await api("POST", "/maps", { name: "school" });
   const [robot] = (await api("GET", "/robots")).items;
   const camera = (await api("GET", `/robots/${robot.name}/cameras`)).cameras[0].name;
-  const frame = await its.context.request.get(`${server.origin}/api/v1/robots/${robot.name}/cameras/${camera}/frame`);
+  const frame = await world.context.request.get(`${world.origin}/api/v1/robots/${robot.name}/cameras/${camera}/frame`);
   const file = { name: "frame.jpg", mimeType: frame.headers()["content-type"], buffer: await frame.body() };
   const page = await go("/maps/school/teach");
   await page.locator("input[type=file]").first().setInputFiles(file);
@@ -124,7 +113,7 @@ test("a landmark is taught by a robot's frame, learnt and tried", async () => {
   await page.getByRole("button", { name: "Learn window" }).click();
   await page.getByText(/window is learnt/).waitFor();
   await page.getByLabel("Photograph to try").setInputFiles(file);
-  await page.getByRole("list", { name: "Quads" }).getByRole("listitem").first().waitFor();
+  await page.getByRole("list", { name: "Outlines" }).getByRole("listitem").first().waitFor();
   assert.deepEqual(page.faults, []);
   const landmark = await api("GET", "/maps/school/landmarks/window");
   assert.equal(landmark.views, 1);
@@ -138,17 +127,17 @@ test("candidates appear while a robot drives, and are named, accepted or thrown 
   await page.goto(`/maps/${MAP}/gather`);
   await page.getByLabel("Robot").selectOption(robot);
   await page.getByLabel("also further views of known landmarks").check();
-  await page.getByRole("button", { name: "Begin to gather" }).click();
+  await page.getByRole("button", { name: "Begin to collect" }).click();
   await page.getByRole("article", { name: /Candidate \d+/ }).first().waitFor();
   await page.getByRole("button", { name: "Stop" }).click();
-  await page.getByRole("button", { name: "Begin to gather" }).waitFor();
+  await page.getByRole("button", { name: "Begin to collect" }).waitFor();
   await page.getByRole("button", { name: /Take the name/ }).first().click();
   await check(page, "gather");
   await page.getByRole("button", { name: "Accept what is named, and learn" }).click();
   await page.getByText("1 landmark accepted and learnt.").waitFor();
   await page.getByRole("button", { name: "Throw everything away" }).click();
   await page.getByRole("dialog").getByRole("button", { name: "Throw away" }).click();
-  await page.getByText("The gathering is thrown away.").waitFor();
+  await page.getByText("What was collected is thrown away.").waitFor();
   assert.deepEqual(page.faults, []);
 });
 
@@ -187,7 +176,7 @@ for (const [size, where] of [[undefined, "desk"], [PHONE, "phone"]]) {
     const name = found.summary.landmarks[0] ?? (await landmarksOf())[0].name;
     const page = await go(`/maps/${MAP}/landmarks/${name}`, size);
     await page.getByText("Details: how well it is told apart").click();
-    const drawing = page.getByRole("img", { name: new RegExp(`^Stored answers of the last 24 hours by hour: [1-9]\\d* name ${name}, \\d+ only compared with it`) });
+    const drawing = page.getByRole("img", { name: new RegExp(`^Stored answers of the last 24 hours by hour: [1-9]\\d* name ${name}, \\d+ have seen it unconfirmed`) });
     await drawing.waitFor();
     assert.equal(await drawing.locator("rect.named").count(), 24);
     const heights = await drawing.locator("rect.named").evaluateAll((bars) => bars.map((bar) => Number(bar.getAttribute("height"))));
@@ -206,7 +195,7 @@ test("candidates say what view is missing, and what to do", async () => {
   const tracks = async () => (await api("GET", `/maps/${MAP}/gatherings/${id}/tracks`)).tracks;
   await eventually("candidate that is not good enough", async () => (await tracks()).some(({ passes, failed_gates }) => !passes && failed_gates.length));
   await page.getByRole("button", { name: "Stop" }).click();
-  await page.getByRole("button", { name: "Begin to gather" }).waitFor();
+  await page.getByRole("button", { name: "Begin to collect" }).waitFor();
   const track = (await tracks()).find(({ passes, failed_gates }) => !passes && failed_gates.length);
   const card = page.getByRole("article", { name: `Candidate ${track.number}`, exact: true });
   for (const { sentence, advice } of track.failed_gates) await card.getByText(`${sentence} ${advice}`).waitFor();
@@ -218,7 +207,7 @@ test("a gathering is thrown away only after a question", async () => {
   const [{ name: robot }] = (await api("GET", "/robots")).items;
   const page = await go(`/maps/${MAP}/gather`);
   await page.getByLabel("Robot").selectOption(robot);
-  await page.getByRole("button", { name: "Begin to gather" }).click();
+  await page.getByRole("button", { name: "Begin to collect" }).click();
   await page.getByRole("button", { name: "Stop" }).click();
   await page.getByRole("button", { name: "Throw everything away" }).click();
   await page.keyboard.press("Escape");
@@ -226,7 +215,7 @@ test("a gathering is thrown away only after a question", async () => {
   assert.equal((await api("GET", `/maps/${MAP}/gatherings`)).items.length, 1, "nothing is lost without an answer");
   await page.getByRole("button", { name: "Throw everything away" }).click();
   await page.getByRole("dialog").getByRole("button", { name: "Throw away" }).click();
-  await page.getByText("The gathering is thrown away.").waitFor();
+  await page.getByText("What was collected is thrown away.").waitFor();
   assert.equal((await api("GET", `/maps/${MAP}/gatherings`)).items.length, 0);
 });
 
@@ -240,7 +229,7 @@ test("every page is readable in dark and in light", async () => {
     for (const address of pages) {
       const page = await go("about:blank");
       await page.emulateMedia({ colorScheme });
-      await page.goto(`${server.origin}${address}`);
+      await page.goto(`${world.origin}${address}`);
       await page.getByRole("heading", { level: 1 }).first().waitFor();
       await page.waitForFunction(() => !document.querySelector(".loading"));
       await check(page, `${colorScheme}${address.replace(String(id), "one").replace(robot, "one").replace(landmark, "one").replaceAll("/", "-")}`);

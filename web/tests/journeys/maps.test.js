@@ -1,24 +1,11 @@
 // Journeys on a map of a running server: its view, its tools, its settings; at a desk and on a phone.
 import assert from "node:assert/strict";
 import { readFile } from "node:fs/promises";
-import { after, afterEach, before, test } from "node:test";
-import { PHONE, SOON, asker, browser, check, demo, open } from "./harness.js";
+import { test } from "node:test";
+import { PHONE, SOON, check, demo, journeys } from "./harness.js";
 
-let server, its, api;
-before(async () => {
-  server = await demo();
-  its = await browser(server);
-  api = asker(its, server);
-});
-after(async () => {
-  await its?.close();
-  await server?.stop();
-});
-
-// Open pages hold streams, and a browser has six connections to a server.
-afterEach(() => Promise.all(its.context.pages().map((page) => page.close())));
-
-const go = (address, size) => open(its.context, server.origin, address, size);
+const world = journeys({ start: demo });
+const { api, go } = world;
 /** The name of the demo's map. */
 const MAP = "corridor";
 

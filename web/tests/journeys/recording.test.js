@@ -2,35 +2,25 @@
 // is told from one that drives.
 import assert from "node:assert/strict";
 import { spawn } from "node:child_process";
-import { mkdtempSync, rmSync, statSync } from "node:fs";
-import { tmpdir } from "node:os";
+import { statSync } from "node:fs";
 import { join } from "node:path";
-import { after, afterEach, before, test } from "node:test";
-import { PHONE, PROGRAM, SOON, asker, browser, check, clean, eventually, hall, open, run, serve } from "./harness.js";
+import { after, test } from "node:test";
+import { PHONE, PROGRAM, SOON, check, clean, eventually, hall, journeys, run } from "./harness.js";
 
-let folder, server, its, api, player;
-before(async () => {
-  folder = mkdtempSync(join(tmpdir(), "waymark-recording-"));
-  await run(["demo", "--record", join(folder, "drive.mcap"), "--robots", "1", "--legs", "1", "--rate-hz", "1", "--http", "127.0.0.1:0"], { timeout: 4 * SOON });
-  server = await serve("--data", join(folder, "data"), "--zenoh", "tcp/127.0.0.1:0");
-  its = await browser(server);
-  api = asker(its, server);
-  await hall(its, server, api);
+let player;
+after(() => player?.kill("SIGKILL"));
+const world = journeys({
+  begin: async () => {
+    await run(["demo", "--record", join(world.folder, "drive.mcap"), "--robots", "1", "--legs", "1", "--rate-hz", "1", "--http", "127.0.0.1:0"], { timeout: 4 * SOON });
+    await hall(world);
+  },
 });
-after(async () => {
-  player?.kill("SIGKILL");
-  await its?.close();
-  await server?.stop();
-  if (folder) rmSync(folder, { recursive: true, force: true });
-});
-afterEach(() => Promise.all(its.context.pages().map((page) => page.close())));
-
-const go = (address, size) => open(its.context, server.origin, address, size);
-const at = () => ["--server", server.origin, "--zenoh", server.robots];
+const { api, go } = world;
+const at = () => ["--server", world.origin, "--zenoh", world.server.robots];
 
 /** Replays the drive as this robot, until it is killed. */
 async function replay(robot) {
-  player = spawn(PROGRAM, ["replay", join(folder, "drive.mcap"), "--robot", robot, "--map", "hall", "--speed", "1", ...at()], { stdio: "ignore", env: clean() });
+  player = spawn(PROGRAM, ["replay", join(world.folder, "drive.mcap"), "--robot", robot, "--map", "hall", "--speed", "1", ...at()], { stdio: "ignore", env: clean() });
   await eventually("robot that replays", async () => (await api("GET", "/robots")).items.some(({ name, activity }) => name === robot && activity));
   // It has a pose once a person has told it one: on this map it recognises nothing.
   await eventually("pose", async () => {
@@ -44,16 +34,16 @@ test("the page's commands record a drive as MCAP, and can be copied", async () =
   const page = await go("/robots/recorded");
   const card = page.getByRole("region", { name: "Record and replay a drive" });
   const command = await card.getByText(/^waymark record /).textContent();
-  assert.equal(command, `waymark record recorded.mcap --robot recorded --server ${server.origin}`);
-  await its.context.grantPermissions(["clipboard-read", "clipboard-write"], { origin: server.origin });
+  assert.equal(command, `waymark record recorded.mcap --robot recorded --server ${world.origin}`);
+  await world.context.grantPermissions(["clipboard-read", "clipboard-write"], { origin: world.origin });
   await card.getByRole("button", { name: "Copy: The command that records" }).click();
   await page.getByText("The command that records is copied.").waitFor();
   assert.equal(await page.evaluate(() => navigator.clipboard.readText()), command);
-  await run([...command.split(" ").slice(1), "--zenoh", server.robots, "--seconds", "2"], { cwd: folder });
-  assert.ok(statSync(join(folder, "recorded.mcap")).size > 1000);
+  await run([...command.split(" ").slice(1), "--zenoh", world.server.robots, "--seconds", "2"], { cwd: world.folder });
+  assert.ok(statSync(join(world.folder, "recorded.mcap")).size > 1000);
   const replayed = await card.getByText(/^waymark replay .* --map hall --server \S+$/).textContent();
   player.kill("SIGKILL");
-  const { stdout } = await run([...replayed.split(" ").slice(1), "--zenoh", server.robots, "--json"], { cwd: folder });
+  const { stdout } = await run([...replayed.split(" ").slice(1), "--zenoh", world.server.robots, "--json"], { cwd: world.folder });
   assert.ok(JSON.parse(stdout), stdout);
   assert.ok((await api("GET", "/robots")).items.some(({ name }) => name === "replay"));
   await check(page, "record-robot");
@@ -68,7 +58,7 @@ for (const [size, where] of [[undefined, "desk"], [PHONE, "phone"]]) {
     await row.getByText("Live", { exact: true }).waitFor();
     await row.getByText(/pose (now|2 s ago)/).waitFor();
     player.kill("SIGKILL");
-    await row.getByText("No fresh pose", { exact: true }).or(row.getByText("Not connected", { exact: true })).first().waitFor();
+    await row.getByText("No fresh position", { exact: true }).or(row.getByText("Not connected", { exact: true })).first().waitFor();
     await row.getByText("Not connected", { exact: true }).waitFor();
     await row.getByText(/pose ([4-9]|[1-9]\d) s ago/).waitFor();
     await check(page, `stale-robot-${where}`);

@@ -1,23 +1,10 @@
 // Journeys about robots, what they were told, and the server, at a desk and on a phone.
 import assert from "node:assert/strict";
-import { after, afterEach, before, test } from "node:test";
-import { PHONE, SOON, asker, browser, check, demo, guestOf, open } from "./harness.js";
+import { test } from "node:test";
+import { PHONE, SOON, check, demo, guestOf, journeys, open } from "./harness.js";
 
-let server, its, api;
-before(async () => {
-  server = await demo();
-  its = await browser(server);
-  api = asker(its, server);
-});
-after(async () => {
-  await its?.close();
-  await server?.stop();
-});
-
-// Open pages hold streams, and a browser has six connections to a server.
-afterEach(() => Promise.all(its.context.pages().map((page) => page.close())));
-
-const go = (address, size) => open(its.context, server.origin, address, size);
+const world = journeys({ start: demo });
+const { api, go } = world;
 /** The name of the demo's map. */
 const MAP = "corridor";
 
@@ -63,7 +50,7 @@ test("where a lost robot may be is listed, and its uncertainty is plotted", asyn
   const hypotheses = [{ probability: 0.6, x_m: 1, y_m: 2, theta_rad: 0 }, { probability: 0.3, x_m: 7, y_m: 2, theta_rad: 1.57 }];
   const lost = () => ({ relocalising: true, hypotheses, entropy_nats: (entropy_nats -= 0.5), sightings: 4, landmarks: [], missing: ["higher_probability"], min_probability: 0.9, map: MAP, map_version: 1 });
   await page.route(`**/api/v1/robots/${robot}/relocalisation`, (route) => route.fulfill({ json: lost() }));
-  await page.goto(`${server.origin}/robots/${robot}`);
+  await page.goto(`${world.origin}/robots/${robot}`);
   const places = page.getByRole("region", { name: "Where it may be" });
   await places.getByText("60 %: x 1.00 m, y 2.00 m, faces 0°").waitFor();
   await places.getByText("It is not sure yet: other places are still too probable.").waitFor();
@@ -94,12 +81,12 @@ test("what is refused of a robot is said, with what to do", async () => {
   const refused = { ...robot, activity: { ...robot.activity, inputs } };
   await page.route(`**/api/v1/robots/${robot.name}`, (route) => route.fulfill({ json: refused }));
   await page.route(/\/api\/v1\/robots(\?.*)?$/, (route) => route.fulfill({ json: { items: [refused] } }));
-  await page.goto(`${server.origin}/robots/${robot.name}`);
+  await page.goto(`${world.origin}/robots/${robot.name}`);
   await page.getByRole("alert").getByText("Laser scans: the last 1,200 were refused. Correct the field.").waitFor();
   await page.getByRole("row", { name: /Laser scans 0 1,200 out_of_range 1,200 times.*bearing_step_rad: the fan is more than a turn Correct the field\./ }).waitFor();
   await page.getByRole("row", { name: "Frames 1,500 0" }).waitFor();
   await check(page, "robot-refused");
-  await page.goto(`${server.origin}/robots`);
+  await page.goto(`${world.origin}/robots`);
   await page.getByRole("cell", { name: /the fan is more than a turn/ }).waitFor();
 });
 
@@ -140,13 +127,13 @@ test("a camera is calibrated from what it has seen, or it is said what is missin
 
 test("a viewer sees no button that may not be pressed, and is refused all the same", async () => {
   const { text } = await api("POST", "/tokens", { name: "guest", role: "viewer" });
-  const guest = await guestOf(its, server);
-  const page = await open(guest, server.origin, "/");
+  const guest = await guestOf(world);
+  const page = await open(guest, world.origin, "/");
   await page.getByLabel("Token").fill(text);
   await page.getByRole("button", { name: "Sign in" }).click();
   await page.getByRole("link", { name: MAP, exact: true }).waitFor();
   for (const name of ["New map", "Delete", "Copy", "Rename"]) assert.equal(await page.getByRole("button", { name }).count(), 0, name);
-  const refused = await guest.request.fetch(`${server.origin}/api/v1/maps`, { method: "POST", headers: { "x-waymark-page": "1" }, data: { name: "mine" } });
+  const refused = await guest.request.fetch(`${world.origin}/api/v1/maps`, { method: "POST", headers: { "x-waymark-page": "1" }, data: { name: "mine" } });
   assert.equal(refused.status(), 403);
   await page.getByRole("button", { name: "Sign out" }).click();
   await page.getByRole("heading", { name: "Sign in to Waymark" }).waitFor();

@@ -1,33 +1,25 @@
 // Journeys to how the server is: healthy, without room, without its router, not ready; several servers; what has happened.
 import assert from "node:assert/strict";
-import { mkdtempSync, rmSync, writeFileSync } from "node:fs";
-import { tmpdir } from "node:os";
+import { writeFileSync } from "node:fs";
 import { join } from "node:path";
-import { after, afterEach, before, test } from "node:test";
-import { PHONE, asker, browser, check, eventually, hall, open, serve } from "./harness.js";
+import { after, test } from "node:test";
+import { PHONE, check, eventually, hall, journeys, open, serve, signedIn } from "./harness.js";
 
-let folder, server, its, api;
-const started = [];
-/** A server with a folder of its own, and a browser that is signed in. */
-async function another(name, ...args) {
-  const made = await serve("--data", join(folder, name), ...(args.includes("--router") ? [] : ["--zenoh", "tcp/127.0.0.1:0"]), ...args);
-  started.push(made.stop);
-  const browsing = await browser(made);
-  started.push(browsing.close);
-  return { server: made, its: browsing, api: asker(browsing, made), go: (address, size) => open(browsing.context, made.origin, address, size) };
-}
-before(async () => {
-  folder = mkdtempSync(join(tmpdir(), "waymark-server-"));
-  ({ server, its, api } = await another("data"));
-  await hall(its, server, api);
-});
+/** What ends the further servers: before the folder is removed. */
+const others = [];
 after(async () => {
-  for (const end of started.reverse()) await end();
-  if (folder) rmSync(folder, { recursive: true, force: true });
+  for (const end of others.reverse()) await end();
 });
-afterEach(() => Promise.all(its.context.pages().map((page) => page.close())));
-
-const go = (address, size) => open(its.context, server.origin, address, size);
+const world = journeys({ begin: async () => void (await hall(world)) });
+const { api, go } = world;
+/** A further server with a folder of its own, and a browser that is signed in. */
+async function another(name, ...args) {
+  const server = await serve("--data", join(world.folder, name), ...(args.includes("--router") ? [] : ["--zenoh", "tcp/127.0.0.1:0"]), ...args);
+  others.push(server.stop);
+  const its = await signedIn(server);
+  others.push(its.close);
+  return { api: its.ask, go: (address, size) => open(its.context, its.origin, address, size) };
+}
 const health = (page) => page.locator("section.card").filter({ has: page.locator("#health-title") });
 
 for (const [size, where] of [[undefined, "desk"], [PHONE, "phone"]]) {
@@ -47,7 +39,7 @@ for (const [size, where] of [[undefined, "desk"], [PHONE, "phone"]]) {
     // A part that stands still cannot be had of a server that is to answer: its answer is given here.
     const problem = { type: "/problems/part_stalled", title: "Service Unavailable", status: 503, code: "part_stalled", detail: "the writer of the store has not gone on for 7 s; after 15 s the server ends with an error", part: "the writer of the store" };
     await page.route("**/api/v1/readyz", (route) => route.fulfill({ status: 503, contentType: "application/problem+json", body: JSON.stringify(problem) }));
-    await page.goto(`${server.origin}/admin`);
+    await page.goto(`${world.origin}/admin`);
     await health(page).getByText("Not ready", { exact: true }).waitFor();
     const fault = page.getByRole("list", { name: "What is wrong" }).getByRole("listitem");
     assert.equal(await fault.count(), 1);
@@ -58,7 +50,7 @@ for (const [size, where] of [[undefined, "desk"], [PHONE, "phone"]]) {
 }
 
 test("a disk without room is told with an advice, and learning is refused", async () => {
-  const settings = join(folder, "full.toml");
+  const settings = join(world.folder, "full.toml");
   writeFileSync(settings, "[limits]\ndisk_percent = 1\ndisk_spare_bytes = 1000000000000000\n");
   const { go, api } = await another("full", "--config", settings);
   const page = await go("/admin");
@@ -73,7 +65,7 @@ test("a disk without room is told with an advice, and learning is refused", asyn
 
 test("a server without its router says so, and two servers of one router are listed with their maps", async () => {
   // A server that joins no router is one itself.
-  const router = server.robots;
+  const router = world.server.robots;
   const first = await another("first", "--server-name", "hall-server", "--router", router);
   await first.api("POST", "/maps", { name: "east" });
   const second = await another("second", "--server-name", "annex-server", "--router", router);
@@ -107,8 +99,8 @@ for (const [size, where] of [[undefined, "desk"], [PHONE, "phone"]]) {
     const at = (text) => texts.findIndex((row) => row.includes(text));
     assert.ok(at(`The map ${name}`) >= 0 && at(`The map ${name}`) < at("The landmark poster of hall was added."), texts.join("\n"));
     // Cut off for a while, it goes on where it was.
-    await its.context.setOffline(true);
-    await its.context.setOffline(false);
+    await world.context.setOffline(true);
+    await world.context.setOffline(false);
     await api("POST", `/maps/${name}/landmarks`, { name: "door" });
     await page.getByText(`The landmark door of ${name} was added.`).waitFor();
     assert.equal(await page.getByText(`The landmark door of ${name} was added.`).count(), 1);

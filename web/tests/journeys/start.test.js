@@ -1,27 +1,11 @@
 // Journeys on the first page and to a first robot: a checklist on an empty server, maps and fleet at a glance, what needs
 // somebody, and how a new robot is connected.
 import assert from "node:assert/strict";
-import { mkdtempSync, rmSync } from "node:fs";
-import { tmpdir } from "node:os";
-import { join } from "node:path";
-import { after, afterEach, before, test } from "node:test";
-import { PHONE, asker, browser, check, hall, open, serve } from "./harness.js";
+import { test } from "node:test";
+import { PHONE, check, hall, journeys } from "./harness.js";
 
-let folder, server, its, api;
-before(async () => {
-  folder = mkdtempSync(join(tmpdir(), "waymark-start-"));
-  server = await serve("--data", folder, "--zenoh", "tcp/127.0.0.1:0");
-  its = await browser(server);
-  api = asker(its, server);
-});
-after(async () => {
-  await its?.close();
-  await server?.stop();
-  if (folder) rmSync(folder, { recursive: true, force: true });
-});
-afterEach(() => Promise.all(its.context.pages().map((page) => page.close())));
-
-const go = (address, size) => open(its.context, server.origin, address, size);
+const world = journeys();
+const { api, go } = world;
 
 test("an empty server leads step by step to the first position", async () => {
   const page = await go("/");
@@ -31,14 +15,14 @@ test("an empty server leads step by step to the first position", async () => {
   await page.getByRole("dialog").getByLabel("Name").fill("hall");
   await page.getByRole("button", { name: "Create" }).click();
   await page.getByRole("heading", { name: "hall", level: 1 }).waitFor();
-  await page.goto(server.origin);
+  await page.goto(world.origin);
   await page.getByText("1 of 7 done").waitFor();
   await page.getByRole("link", { name: "Do it" }).click();
   await page.getByRole("button", { name: "Floor plan" }).waitFor();
   await api("DELETE", "/maps/hall", undefined, { "if-match": "*" });
-  await hall(its, server, api);
+  await hall(world);
   // Walls without a plan need none, and the landmark is learnt and placed.
-  await page.goto(server.origin);
+  await page.goto(world.origin);
   await page.getByText("5 of 7 done").waitFor();
   const next = page.getByRole("listitem").filter({ has: page.getByRole("link", { name: "Do it" }) });
   assert.match(await next.textContent(), /Register a robot, and connect it/);
@@ -60,7 +44,7 @@ for (const [size, where] of [[undefined, "desk"], [PHONE, "phone"]]) {
     await robots.getByText("0 of 1").first().waitFor();
     const needs = page.getByRole("region", { name: "Needs attention" });
     await needs.getByText("1 landmark of hall: out of use.").waitFor();
-    await check(page, `start-${where}`);
+    await check(page, `needs-attention-${where}`);
     await needs.getByRole("link", { name: /Look: 1 landmark of hall/ }).click();
     await page.waitForURL(/maps\/hall\?.*state=quarantined/);
     const list = page.getByRole("region", { name: "Landmarks", exact: true });

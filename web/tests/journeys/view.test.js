@@ -1,27 +1,14 @@
 // Journeys to the view of a map, without robots: turned, zoomed by two fingers, its layers in another order, its floor plan.
 import assert from "node:assert/strict";
-import { mkdtempSync, rmSync } from "node:fs";
-import { tmpdir } from "node:os";
-import { join } from "node:path";
-import { after, afterEach, before, test } from "node:test";
-import { PHONE, asker, browser, check, hall, open, pixels, serve } from "./harness.js";
+import { test } from "node:test";
+import { PHONE, check, hall, journeys, layPlan, pixels } from "./harness.js";
 
-let folder, server, its, api;
-before(async () => {
-  folder = mkdtempSync(join(tmpdir(), "waymark-view-"));
-  server = await serve("--data", folder, "--zenoh", "tcp/127.0.0.1:0");
-  its = await browser(server);
-  api = asker(its, server);
-  await hall(its, server, api);
+const world = journeys({
+  begin: async () => {
+    await hall(world);
+  },
 });
-after(async () => {
-  await its?.close();
-  await server?.stop();
-  if (folder) rmSync(folder, { recursive: true, force: true });
-});
-afterEach(() => Promise.all(its.context.pages().map((page) => page.close())));
-
-const go = (address, size) => open(its.context, server.origin, address, size);
+const { api, go } = world;
 const MAP = "hall";
 /** Metres in a pixel of the view that the address holds. */
 const resolution = (page) => Number(new URL(page.url()).searchParams.get("view")?.split(",")[2]);
@@ -34,9 +21,7 @@ async function plan(page) {
     pen.fillRect(0, 0, 200, 120);
     return canvas.toDataURL("image/png").split(",")[1];
   });
-  const multipart = { image: { name: "plan.png", mimeType: "image/png", buffer: Buffer.from(png, "base64") }, metres_per_pixel: "0.05", x_m: "-5", y_m: "-3" };
-  const answer = await its.context.request.put(`${server.origin}/api/v1/maps/${MAP}/underlay`, { headers: { "x-waymark-page": "1", "if-match": "*" }, multipart });
-  assert.ok(answer.ok(), await answer.text());
+  await layPlan(world, MAP, Buffer.from(png, "base64"), ["-5", "-3"]);
 }
 
 test("a map is turned, its layers fade, and the view is in the address", async () => {
@@ -118,7 +103,7 @@ test("two fingers zoom the map on a phone", async () => {
   await canvas.evaluate((floor) => floor.scrollIntoView({ block: "center" }));
   const box = await canvas.boundingBox();
   const [x, y] = [box.x + box.width / 2, box.y + box.height / 2];
-  const cdp = await its.context.newCDPSession(page);
+  const cdp = await world.context.newCDPSession(page);
   await cdp.send("Emulation.setTouchEmulationEnabled", { enabled: true, maxTouchPoints: 2 });
   const scrolled = await page.evaluate(() => scrollY);
   const fingers = (apart) => [{ x: x - apart, y, id: 0 }, { x: x + apart, y, id: 1 }];

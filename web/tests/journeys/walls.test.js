@@ -1,47 +1,17 @@
 // Journeys from a floor plan to walls and to the first placed landmark: walls are traced, moved, removed, offered of the plan.
 import assert from "node:assert/strict";
-import { mkdtempSync, rmSync } from "node:fs";
-import { tmpdir } from "node:os";
-import { join } from "node:path";
-import { after, afterEach, before, test } from "node:test";
-import { PHONE, asker, browser, check, open, serve } from "./harness.js";
+import { test } from "node:test";
+import { PHONE, check, eventually, journeys, layPlan, pixels, roomPlan } from "./harness.js";
 
-let folder, server, its, api;
-before(async () => {
-  folder = mkdtempSync(join(tmpdir(), "waymark-walls-"));
-  server = await serve("--data", folder, "--zenoh", "tcp/127.0.0.1:0");
-  its = await browser(server);
-  api = asker(its, server);
-});
-after(async () => {
-  await its?.close();
-  await server?.stop();
-  if (folder) rmSync(folder, { recursive: true, force: true });
-});
-afterEach(() => Promise.all(its.context.pages().map((page) => page.close())));
-
-const go = (address, size) => open(its.context, server.origin, address, size);
+const world = journeys();
+const { api, go } = world;
 const wallsOf = async (map) => (await api("GET", `/maps/${map}/walls`)).segments;
 
-/** A map with a plan of 20 m by 12 m: a room, its outline drawn 1 m inside of the picture, and a landmark without a place. */
+/** A map with the plan of a room, and a landmark without a place. */
 async function planned(map) {
   await api("POST", "/maps", { name: map });
   await api("POST", `/maps/${map}/landmarks`, { name: "sign", size: { width_m: 0.6, height_m: 0.8 } });
-  const page = await its.context.newPage();
-  await page.goto(server.origin);
-  const base64 = await page.evaluate(() => {
-    const canvas = Object.assign(document.createElement("canvas"), { width: 400, height: 240 });
-    const pen = canvas.getContext("2d");
-    pen.fillStyle = "#fff";
-    pen.fillRect(0, 0, 400, 240);
-    pen.lineWidth = 4;
-    pen.strokeRect(20, 20, 360, 200);
-    return canvas.toDataURL("image/png").split(",")[1];
-  });
-  await page.close();
-  const multipart = { image: { name: "plan.png", mimeType: "image/png", buffer: Buffer.from(base64, "base64") }, metres_per_pixel: "0.05", x_m: "0", y_m: "0" };
-  const answer = await its.context.request.put(`${server.origin}/api/v1/maps/${map}/underlay`, { headers: { "x-waymark-page": "1", "if-match": "*" }, multipart });
-  assert.ok(answer.ok(), await answer.text());
+  await layPlan(world, map, await roomPlan(world));
 }
 
 /** Where a point of the floor is on the screen. The view of these journeys has its middle at 10, 6. */
@@ -156,4 +126,103 @@ test("walls that are found in a plan are shown, and stored only when they are ta
   await page.getByText("The walls are saved: 4 drawn or moved").waitFor();
   const walls = await wallsOf("found");
   for (const wanted of [[1, 1, 19, 1], [1, 11, 19, 11], [1, 1, 1, 11], [19, 1, 19, 11]]) assert.ok(walls.some((wall) => near(wall, wanted)), `${wanted} of ${JSON.stringify(walls)}`);
+});
+
+for (const [size, where] of [[undefined, "desk"], [PHONE, "phone"]]) {
+  test(`walls of scans are shown before they replace any, and are taken or given up, at the ${where}`, async () => {
+    const map = `scanned-${where}`;
+    await api("POST", "/maps", { name: map });
+    const old = [{ a: [0, 0], b: [8, 0] }];
+    await api("PUT", `/maps/${map}/walls`, { segments: old }, { "if-match": "*" });
+    await api("PUT", `/robots/sweeper-${where}`, { map });
+    const page = await go(`/maps/${map}/settings?part=scans`, size);
+    // No robot with a laser drives here: what the server says of one is given here. The server's part is tested by
+    // `a_drive_over_zenoh_gives_the_walls_of_its_scan_log`.
+    const found = [[0, 0.1, 8.1, 0.1], [8.1, 0.1, 8.1, 5]].map(([ax, ay, bx, by]) => ({ a: [ax, ay], b: [bx, by], covariance: [1e-6, 0, 1e-4] }));
+    const asked = [];
+    let stage = "mapping";
+    const told = () => ({ map, robot: `sweeper-${where}`, stage, scans: 400, dropped: 0, distance_m: 31.5, ...(stage === "found" && { segments: 2, walls: found }), ...(stage === "done" && { segments: 2 }) });
+    await page.route(new RegExp(`/maps/${map}/mapping(/finish)?(\\?.*)?$`), async (route) => {
+      const request = route.request();
+      const { pathname, search } = new URL(request.url());
+      if (request.method() !== "GET") asked.push(`${request.method()} ${pathname.split("/").at(-1)}${search}`);
+      if (request.method() === "DELETE") return route.fulfill({ status: 204 });
+      if (pathname.endsWith("/finish")) {
+        stage = search ? "found" : "done";
+        if (!search) await api("PUT", `/maps/${map}/walls`, { segments: found }, { "if-match": "*" });
+        return route.fulfill({ status: 202, json: told() });
+      }
+      if (request.method() === "POST") stage = "mapping";
+      return route.fulfill({ json: told() });
+    });
+    const finish = async () => {
+      await page.getByLabel("Robot").selectOption(`sweeper-${where}`);
+      await page.getByRole("button", { name: "Begin to map" }).click();
+      await page.getByRole("button", { name: "Finish" }).click();
+      await page.getByRole("dialog").getByRole("button", { name: "Finish" }).click();
+      await page.getByRole("heading", { name: "2 walls found" }).waitFor();
+    };
+    await finish();
+    await page.getByText(/Dashed: what the scans were taken for\. Plain: the 1 wall of the map, which they replace\. Nothing is replaced so far\./).waitFor();
+    await page.getByRole("application").scrollIntoViewIfNeeded();
+    await page.waitForTimeout(500);
+    assert.ok((await pixels(page.locator(".canvas"), [0xc2, 0x41, 0x0c])) > 100, "what was found is drawn, all of it in sight");
+    await check(page, `walls-of-scans-${where}`);
+    await page.getByRole("button", { name: "Give them up" }).click();
+    await page.getByRole("dialog").getByRole("button", { name: "Give it up" }).click();
+    await page.getByText("The mapping is given up. The map is as it was.").waitFor();
+    assert.deepEqual(await wallsOf(map), old);
+    await finish();
+    await page.getByRole("button", { name: "Replace the walls" }).click();
+    const done = page.getByRole("status").filter({ hasText: "The map has 2 wall segments of these scans." });
+    await done.waitFor();
+    assert.deepEqual(asked, ["POST mapping", "POST finish?hold=true", "DELETE mapping", "POST mapping", "POST finish?hold=true", "POST finish"]);
+    assert.equal((await wallsOf(map)).length, 2);
+    await done.getByRole("button", { name: "Undo" }).click();
+    await eventually("way back", async () => (await wallsOf(map)).length === 1);
+    assert.deepEqual(page.faults, []);
+  });
+}
+
+/** A plan of an L-shaped wall, 5 cm a pixel, whose upright leg leans by 10 degrees. */
+async function leaning(map) {
+  const page = await go("/");
+  const base64 = await page.evaluate(() => {
+    const canvas = Object.assign(document.createElement("canvas"), { width: 400, height: 240 });
+    const pen = canvas.getContext("2d");
+    pen.fillStyle = "#fff";
+    pen.fillRect(0, 0, 400, 240);
+    pen.lineWidth = 4;
+    pen.beginPath();
+    pen.moveTo(60, 200);
+    pen.lineTo(300, 200);
+    pen.moveTo(60, 200);
+    pen.lineTo(60 + 160 * Math.tan(Math.PI / 18), 40);
+    pen.stroke();
+    return canvas.toDataURL("image/png").split(",")[1];
+  });
+  await page.close();
+  await api("POST", "/maps", { name: map });
+  await layPlan(world, map, Buffer.from(base64, "base64"));
+}
+
+test("walls that are traced beside the lines of a plan lie on them, oblique ones too", async () => {
+  await leaning("leaning");
+  const page = await go("/maps/leaning?view=10,6,0.03,0");
+  await page.getByRole("button", { name: "Trace walls" }).click();
+  await page.getByText("Click where a wall begins.").waitFor();
+  const at = await screen(page, 0.03);
+  const [top, right] = [[3 + 8 * Math.tan(Math.PI / 18), 10], [15, 2]];
+  // Each click is 15 cm beside the line.
+  await page.mouse.click(...at(right[0] - 2, right[1] + 0.15));
+  await page.mouse.click(...at(5, 1.85));
+  await page.keyboard.press("Escape");
+  await page.mouse.click(...at(3 + 2 * Math.tan(Math.PI / 18) + 0.15, 4));
+  await page.getByText("Click where the wall ends: lines of the plan, corners and right angles snap.").waitFor();
+  await page.mouse.click(...at(top[0] - 1.5 * Math.tan(Math.PI / 18) + 0.15, top[1] - 1.5));
+  await page.getByRole("button", { name: "Save the walls" }).click();
+  await page.getByText("The walls are saved: 2 drawn").waitFor();
+  const [level, oblique] = await wallsOf("leaning");
+  for (const [x, y] of [level.a, level.b]) assert.ok(Math.abs(y - 2) < 0.03, `${x}, ${y} is on the line`);
+  for (const [x, y] of [oblique.a, oblique.b]) assert.ok(Math.abs(x - 3 - (y - 2) * Math.tan(Math.PI / 18)) < 0.04, `${x}, ${y} is on the line`);
 });

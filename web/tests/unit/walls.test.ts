@@ -1,6 +1,8 @@
 // Drawing walls: what a click snaps to; and the lines of a plan that are offered as walls.
 import { expect, test } from "vitest";
-import { planLines } from "../../src/map/plan-walls";
+import { type Point, crossing } from "../../src/map/geometry";
+import type { PlanInk } from "../../src/map/plan-ink";
+import { lineAt, planLines } from "../../src/map/plan-walls";
 import { WallEditor } from "../../src/map/wall-editor.svelte";
 
 const PX_M = 0.01;
@@ -59,4 +61,45 @@ test("straight lines of a plan are found with their thickness taken out; letters
   fill(120, 40, 40, 40);
   const found = planLines(grey, width, height, 30);
   expect(found).toEqual([{ a: [10, 22], b: [160, 22] }, { a: [12, 20], b: [12, 90] }]);
+});
+
+/** A plan of 2 m by 1 m, 1 cm a pixel. */
+function planOf(draw: (dark: (x: number, y: number) => void) => void): { grey: Uint8Array; width: number; height: number } {
+  const [width, height] = [200, 100];
+  const grey = new Uint8Array(width * height).fill(255);
+  draw((x, y) => (grey[y * width + x] = 0));
+  return { grey, width, height };
+}
+
+test("an oblique line of a plan is followed along its middle, and a crossing, a blot and bare paper are no line", () => {
+  const { grey, width, height } = planOf((dark) => {
+    for (let x = 0; x < 100; x++) for (let k = -2; k <= 2; k++) dark(x, 10 + Math.floor(x / 2) + k);
+    for (let x = 120; x < 150; x++) for (let y = 20; y < 50; y++) dark(x, y);
+    for (let i = 0; i < 60; i++) for (let k = 0; k < 3; k++) [dark(130 + i, 80 + k), dark(160 + k, 55 + (i % 45))];
+  });
+  const found = lineAt(grey, width, height, [50, 40], 12);
+  const [u, v] = found ?? [0, 0];
+  expect(Math.abs(v - (10.5 + u / 2))).toBeLessThan(0.5);
+  // The foot of the perpendicular, so that what is drawn follows the hand.
+  expect(Math.abs((u - 50) * 2 + (v - 40))).toBeLessThan(1);
+  expect(lineAt(grey, width, height, [135, 35], 12)).toBeUndefined();
+  expect(lineAt(grey, width, height, [161, 81], 12)).toBeUndefined();
+  expect(lineAt(grey, width, height, [20, 80], 12)).toBeUndefined();
+});
+
+test("a wall that is drawn beside a line of the plan lies on it, and a right angle that is along it stays square", () => {
+  const ink = { corner: () => undefined, line: ([x, y]: Point): Point | undefined => (Math.abs(y - (1 + 0.02 * x)) < 0.2 ? [x, 1 + 0.02 * x] : undefined), lines: () => [] };
+  const editor = new WallEditor([], "1", ink as unknown as PlanInk);
+  editor.click([0, 1.1], PX_M);
+  expect(editor.from).toEqual([0, 1]);
+  // Far along, the line of the plan is not at a right angle to the axes any more: the plan counts.
+  expect(editor.snapped([5, 1.15], PX_M)).toEqual([5, 1.1]);
+  // Near by, both agree within the thickness of the line.
+  expect(editor.snapped([1, 1.02], PX_M)[1]).toBeCloseTo(1, 12);
+});
+
+test("lines meet in a corner, also where each ends half a thickness before it", () => {
+  expect(crossing([[0, 0], [4, 0]], [[4.05, 0.05], [4.05, 3]], 0.1)).toEqual([4.05, 0]);
+  expect(crossing([[0, 0], [4, 0]], [[4.5, 0.05], [4.5, 3]], 0.1)).toBeUndefined();
+  expect(crossing([[0, 0], [4, 0]], [[0, 1], [4, 1]], 0.1)).toBeUndefined();
 });

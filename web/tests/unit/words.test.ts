@@ -14,8 +14,8 @@ import { robotAge, robotState } from "../../src/words/robots";
 import { stateOf } from "../../src/words/states";
 import { area, proposals } from "../../src/pages/teach/photograph";
 
-/** Operations that change nothing that is kept, or are asked for by programs alone. */
-const WORDLESS = /recognise|localise|visible|coverage|gaze|calibrate|session|replay|recording|mapping|gatherings|jobs|reference-runs|bundle|pose/;
+/** Questions, which change nothing. */
+const WORDLESS = /\/(recognise|localise|visible|coverage|gaze)$/;
 
 test("every change has words", () => {
   const wordless = Object.keys(rights).filter((name) => !name.startsWith("GET ") && !WORDLESS.test(name) && operation(name) === name);
@@ -74,11 +74,11 @@ test("a quad is called by what named it, and nothing else", () => {
 
 test("a robot's state and age follow the clock alone", () => {
   const robot = { is_connected: true, pose: {}, posed_ms: 1000, heard_ms: 1000 };
-  expect([robotState(robot, 2900).word, robotState(robot, 3100).word]).toEqual(["Live", "No fresh pose"]);
-  expect([robotAge(robot, 1500), robotAge(robot, 13_000)]).toEqual(["pose now", "pose 12 s ago"]);
+  expect([robotState(robot, 2900).word, robotState(robot, 3100).word]).toEqual(["Live", "No fresh position"]);
+  expect([robotAge(robot, 1500), robotAge(robot, 13_000)]).toEqual(["position now", "position 12 s ago"]);
   expect(robotState({ ...robot, is_connected: false }, 1000).word).toBe("Not connected");
   const lost = { is_connected: true, posed_ms: 0, heard_ms: 1000 };
-  expect([robotState(lost, 1100).word, robotAge(lost, 61_000)]).toEqual(["No pose", "last seen 60 s ago"]);
+  expect([robotState(lost, 1100).word, robotAge(lost, 61_000)]).toEqual(["No position", "last seen 60 s ago"]);
   expect(robotAge({ is_connected: false, posed_ms: 0 }, 0)).toBe("not heard since the server's start");
 });
 

@@ -202,9 +202,11 @@ class AsyncRobots(AsyncBase):
         """Cancels a mapping, or deletes one that failed; the map does not change."""
         await self._done("cancel_mapping", map)
 
-    async def finish_mapping(self, map: str) -> MappingProgressBody:
-        """Ends the drive: the walls are fitted once more and stored. `mapping` says when they are."""
-        return await self._send(MappingProgressBody, "finish_mapping", map)
+    async def finish_mapping(self, map: str, *, hold: bool = False) -> MappingProgressBody:
+        """Ends the drive: the walls are fitted once more and stored. `mapping` says when they are. With `hold` they are
+        held instead: `mapping` has them, a further call without it stores them, `cancel_mapping` gives them up."""
+        params = {"hold": "true"} if hold else {}
+        return await self._send(MappingProgressBody, "finish_mapping", map, params=params)
 
     async def start_gathering(
         self, map: str, robot: str, *, landmark: str | None = None, known: bool = False

@@ -203,9 +203,11 @@ class Robots(Base):
         """Cancels a mapping, or deletes one that failed; the map does not change."""
         self._done("cancel_mapping", map)
 
-    def finish_mapping(self, map: str) -> MappingProgressBody:
-        """Ends the drive: the walls are fitted once more and stored. `mapping` says when they are."""
-        return self._send(MappingProgressBody, "finish_mapping", map)
+    def finish_mapping(self, map: str, *, hold: bool = False) -> MappingProgressBody:
+        """Ends the drive: the walls are fitted once more and stored. `mapping` says when they are. With `hold` they are
+        held instead: `mapping` has them, a further call without it stores them, `cancel_mapping` gives them up."""
+        params = {"hold": "true"} if hold else {}
+        return self._send(MappingProgressBody, "finish_mapping", map, params=params)
 
     def start_gathering(self, map: str, robot: str, *, landmark: str | None = None, known: bool = False) -> Gathering:
         """Begins to gather views with a robot: of one landmark, or of new objects (`known`: of known ones, too)."""

@@ -1,1 +1,0 @@
-import{ax as t,ay as e,W as f,ak as c}from"./index-CBhSpk_8.js";function u(n){t===null&&e(),f(()=>{const o=c(n);if(typeof o=="function")return o})}function i(n){t===null&&e(),u(()=>()=>c(n))}export{i as o};

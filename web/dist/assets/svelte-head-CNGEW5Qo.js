@@ -1,1 +1,0 @@
-import{aD as s,aE as t,aF as d,aG as l,aH as r}from"./index-CBhSpk_8.js";function i(o,n){var a;a=document.head.appendChild(s()),t(()=>{var e=d(()=>n(a));e.f|=l,r||(e.nodes===null?e.nodes={start:a,end:a,a:null,t:null}:e.nodes.end=a)})}export{i as h};
