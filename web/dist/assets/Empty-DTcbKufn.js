@@ -1,1 +1,0 @@
-import{ao as p,t as i,a as d,s as l,m as n,k as v,L as m,j as c,o as f}from"./index-DvyDBUmf.js";var h=n('<div class="card empty svelte-1fpw1hr"><p> </p> <!></div>');function x(s,a){var t=h(),e=v(t),r=f(e,!0),o=l(e,2);p(o,()=>a.children??m),i(()=>c(r,a.what)),d(s,t)}export{x as E};

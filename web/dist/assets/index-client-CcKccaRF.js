@@ -1,1 +1,0 @@
-import{aH as t,aI as e,W as f,ak as c}from"./index-DvyDBUmf.js";function u(n){t===null&&e(),f(()=>{const o=c(n);if(typeof o=="function")return o})}function i(n){t===null&&e(),u(()=>()=>c(n))}export{i as o};

@@ -1,0 +1,1 @@
+import{aJ as s,aK as t,aL as d,aM as l,aw as r}from"./index-CVUG8wfL.js";function i(o,n){var a;a=document.head.appendChild(s()),t(()=>{var e=d(()=>n(a));e.f|=l,r||(e.nodes===null?e.nodes={start:a,end:a,a:null,t:null}:e.nodes.end=a)})}export{i as h};
