@@ -332,13 +332,19 @@ pub struct QuadAnswer {
     #[prost(message, repeated, tag = "1")]
     pub corners: ::prost::alloc::vec::Vec<Point>,
     #[prost(enumeration = "QuadKind", tag = "2")]
-    #[cfg_attr(feature = "openapi", schema(value_type = QuadKind, default = json!("unspecified")))]
+    #[cfg_attr(
+        feature = "openapi",
+        schema(value_type = QuadKind, default = json!("unspecified"))
+    )]
     #[serde(with = "crate::json::quad_kind")]
     pub kind: i32,
     #[prost(double, tag = "3")]
     pub score: f64,
     #[prost(enumeration = "Verdict", tag = "4")]
-    #[cfg_attr(feature = "openapi", schema(value_type = Verdict, default = json!("unspecified")))]
+    #[cfg_attr(
+        feature = "openapi",
+        schema(value_type = Verdict, default = json!("unspecified"))
+    )]
     #[serde(with = "crate::json::verdict")]
     pub verdict: i32,
     /// Set only for UNIQUE; what a known pose adds is `guided_landmark`.
@@ -375,7 +381,10 @@ pub struct QuadAnswer {
     pub doubtful_landmark: ::prost::alloc::string::String,
     /// How it was named: GLOBAL with `landmark`, GUIDED with `guided_landmark`; unspecified where it was not.
     #[prost(enumeration = "Sighting", tag = "16")]
-    #[cfg_attr(feature = "openapi", schema(value_type = Sighting, default = json!("unspecified")))]
+    #[cfg_attr(
+        feature = "openapi",
+        schema(value_type = Sighting, default = json!("unspecified"))
+    )]
     #[serde(with = "crate::json::sighting")]
     pub sighting: i32,
     /// The landmark that the quad is by the pose known before the frame, where the picture alone leaves several. The verdict
@@ -390,7 +399,10 @@ pub struct QuadAnswer {
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct PoseRefusalCause {
     #[prost(enumeration = "FixQuantity", tag = "1")]
-    #[cfg_attr(feature = "openapi", schema(value_type = FixQuantity, default = json!("unspecified")))]
+    #[cfg_attr(
+        feature = "openapi",
+        schema(value_type = FixQuantity, default = json!("unspecified"))
+    )]
     #[serde(with = "crate::json::fix_quantity")]
     pub quantity: i32,
     /// Of SIZE: the landmark.
@@ -466,7 +478,10 @@ pub struct Answer {
     #[prost(uint64, tag = "5")]
     pub map_version: u64,
     #[prost(enumeration = "Status", tag = "6")]
-    #[cfg_attr(feature = "openapi", schema(value_type = crate::api::AnswerStatus, default = json!("unspecified")))]
+    #[cfg_attr(
+        feature = "openapi",
+        schema(value_type = crate::api::AnswerStatus, default = json!("unspecified"))
+    )]
     #[serde(with = "crate::json::status")]
     pub status: i32,
     #[prost(message, optional, tag = "7")]

@@ -79,7 +79,7 @@ impl Jobs {
             });
             match write.await {
                 Ok(job) => {
-                    tracing::info!(map = map.name, landmarks = count, job = job.id, "models_without_points")
+                    tracing::info!(map = map.name, landmarks = count, job = job.id, "models_without_points");
                 }
                 Err(StoreError::Limit { what, max }) => {
                     tracing::warn!(
