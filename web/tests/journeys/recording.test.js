@@ -56,11 +56,11 @@ for (const [size, where] of [[undefined, "desk"], [PHONE, "phone"]]) {
     const page = await go("/maps/hall", size);
     const row = page.getByRole("region", { name: "Robots on this map" }).getByRole("listitem").filter({ hasText: robot });
     await row.getByText("Live", { exact: true }).waitFor();
-    await row.getByText(/pose (now|2 s ago)/).waitFor();
+    await row.getByText(/position (now|2 s ago)/).waitFor();
     player.kill("SIGKILL");
     await row.getByText("No fresh position", { exact: true }).or(row.getByText("Not connected", { exact: true })).first().waitFor();
     await row.getByText("Not connected", { exact: true }).waitFor();
-    await row.getByText(/pose ([4-9]|[1-9]\d) s ago/).waitFor();
+    await row.getByText(/position ([4-9]|[1-9]\d) s ago/).waitFor();
     await check(page, `stale-robot-${where}`);
     await page.goto("/robots");
     const cells = page.getByRole("row").filter({ hasText: robot });
