@@ -262,7 +262,7 @@ Order = Literal["name", "-name", "changed", "-changed"]
 # What came of a localisation.
 LocaliseStatus = Literal["located", "ambiguous", "no_match"]
 # How far a mapping has come.
-MappingStage = Literal["resuming", "mapping", "finishing", "done", "failed"]
+MappingStage = Literal["resuming", "mapping", "finishing", "found", "done", "failed"]
 # Why the first hypothesis is not yet the pose.
 MissingCondition = Literal["higher_probability", "second_landmark", "consistent_observations", "no_rival_pose"]
 # What estimates poses by itself.
@@ -1596,13 +1596,15 @@ class MappingProgressBody:
     pose: Triple | None = None
     """Where the robot is in the map so far: x, y, theta; absent before the first scan."""
     segments: int | None = None
-    """Walls, once it is done."""
+    """Number of walls, once they are found."""
     loop_closures: int | None = None
     """Loop closures, once fitted."""
     reason: str | None = None
     """Why it failed."""
     journal_error: str | None = None
     """Why further scans are not kept on disk: a restart of the server would lose them. Absent while they are."""
+    walls: tuple[WallBody, ...] | None = None
+    """The walls that are held: what would replace those of the map. Absent at every other stage."""
 
 
 @dataclass(frozen=True, slots=True)
