@@ -91,7 +91,9 @@ async function comesOf(page, { key, is_tab }) {
     const own = /\/whoami$|\/live$|\/events|\/readyz$|\/version$|\/servers$|\/robots$|\/cameras$|\/relocalisation$/.test(new URL(request.url()).pathname);
     happened ||= !is_tab && (request.method() !== "GET" || request.isNavigationRequest() || (request.resourceType() === "fetch" && !own));
   };
-  for (const event of ["popup", "download", "filechooser"]) page.once(event, note);
+  for (const event of ["download", "filechooser"]) page.once(event, note);
+  // Another tab; "popup" is not told of one without an opener.
+  page.context().once("page", note);
   page.on("request", sent);
   await page.locator(`[data-click="${key.replaceAll('"', '\\"')}"]`).click();
   const until = Date.now() + LATEST_MS;
@@ -100,7 +102,8 @@ async function comesOf(page, { key, is_tab }) {
     if (!happened) await page.waitForTimeout(100);
   }
   page.off("request", sent);
-  for (const event of ["popup", "download", "filechooser"]) page.off(event, note);
+  for (const event of ["download", "filechooser"]) page.off(event, note);
+  page.context().off("page", note);
   return happened;
 }
 
