@@ -178,6 +178,7 @@ impl Epochs {
         if let Some(refused) = epochs.refuse(epoch, now) {
             tracing::warn!(
                 %robot, live_epoch = live, refused_epoch = epoch, refused,
+                follows = "two programs use the name of one robot; messages of the later one are refused",
                 "epoch_conflict"
             );
         }

@@ -203,7 +203,8 @@ impl MappingSessions {
     /// Holds the walls until somebody accepts them with [`MappingSessions::finish`], or says why there are none. The journal
     /// stays: after a restart the mapping resumes, and is finished once more.
     pub fn hold(&self, map: &str, walls: Result<Walls, String>) {
-        if let Some(session) = self.lock().get_mut(map) {
+        // Another mapping of the map may have begun after this one was cancelled.
+        if let Some(session) = self.lock().get_mut(map).filter(|session| session.is_finishing()) {
             session.hold(walls);
         }
     }

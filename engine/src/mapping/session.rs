@@ -116,6 +116,10 @@ impl Session {
         matches!(lock(&self.progress).stage, MappingStage::Resuming | MappingStage::Mapping)
     }
 
+    pub(super) fn is_finishing(&self) -> bool {
+        lock(&self.progress).stage == MappingStage::Finishing
+    }
+
     /// Whether there are walls, or will be once it is finished.
     pub(super) fn can_finish(&self) -> bool {
         self.takes() || self.held.is_some()

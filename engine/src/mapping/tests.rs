@@ -71,6 +71,9 @@ async fn scans_become_the_walls_that_mapping_them_gives() {
     assert_eq!(mappings.progress("hall").unwrap().stage, MappingStage::Done);
     assert_eq!(mappings.finish("hall").unwrap_err(), MappingError::None);
     mappings.begin(&name("hall"), &name("r1"), origin).unwrap();
+    // Late word of the one before.
+    mappings.hold("hall", Err("the mapping was given up".into()));
+    assert_eq!(mappings.progress("hall").unwrap().stage, MappingStage::Mapping);
 }
 
 #[test]

@@ -79,7 +79,13 @@ impl Jobs {
             });
             match write.await {
                 Ok(job) => {
-                    tracing::info!(map = map.name, landmarks = count, job = job.id, "models_without_points");
+                    tracing::info!(
+                        map = map.name,
+                        landmarks = count,
+                        job = job.id,
+                        follows = "the job takes them from the views; recognition goes on with the models as they are",
+                        "models_without_points"
+                    );
                 }
                 Err(StoreError::Limit { what, max }) => {
                     tracing::warn!(

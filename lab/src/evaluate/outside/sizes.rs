@@ -101,3 +101,23 @@ pub(super) fn sizes(worlds: &[World], scores: &[PictureScore]) -> Option<SizeRep
     }
     (report.one_view.stated > 0).then_some(report)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_true_size_agrees_and_a_swapped_one_is_refused() {
+        let shown = Some(Aspect { ratio: 0.75, sigma_log: 0.02 });
+        let size = |width_m, height_m| LandmarkSize { width_m, height_m };
+        let mut figures = SizeFigures::default();
+        figures.add(None, size(0.6, 0.8), true);
+        figures.add(shown, size(0.6, 0.8), true);
+        // Another border than the one that was measured, and a square, which has no swapped sides.
+        figures.add(shown, size(0.7, 0.7), false);
+        figures.add(shown, size(0.8, 0.6), true);
+        let SizeFigures { stated, refused, refused_wrongly, doubted, swapped, swapped_refused } = figures;
+        assert_eq!((stated, refused, refused_wrongly, doubted), (3, 2, 1, 0));
+        assert_eq!((swapped, swapped_refused), (2, 1));
+    }
+}
