@@ -125,7 +125,9 @@ impl Drop for Child {
     }
 }
 
-/// The program, built with the profile of the tests: cargo does not build another package's program for a test.
+/// The program, built with the profile of the tests: cargo does not build another package's program for a test. Built beside a
+/// test of the whole workspace, it takes the crates that the tests are linked with; by itself it has features of its own, and
+/// half of the crates are built once more.
 pub(crate) fn program() -> &'static Path {
     static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
     PROGRAM.get_or_init(|| {
@@ -133,7 +135,7 @@ pub(crate) fn program() -> &'static Path {
         let exe = std::env::current_exe().expect("own path");
         let profile = exe.parent().and_then(Path::parent).expect("target directory");
         let mut cargo = Command::new(env!("CARGO"));
-        cargo.args(["build", "--quiet", "--package", "cli", "--bin", "waymark"]);
+        cargo.args(["build", "--quiet", "--workspace", "--bin", "waymark", "--test", "wedged_router"]);
         cargo.current_dir(env!("CARGO_MANIFEST_DIR"));
         if profile.ends_with("release") {
             cargo.arg("--release");

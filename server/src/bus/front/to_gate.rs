@@ -1,20 +1,27 @@
 //! The way from the front to the gate, inside the machine: QUIC on loopback, whose both ends are sound under load, with a
 //! certificate of the robot's name that is made for each connection and known to the gate alone.
 //!
+//! Both ends have one socket for all robots, and what finds it full is lost. A window that shrinks by such losses would starve
+//! a robot while the processors are busy: in this direction it is small and fixed, in the other the socket is large.
+//!
 //! Of zenoh's QUIC links this uses that the protocol `zenoh` has one stream, which the client opens, framed as TLS is.
 
 use super::{lasting::Lasting, relay::ToRouter};
 use crate::identity::certificates::LinkCertificates;
 use protos::Name;
 use quinn::{
-    ClientConfig, Connection, Endpoint, RecvStream, SendStream, TransportConfig, VarInt,
+    ClientConfig, Connection, Endpoint, EndpointConfig, RecvStream, SendStream, TokioRuntime,
+    TransportConfig, VarInt,
+    congestion::{Controller, ControllerFactory},
     crypto::rustls::QuicClientConfig,
 };
+use rustix::net::sockopt::set_socket_recv_buffer_size;
 use std::{
+    any::Any,
     io,
-    net::{Ipv4Addr, SocketAddr},
+    net::{Ipv4Addr, SocketAddr, UdpSocket},
     sync::{Arc, Mutex, PoisonError},
-    time::Duration,
+    time::{Duration, Instant},
 };
 use tokio::sync::watch;
 
@@ -24,6 +31,42 @@ const PROTOCOL: &[u8] = b"zenoh";
 const LONGEST: Duration = Duration::from_secs(10);
 /// What the gate may have sent and the robot not taken, in bytes: more would only be older.
 const WINDOW: u32 = 256 << 10;
+/// What is on the way to the gate at most, in bytes of one robot: less than a socket of Linux takes by default.
+const ON_THE_WAY: u64 = 64 << 10;
+/// Room for what is on the way from the gate, in bytes of all robots. The system may give less.
+const RECEIVED: usize = 4 << 20;
+
+/// Sends again what is lost, and no slower.
+#[derive(Debug, Clone)]
+struct FixedWindow;
+
+impl Controller for FixedWindow {
+    fn on_congestion_event(&mut self, _: Instant, _: Instant, _: bool, _: u64) {}
+
+    fn on_mtu_update(&mut self, _: u16) {}
+
+    fn window(&self) -> u64 {
+        ON_THE_WAY
+    }
+
+    fn clone_box(&self) -> Box<dyn Controller> {
+        Box::new(Self)
+    }
+
+    fn initial_window(&self) -> u64 {
+        ON_THE_WAY
+    }
+
+    fn into_any(self: Box<Self>) -> Box<dyn Any> {
+        self
+    }
+}
+
+impl ControllerFactory for FixedWindow {
+    fn build(self: Arc<Self>, _: Instant, _: u16) -> Box<dyn Controller> {
+        Box::new(Self)
+    }
+}
 
 /// Connects robots with the gate.
 pub(in crate::bus) struct ToGate {
@@ -53,8 +96,10 @@ impl ToGate {
         link: Arc<LinkCertificates>,
         gate: watch::Receiver<Option<SocketAddr>>,
     ) -> io::Result<Self> {
+        let socket = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0))?;
+        set_socket_recv_buffer_size(&socket, RECEIVED)?;
         Ok(Self {
-            endpoint: Endpoint::client((Ipv4Addr::LOCALHOST, 0).into())?,
+            endpoint: Endpoint::new(EndpointConfig::default(), None, socket, Arc::new(TokioRuntime))?,
             link,
             gate,
             lasting: Mutex::default(),
@@ -89,6 +134,7 @@ impl ToGate {
         let crypto = crypto.map_err(io::Error::other)?;
         let mut transport = TransportConfig::default();
         transport.stream_receive_window(VarInt::from_u32(WINDOW));
+        transport.congestion_controller_factory(Arc::new(FixedWindow));
         let mut config = ClientConfig::new(Arc::new(crypto));
         config.transport_config(Arc::new(transport));
         Ok(config)
