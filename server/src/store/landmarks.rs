@@ -12,9 +12,6 @@ use vision::{model::LandmarkId, pose::LandmarkSize};
 
 /// The columns that [`geometry`] reads, with what names their table.
 macro_rules! geometry_columns {
-    () => {
-        geometry_columns!("")
-    };
     ($of:literal) => {
         geometry_columns!(@ $of, "width_m" "height_m" "x_m" "y_m" "z_m" "theta_rad" "roll_rad" "tilt_rad"
             "place_covariance" "size_from_views")
@@ -109,8 +106,7 @@ impl LandmarkGeometry {
     /// In what another one differs: `size`, `place`.
     pub(crate) fn differences(&self, other: &Self) -> impl Iterator<Item = &'static str> {
         let size = (self.size, self.size_from_views) != (other.size, other.size_from_views);
-        let place = self.place != other.place;
-        size.then_some("size").into_iter().chain(place.then_some("place"))
+        size.then_some("size").into_iter().chain((self.place != other.place).then_some("place"))
     }
 
     /// Size and place as they are shown.
@@ -195,8 +191,7 @@ pub(super) fn geometry(row: &SqliteRow) -> Result<LandmarkGeometry, sqlx::Error>
     let size = real("width_m")?.zip(real("height_m")?);
     let (xy, zt) = (real("x_m")?.zip(real("y_m")?), real("z_m")?.zip(real("theta_rad")?));
     let (roll_rad, tilt_rad) = (real("roll_rad")?.unwrap_or(0.0), real("tilt_rad")?.unwrap_or(0.0));
-    let covariance: Option<Vec<u8>> = row.try_get("place_covariance")?;
-    let covariance = covariance.as_deref().and_then(covariance_of);
+    let covariance = row.try_get::<Option<&[u8]>, _>("place_covariance")?.and_then(covariance_of);
     Ok(LandmarkGeometry {
         size: size.map(|(width_m, height_m)| LandmarkSize { width_m, height_m }),
         place: xy.zip(zt).map(|((x_m, y_m), (z_m, theta_rad))| StoredPlace {
@@ -242,8 +237,8 @@ pub(super) async fn set_geometry(
         .bind(size.map(|_| geometry.size_from_views))
         .execute(&mut tx.conn)
         .await
-        .map_err(StoreError::during("measure landmark"))?;
-    Ok(())
+        .map(drop)
+        .map_err(StoreError::during("measure landmark"))
 }
 
 fn landmark_row(row: &SqliteRow) -> Result<LandmarkRow, sqlx::Error> {

@@ -18,7 +18,7 @@ statements! {
     MAP_IDS = "SELECT id FROM maps ORDER BY id";
     ROWS = "SELECT coalesce(group_concat(id || ' ' || revision || ' ' || changed_ms || ' ' || health, ';'), '') \
             FROM landmarks WHERE map_id = ?1";
-    LANDMARKS = concat!("SELECT id, name, ", geometry_columns!(), " FROM landmarks WHERE map_id = ?1 \
+    LANDMARKS = concat!("SELECT id, name, ", geometry_columns!(""), " FROM landmarks WHERE map_id = ?1 \
                 AND id IN (SELECT value FROM json_each(?2))");
 }
 

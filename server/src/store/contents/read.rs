@@ -20,7 +20,7 @@ use vision::model::LandmarkId;
 
 statements! {
     SETTINGS = "SELECT fusion, areas, sight FROM maps WHERE id = ?1";
-    LANDMARKS = concat!("SELECT id, name, health, finding, created_ms, ", geometry_columns!(), " FROM landmarks \
+    LANDMARKS = concat!("SELECT id, name, health, finding, created_ms, ", geometry_columns!(""), " FROM landmarks \
                 WHERE map_id = ?1 ORDER BY id");
     VIEWS = "SELECT v.landmark_id, v.image_sha256, v.image_kind, v.width_px, v.height_px, v.corners_px, v.created_ms, \
              v.icon_side, v.icon_scale, v.capture, v.icon FROM views v JOIN landmarks l ON l.id = v.landmark_id \

@@ -65,9 +65,9 @@ macro_rules! with_later {
 
 statements! {
     // The row before and the row at ?3, as far as they are there, under each other.
-    LANDMARKS = concat!(with_later!("landmarks", "id", concat!("name, ", geometry_columns!())),
-                "SELECT id, 0 AS side, present, name, ", geometry_columns!(), " FROM f \
-                UNION ALL SELECT id, 1, present, name, ", geometry_columns!(), " FROM n ORDER BY id");
+    LANDMARKS = concat!(with_later!("landmarks", "id", concat!("name, ", geometry_columns!(""))),
+                "SELECT id, 0 AS side, present, name, ", geometry_columns!(""), " FROM f \
+                UNION ALL SELECT id, 1, present, name, ", geometry_columns!(""), " FROM n ORDER BY id");
     VIEWS = concat!("SELECT landmark_id, sum(was = 0 AND is_now = 1) AS added, sum(was = 1 AND is_now = 0) AS removed FROM \
             (SELECT f.landmark_id, f.present AS was, ", is_present!("views"), " AS is_now FROM ",
             before!("views", "id"), " f) GROUP BY landmark_id HAVING added + removed > 0");
@@ -92,9 +92,9 @@ statements! {
     WALLS_AFTER = "SELECT min(id) FROM commits WHERE map_id = ?1 AND walls = 1 AND id > ?2";
     PAST_WALLS = "SELECT ax_m, ay_m, bx_m, by_m, covariance FROM past_walls WHERE commit_id = ?1";
     NOW_WALLS = "SELECT ax_m, ay_m, bx_m, by_m, covariance FROM laser_segments WHERE map_id = ?1";
-    ROW_AT = concat!("SELECT * FROM (SELECT commit_id, name, ", geometry_columns!(), " FROM past_landmarks \
+    ROW_AT = concat!("SELECT * FROM (SELECT commit_id, name, ", geometry_columns!(""), " FROM past_landmarks \
              WHERE id = ?1 AND commit_id > ?2 AND present = 1 UNION ALL SELECT 9223372036854775807, name, ",
-             geometry_columns!(), " FROM landmarks WHERE id = ?1) ORDER BY commit_id LIMIT 1");
+             geometry_columns!(""), " FROM landmarks WHERE id = ?1) ORDER BY commit_id LIMIT 1");
 }
 
 /// Words for settings; also the columns of `SETTINGS`.
