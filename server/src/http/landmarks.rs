@@ -63,7 +63,7 @@ pub(super) fn geometry(size: Option<Size>, place: Option<Place>) -> Result<Landm
         tilt_rad: p.tilt_rad,
         covariance: None,
     });
-    Ok(LandmarkGeometry::by_hand(size, place))
+    Ok(LandmarkGeometry { size, place, ..LandmarkGeometry::default() })
 }
 
 /// A size within its ranges. Errors: `out_of_range`, with the side.
@@ -285,10 +285,8 @@ async fn patch(
                 Some(new) => landmarks::rename(tx, &map, &landmark, new.as_str()).await?,
                 None => landmark,
             };
-            let changed = landmarks::update(tx, &map, &landmark, |old| {
-                old.edited(size.then_some(checked.size), place.then_some(checked.place))
-            })
-            .await?;
+            let changed =
+                landmarks::update(tx, &map, &landmark, |old| old.edited(&checked, (size, place))).await?;
             match health {
                 Some(health) => landmarks::set_health(tx, &map, &landmark, health, None).await,
                 None => Ok(changed),

@@ -62,7 +62,8 @@ async fn past_rows(
 ) -> Result<(), sqlx::Error> {
     let there = names(conn, &format!("past_{name}")).await?;
     if there.is_empty() {
-        let columns: String = columns.iter().map(|c| format!("{} {}, ", c.name, c.declaration)).collect();
+        let columns: Vec<_> = columns.iter().map(|c| format!("{} {}, ", c.name, c.declaration)).collect();
+        let columns = columns.concat();
         let sql = format!(
             "CREATE TABLE past_{name} (commit_id INTEGER NOT NULL REFERENCES commits (id) ON DELETE CASCADE, \
              {key} INTEGER NOT NULL, present INTEGER NOT NULL CHECK (present IN (0, 1)), {columns}\
@@ -163,7 +164,7 @@ fn wall_triggers(columns: &[String]) -> [Trigger; 3] {
 /// What deletes a content with the last row that refers to it, live or past, also where a cascade deletes that row.
 fn content_triggers(content: &str, references: &[(String, String)]) -> Vec<Trigger> {
     let trigger = |(name, column): &(String, String)| {
-        let unused: String = references
+        let unused: Vec<String> = references
             .iter()
             .map(|(table, by)| format!(" AND NOT EXISTS (SELECT 1 FROM {table} WHERE {by} = OLD.{column})"))
             .collect();
@@ -173,6 +174,7 @@ fn content_triggers(content: &str, references: &[(String, String)]) -> Vec<Trigg
         } else {
             String::new()
         };
+        let unused = unused.concat();
         let delete = format!("BEGIN DELETE FROM {content} WHERE sha256 = OLD.{column}{unused}{damaged}; END");
         let replaced =
             format!("AFTER UPDATE OF {column} ON {name} WHEN OLD.{column} IS NOT NEW.{column} {delete}");

@@ -74,26 +74,17 @@ pub(crate) struct LandmarkGeometry {
 }
 
 impl LandmarkGeometry {
-    /// Set by hand.
-    pub(crate) fn by_hand(size: Option<LandmarkSize>, place: Option<StoredPlace>) -> Self {
-        Self { size, place, size_from_views: false }
-    }
-
     /// The size, if it was set by hand.
     pub(crate) fn size_by_hand(&self) -> Option<LandmarkSize> {
         self.size.filter(|_| !self.size_from_views)
     }
 
-    /// With what a person sets of it; what is `None` stays.
-    pub(crate) fn edited(
-        self,
-        size: Option<Option<LandmarkSize>>,
-        place: Option<Option<StoredPlace>>,
-    ) -> Self {
+    /// With the size and the place of `by_hand`, if a person sets them.
+    pub(crate) fn edited(self, by_hand: &Self, (size, place): (bool, bool)) -> Self {
         Self {
-            size: size.unwrap_or(self.size),
-            place: place.unwrap_or(self.place),
-            size_from_views: self.size_from_views && size.is_none(),
+            size: if size { by_hand.size } else { self.size },
+            place: if place { by_hand.place } else { self.place },
+            size_from_views: self.size_from_views && !size,
         }
     }
 

@@ -21,7 +21,11 @@ pub(super) async fn schema(conn: &mut SqliteConnection) -> Result<i64, StoreErro
 mod tests {
     use super::*;
     use crate::store::open;
-    use std::{collections::BTreeMap, fs, path::Path};
+    use std::{
+        collections::{BTreeMap, BTreeSet},
+        fs,
+        path::Path,
+    };
 
     /// The checksum of every applied file, then every table, index and trigger on a line.
     async fn dump(conn: &mut SqliteConnection) -> String {
@@ -51,7 +55,7 @@ mod tests {
         };
         let (made, pinned) = (by_name(&made), by_name(&pinned));
         let differs = |name: &&String| made.get(*name) != pinned.get(*name);
-        let differing: Vec<&String> = made.keys().chain(pinned.keys()).filter(differs).collect();
+        let differing: BTreeSet<&String> = made.keys().chain(pinned.keys()).filter(differs).collect();
         assert!(
             differing.is_empty(),
             "{differing:?} differ from schema.txt. A database in use is brought from one schema to the next by a new file in \

@@ -120,7 +120,7 @@ impl Teaching {
             }
             return Ok(*now);
         }
-        Ok(now.edited(Some(Some(given)), None))
+        Ok(now.edited(&LandmarkGeometry { size: Some(given), place: None, ..*now }, (true, false)))
     }
 }
 

@@ -103,6 +103,9 @@ const SETTINGS_OF_MAP: [&str; 8] =
 /// Landmarks that a summary names.
 const MAX_NAMED: usize = 8;
 
+/// Name, size and place of a landmark.
+type NamedGeometry = (String, LandmarkGeometry);
+
 /// What changed of a landmark.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct LandmarkChange {
@@ -122,10 +125,7 @@ pub(crate) struct LandmarkChange {
 
 impl LandmarkChange {
     /// Of a landmark with this name and geometry before and after, as far as it is there.
-    pub(in crate::store) fn of(
-        old: Option<&(String, LandmarkGeometry)>,
-        new: Option<&(String, LandmarkGeometry)>,
-    ) -> Self {
+    pub(in crate::store) fn of(old: Option<&NamedGeometry>, new: Option<&NamedGeometry>) -> Self {
         let sides = [old, new];
         let mut fields = Vec::new();
         if let Some(((old_name, old), (new_name, new))) = old.zip(new) {
@@ -183,7 +183,7 @@ pub(crate) async fn between(
 ) -> Result<Difference, StoreError> {
     let at = || StoreError::during("compare versions");
     let mut made = Difference::default();
-    let mut landmarks: BTreeMap<i64, [Option<(String, LandmarkGeometry)>; 2]> = BTreeMap::new();
+    let mut landmarks: BTreeMap<i64, [Option<NamedGeometry>; 2]> = BTreeMap::new();
     for row in rows(conn, LANDMARKS, map, (from, to)).await? {
         let (id, side, landmark) = landmark_at(&row).map_err(at())?;
         landmarks.entry(id).or_default()[side] = landmark;
@@ -231,7 +231,7 @@ async fn rows(
 }
 
 /// Number, side (before or after), and name and geometry where it is there.
-fn landmark_at(row: &SqliteRow) -> Result<(i64, usize, Option<(String, LandmarkGeometry)>), sqlx::Error> {
+fn landmark_at(row: &SqliteRow) -> Result<(i64, usize, Option<NamedGeometry>), sqlx::Error> {
     let is_present: bool = row.try_get("present")?;
     let landmark = is_present.then(|| Ok::<_, sqlx::Error>((row.try_get("name")?, geometry(row)?)));
     Ok((row.try_get("id")?, usize::from(row.try_get::<bool, _>("side")?), landmark.transpose()?))
