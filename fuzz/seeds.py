@@ -1,16 +1,13 @@
 #!/usr/bin/env python3
 """Writes the seeds of the fuzz targets (fuzz/corpus) of real values: examples of the HTTP interface, files of walls and
-logs, messages of a robot, a stored model of an earlier database. `python3 fuzz/seeds.py` after a change of a format.
+logs, messages of a robot, a visibility area. `python3 fuzz/seeds.py` after a change of a format.
 
 JPEG seeds are made by `cjpeg` (Debian: libjpeg-turbo-progs) where it is installed, and else stay as they are."""
 
-import gzip
 import json
 import shutil
-import sqlite3
 import struct
 import subprocess
-import tempfile
 import zlib
 from pathlib import Path
 
@@ -169,13 +166,8 @@ def poses():
 
 
 def stored():
-    with tempfile.NamedTemporaryFile(suffix=".sqlite") as file:
-        file.write(gzip.decompress((ROOT.parent / "tests/fixtures/2026-11-22.sqlite.gz").read_bytes()))
-        file.flush()
-        models = [row[0] for row in sqlite3.connect(file.name).execute("SELECT model FROM models")]
-    smallest = min(models, key=len)
-    seed("stored", "model", b"\x02" + smallest)
-    seed("stored", "model-head", b"\x02" + smallest[:200])
+    # `model` is a row of `model_contents` behind one byte; it stays as it is.
+    seed("stored", "model-head", (CORPUS / "stored/model").read_bytes()[:201])
     seed("stored", "area", b"\x00\x01" + struct.pack("<12d", 8, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0))
 
 

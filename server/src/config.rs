@@ -115,7 +115,7 @@ impl RawConfig {
     /// Defaults, then the file (which must exist if named), then the environment; of that what is no setting is left out
     /// ([`Self::unknown_variables`]).
     pub fn read(file: Option<&Path>) -> Result<Self, ConfigError> {
-        // Defaults are left to serde: as values they would stand beside a key of an earlier build.
+        // Defaults are left to serde.
         let mut figment = Figment::new();
         if let Some(path) = file {
             figment = figment.merge(Toml::file_exact(path));

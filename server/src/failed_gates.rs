@@ -10,25 +10,19 @@ use vision::model::{Gate, GateFailure, LandmarkId, ThresholdError};
 /// A look-alike as it is stored. Its name is that of the time of learning; the number is what holds.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct StoredLookAlike {
-    /// Absent in rows of earlier builds.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    id: Option<u64>,
+    id: u64,
     landmark: String,
-    #[serde(alias = "likeness")]
     gradient_similarity: f64,
 }
 
 impl StoredLookAlike {
     pub(crate) fn new(id: LandmarkId, name: &str, gradient_similarity: f64) -> Self {
-        Self { id: Some(id.0), landmark: name.to_owned(), gradient_similarity }
+        Self { id: id.0, landmark: name.to_owned(), gradient_similarity }
     }
 
     /// With the present name; `None` if that landmark is gone.
     pub(crate) fn shown(self, name_of: impl Fn(LandmarkId) -> Option<String>) -> Option<LookAlikeBody> {
-        let landmark = match self.id {
-            Some(id) => name_of(LandmarkId(id))?,
-            None => self.landmark,
-        };
+        let landmark = name_of(LandmarkId(self.id))?;
         Some(LookAlikeBody { landmark, gradient_similarity: self.gradient_similarity })
     }
 }
@@ -56,10 +50,7 @@ pub(crate) fn renumbered(text: &str, numbers: &BTreeMap<LandmarkId, LandmarkId>)
 #[derive(Debug, Serialize, Deserialize)]
 struct StoredFailure {
     gate: Gate,
-    // Earlier builds stored some gates without numbers.
-    #[serde(default)]
     value: f64,
-    #[serde(default)]
     limit: f64,
 }
 
@@ -286,12 +277,11 @@ mod tests {
     }
 
     #[test]
-    fn gates_are_stored_and_read_and_those_of_earlier_builds_too() {
+    fn gates_are_stored_and_read() {
         let all = [Gate::Saliency, Gate::LikenessThreshold(ThresholdError::Overlap)].map(failure);
         assert_eq!(from_stored(&stored(&all)), all);
-        let earlier = r#"[{"gate":"saliency"},{"gate":"unheard_of"}]"#;
-        let read = GateFailure { gate: Gate::Saliency, value: 0.0, limit: 0.0 };
-        assert_eq!(from_stored(earlier), [read]);
+        let unknown = stored(&all).replace("saliency", "unheard_of");
+        assert_eq!(from_stored(&unknown), all[1..]);
     }
 
     #[test]
@@ -300,9 +290,5 @@ mod tests {
         let renamed = |id: LandmarkId| (id.0 == 7).then(|| "second".to_owned());
         assert_eq!(stored.clone().shown(renamed).unwrap().landmark, "second");
         assert_eq!(stored.shown(|_| None), None, "it is gone");
-        let earlier: StoredLookAlike =
-            serde_json::from_str(r#"{"landmark":"first","likeness":0.75}"#).unwrap();
-        let shown = earlier.shown(|_| None).unwrap();
-        assert_eq!((shown.landmark.as_str(), shown.gradient_similarity), ("first", 0.75));
     }
 }

@@ -251,14 +251,6 @@ impl Teaching {
         let failed = |e: StoreError| StartError::Store(e.to_string());
         let started = Jobs::start(store.clone(), config.clone(), stopping.clone());
         let (jobs, jobs_task) = started.await.map_err(failed)?;
-        if config.params.recognise.verdict.points {
-            match jobs.renew().await {
-                Err(error) if error.is_of_the_disk() => {
-                    tracing::warn!(%error, follows = "the next start tries again", "models_not_renewed");
-                }
-                renewed => drop(renewed.map_err(failed)?),
-            }
-        }
         let started = Gatherer::start(store.clone(), config, tap, offered);
         let (gatherer, gather_task) = started.await.map_err(failed)?;
         Ok(Self { jobs, jobs_task, gatherer, gather_task })

@@ -18,7 +18,6 @@ mod demo;
 mod detect_command;
 mod disk_errors;
 mod drafts;
-mod earlier_database;
 mod encrypted_http;
 mod event_stream;
 mod full_disk;

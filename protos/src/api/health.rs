@@ -37,7 +37,7 @@ pub struct Readiness {
     /// asks.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub maps_not_served: BTreeMap<String, String>,
-    /// The check of the whole database after the start; absent where an earlier build answers.
+    /// The check of the whole database after the start.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub database_check: Option<DatabaseCheckBody>,
     /// The newest backup, and why the last attempt failed. A token for all maps is told the name and the reason.
@@ -47,7 +47,7 @@ pub struct Readiness {
     /// Empty for whoever does not see all maps.
     #[serde(default)]
     pub parts_still_s: BTreeMap<String, u64>,
-    /// The disk of the data directory; absent for whoever does not see all maps, and where an earlier build answers.
+    /// The disk of the data directory; absent for whoever does not see all maps.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub storage: Option<StorageHealth>,
     /// Panics caught since the start, by where: what they met was refused or dropped, everything else went on. Each is in

@@ -18,8 +18,8 @@ pub struct Commit {
     pub author: String,
     /// The job, if one did it.
     pub job: Option<u64>,
-    /// Method and path of the request, as `PATCH /maps/{map}/landmarks/{landmark}`; of a job its kind; `upgrade` for the state
-    /// in which an older server left the map, `outside` for what another program wrote into the database.
+    /// Method and path of the request, as `PATCH /maps/{map}/landmarks/{landmark}`; of a job its kind; `outside` for
+    /// what another program wrote into the database.
     pub operation: String,
     /// The reason that the client gave (header `Waymark-Why`).
     pub why: Option<String>,

@@ -182,7 +182,7 @@ pub enum LandmarkHealthBody {
     Quarantined,
 }
 
-/// What robots found of a landmark that is not where the map says. Stored as JSON: the other words are of earlier builds.
+/// What robots found of a landmark that is not where the map says. Stored as JSON.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(tag = "kind", rename_all = "snake_case")]
@@ -190,10 +190,8 @@ pub enum FindingBody {
     /// It is observed elsewhere.
     Moved {
         /// Where it is observed.
-        #[serde(alias = "apparent")]
         observed_place: ObservedPlaceBody,
         /// Distance from its place.
-        #[serde(alias = "by_m")]
         offset_m: f64,
         /// Observations that agree on it.
         sightings: u32,
@@ -201,7 +199,6 @@ pub enum FindingBody {
     /// It should be visible and is not.
     Missing {
         /// Consecutive frames without it.
-        #[serde(alias = "looks")]
         missed_frames: u32,
     },
 }
@@ -304,20 +301,6 @@ mod tests {
         for place in [wall, ceiling] {
             let back: Place = serde_json::from_str(&serde_json::to_string(&place).unwrap()).unwrap();
             assert_eq!(back, place);
-        }
-    }
-
-    /// Rows of earlier builds are read with their words and answered with those of now.
-    #[test]
-    fn a_stored_finding_reads_with_the_words_of_earlier_builds() {
-        let place = r#"{"x_m":1.5,"y_m":2.0,"theta_rad":0.5}"#;
-        let earlier = format!(r#"{{"kind":"moved","by_m":1.25,"sightings":3,"apparent":{place}}}"#);
-        let now = format!(r#"{{"kind":"moved","observed_place":{place},"offset_m":1.25,"sightings":3}}"#);
-        let missing = (r#"{"kind":"missing","looks":6}"#, r#"{"kind":"missing","missed_frames":6}"#);
-        for (earlier, now) in [(earlier.as_str(), now.as_str()), missing] {
-            let read: FindingBody = serde_json::from_str(earlier).unwrap();
-            assert_eq!(serde_json::to_string(&read).unwrap(), now);
-            assert_eq!(serde_json::from_str::<FindingBody>(now).unwrap(), read);
         }
     }
 

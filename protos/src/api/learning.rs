@@ -99,7 +99,7 @@ pub struct Job {
     /// When it was asked for, ms since the Unix epoch.
     #[serde(default)]
     pub created_ms: i64,
-    /// When it was begun last; absent while it waits, and for jobs of earlier builds.
+    /// When it was begun last; absent while it waits.
     pub started_ms: Option<i64>,
     /// When it ended.
     pub ended_ms: Option<i64>,

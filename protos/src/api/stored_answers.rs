@@ -153,8 +153,7 @@ pub struct StoredQuad {
     pub icon: Option<String>,
     /// The landmarks it was compared with, in the order of the answer's candidates.
     pub landmarks: Vec<LandmarkIcon>,
-    /// Its points that are like those of the best candidate; null without an icon, where that has no points, and for answers of
-    /// earlier builds.
+    /// Its points that are like those of the best candidate; null without an icon, and where that has no points.
     pub matched: Option<QuadMatches>,
 }
 
@@ -168,6 +167,6 @@ pub struct StoredAnswer {
     pub answer: Answer,
     /// The pictures of its quads, in the order of `answer.quads`.
     pub quads: Vec<StoredQuad>,
-    /// The pose before the frame and that by the frame; null where none was known before, and for answers of earlier builds.
+    /// The pose before the frame and that by the frame; null where none was known before.
     pub prior_check: Option<PriorCheck>,
 }

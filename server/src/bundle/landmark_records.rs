@@ -66,7 +66,6 @@ pub(super) struct ModelRecord {
     views: u64,
     generated_views: u64,
     learnt_ms: i64,
-    points_asked: bool,
 }
 
 /// A view of `views.json`.
@@ -114,7 +113,6 @@ fn model_record(number: u64, model: &ModelContents) -> Result<ModelRecord, serde
         views: *views,
         generated_views: *generated_views,
         learnt_ms: *learnt_ms,
-        points_asked: model.points_asked,
     })
 }
 
@@ -257,7 +255,6 @@ impl ModelRecord {
                 generated_views: count("generated_views", self.generated_views)?,
                 learnt_ms: self.learnt_ms,
             },
-            points_asked: self.points_asked,
         })
     }
 }

@@ -185,31 +185,6 @@ fn bad_settings_are_named() {
 }
 
 #[test]
-fn a_file_of_an_earlier_build_reads() {
-    let dir = tempfile::tempdir().unwrap();
-    let file = |text: &str| {
-        let path = dir.path().join("waymark.toml");
-        std::fs::write(&path, text).unwrap();
-        RawConfig::read(Some(&path)).unwrap()
-    };
-    let quads = "[algorithm.detect.quads]";
-    let earlier = file(&format!(
-        "{quads}
-grouping = \"hypotheses\"
-hypotheses.min_support = 0.25
-"
-    ));
-    let now = file(&format!(
-        "{quads}
-grouping = \"proposals\"
-proposals.min_support = 0.25
-"
-    ));
-    assert_eq!(earlier, now);
-    assert!((now.algorithm.detect.quads.proposals.min_support - 0.25).abs() < 1e-12);
-}
-
-#[test]
 fn a_missing_file_and_an_unknown_setting_are_errors() {
     assert!(RawConfig::read(Some(Path::new("/nonexistent/waymark.toml"))).is_err());
     let unknown: Result<RawConfig, _> = Figment::from(Toml::string("colour = 3")).extract();

@@ -20,7 +20,7 @@ use vision::model::LandmarkId;
 /// Frames that wait; further ones are dropped.
 pub(crate) const QUEUE: usize = 8;
 
-/// Counts of a gathering's frames and quads, stored as JSON when it ends; the aliases are words of earlier builds.
+/// Counts of a gathering's frames and quads, stored as JSON when it ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(default)]
 pub(crate) struct GatheringCounts {
@@ -29,7 +29,6 @@ pub(crate) struct GatheringCounts {
     /// Of these, dropped because the queue was full.
     pub(crate) dropped: u64,
     /// Frames on another map.
-    #[serde(alias = "elsewhere")]
     pub(crate) other_map: u64,
     /// Quads that were too small, clipped or blurred to have an icon.
     pub(crate) unusable: u64,
@@ -38,29 +37,22 @@ pub(crate) struct GatheringCounts {
     /// Views that were stored.
     pub(crate) kept: u64,
     /// Quads that are near-duplicates of a view.
-    #[serde(alias = "alike")]
     pub(crate) near_duplicate: u64,
     /// Quads with too few observations so far.
-    #[serde(alias = "too_new")]
     pub(crate) too_few_observations: u64,
     /// Quads of tracks with all the views that they may have.
     pub(crate) full: u64,
     /// Quads of tracks that were accepted or discarded.
     pub(crate) decided: u64,
     /// Quads that show a landmark, or may show one.
-    #[serde(alias = "known")]
     pub(crate) known_landmark: u64,
     /// Quads that show no landmark, where only landmarks are wanted.
-    #[serde(alias = "unwanted")]
     pub(crate) not_requested: u64,
     /// Quads at the place of a track with another appearance.
-    #[serde(alias = "unlike")]
     pub(crate) appearance_mismatch: u64,
     /// Quads beyond the number of tracks.
-    #[serde(alias = "too_many")]
     pub(crate) track_limit: u64,
     /// Views that were not stored because a bound was reached or the disk was full.
-    #[serde(alias = "refused")]
     pub(crate) not_stored: u64,
 }
 

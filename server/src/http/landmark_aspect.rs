@@ -65,7 +65,7 @@ pub(super) async fn check_view(
         Err(StoreError::NotFound { .. }) => None,
         found => Some(found?),
     };
-    let by_hand = row.as_ref().and_then(|row| row.geometry.size.filter(|_| !row.geometry.size_from_views));
+    let by_hand = row.as_ref().and_then(|row| row.geometry.size_by_hand());
     // Another size than that by hand is refused as such.
     let Some(stated) = given.or(by_hand) else { return Ok(()) };
     let shown = shown_by_views(app, row.map(|row| row.id), Some(view)).await?;

@@ -63,7 +63,7 @@ pub(super) fn geometry(size: Option<Size>, place: Option<Place>) -> Result<Landm
         tilt_rad: p.tilt_rad,
         covariance: None,
     });
-    Ok(LandmarkGeometry { size, place, size_from_views: false })
+    Ok(LandmarkGeometry { size, place, ..LandmarkGeometry::default() })
 }
 
 /// A size within its ranges. Errors: `out_of_range`, with the side.
@@ -88,24 +88,6 @@ fn health_shown(health: LandmarkHealth) -> LandmarkHealthBody {
         LandmarkHealth::Sound => LandmarkHealthBody::Sound,
         LandmarkHealth::Flagged => LandmarkHealthBody::Flagged,
         LandmarkHealth::Quarantined => LandmarkHealthBody::Quarantined,
-    }
-}
-
-/// Facts of a stored model: keys of earlier builds become those of now.
-fn facts_shown(facts: Map<String, Value>) -> Map<String, Value> {
-    let key = |key: String| match key.as_str() {
-        "likeness" => "gradient_similarity".to_owned(),
-        "tau" => "threshold".to_owned(),
-        _ => key,
-    };
-    facts.into_iter().map(|(of, fact)| (key(of), fact_shown(fact))).collect()
-}
-
-fn fact_shown(fact: Value) -> Value {
-    match fact {
-        Value::Object(parts) => Value::Object(facts_shown(parts)),
-        Value::Array(items) => items.into_iter().map(fact_shown).collect(),
-        other => other,
     }
 }
 
@@ -141,8 +123,7 @@ fn look_alikes_shown(stored: &mut Value, snapshot: Option<&MapSnapshot>) -> Vec<
 fn landmark_shown(row: LandmarkRow, context: &Context<'_>) -> Landmark {
     let (mut failed_gates, mut is_active) = (Vec::<FailedGate>::new(), false);
     let model = row.model.map(|m| {
-        let mut facts: Map<String, Value> =
-            serde_json::from_str(&m.facts).map(facts_shown).unwrap_or_default();
+        let mut facts: Map<String, Value> = serde_json::from_str(&m.facts).unwrap_or_default();
         let look_alikes = facts.get_mut("look_alikes").map(|l| look_alikes_shown(l, context.snapshot));
         is_active = m.active && context.unusable.is_none();
         failed_gates = if let Some(reason) = &context.unusable {
@@ -304,12 +285,8 @@ async fn patch(
                 Some(new) => landmarks::rename(tx, &map, &landmark, new.as_str()).await?,
                 None => landmark,
             };
-            let changed = landmarks::update(tx, &map, &landmark, |old| LandmarkGeometry {
-                size: if size { checked.size } else { old.size },
-                place: if place { checked.place } else { old.place },
-                size_from_views: old.size_from_views && !size,
-            })
-            .await?;
+            let changed =
+                landmarks::update(tx, &map, &landmark, |old| old.edited(&checked, (size, place))).await?;
             match health {
                 Some(health) => landmarks::set_health(tx, &map, &landmark, health, None).await,
                 None => Ok(changed),

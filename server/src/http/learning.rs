@@ -82,7 +82,6 @@ async fn learn_one(
     let request = request::Request {
         landmarks: Some(vec![landmark]),
         generated_views: check_generated(lesson.generated_views)?,
-        only_points: false,
     };
     submit(&app, &map, request).await
 }
@@ -108,7 +107,6 @@ async fn learn_map(
     let request = request::Request {
         landmarks: lesson.landmarks,
         generated_views: check_generated(lesson.generated_views)?,
-        only_points: false,
     };
     submit(&app, &map, request).await
 }

@@ -2,7 +2,6 @@
 
 mod authorisation;
 mod creation;
-mod earlier_build;
 mod events;
 mod lists;
 mod metrics;

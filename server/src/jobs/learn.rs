@@ -11,7 +11,6 @@ use super::{
     look_alikes::look_alikes,
     negatives::{Negatives, each, spread, untaught_distractors},
     pictures::{Pictures, point_views},
-    points,
     request::Request,
     spread_work::each_of,
 };
@@ -87,9 +86,6 @@ pub(super) async fn run(
 ) -> Result<(), JobError> {
     let started = Instant::now();
     let request = Request::from_json(&row.request);
-    if request.only_points {
-        return points::run(store, config, row, request.landmarks.unwrap_or_default(), reporter).await;
-    }
     let map = maps::get(store.reads(), &row.map).await?;
     let material = read_material(store, config, &map, &request).await?;
     let names: BTreeMap<LandmarkId, String> =
@@ -339,3 +335,6 @@ fn collect_negatives(
         .set_distractors(m.distractors.iter().map(|s| features(s.clone(), &m.params.recognise)).collect());
     Ok(negatives)
 }
+
+#[cfg(test)]
+mod tests;

@@ -10,7 +10,6 @@ mod lesson_result;
 mod negatives;
 mod look_alikes;
 mod pictures;
-mod points;
 pub(crate) mod request;
 mod spread_work;
 
@@ -230,13 +229,12 @@ impl Jobs {
         write.await
     }
 
-    /// What the open jobs of a map learn. Models that only get points stay as they are.
+    /// What the open jobs of a map learn.
     pub(crate) async fn learning(&self, map: &str) -> Result<Learning, StoreError> {
         let mut learning = Learning::default();
         for row in jobs::open(self.store.reads()).await?.into_iter().filter(|row| row.map == map) {
             let request = request::Request::from_json(&row.request);
             match request.landmarks {
-                _ if request.only_points => {}
                 Some(names) => learning.landmarks.extend(names),
                 None => learning.all = true,
             }

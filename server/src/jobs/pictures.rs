@@ -1,4 +1,4 @@
-//! Stored photographs of landmarks, and the points in them.
+//! Stored photographs of landmarks, and those that give points.
 
 use super::negatives::spread;
 use crate::{
@@ -9,7 +9,7 @@ use crate::{
 use engine::{decode::ImageLimits, picture, threads::wait_for};
 use vision::{
     frame::{GrayImage, Picture},
-    points::taught::{MAX_POINT_VIEWS, TaughtPoint, view_points},
+    points::taught::MAX_POINT_VIEWS,
 };
 
 /// The stored pictures, for threads outside of the runtime.
@@ -44,10 +44,4 @@ impl Pictures {
 /// The photographs of a landmark that give it points.
 pub(super) fn point_views(views: &[TrainingViewRow]) -> impl Iterator<Item = &TrainingViewRow> {
     spread(views, MAX_POINT_VIEWS)
-}
-
-/// The points of a landmark's photographs; those that cannot be read are left out.
-pub(super) fn points_of(views: &[TrainingViewRow], pictures: &Pictures) -> Vec<Vec<TaughtPoint>> {
-    let of = |view: &TrainingViewRow| Some(view_points(&pictures.of(view)?, &view.crop.corners_px));
-    point_views(views).filter_map(of).collect()
 }

@@ -14,7 +14,4 @@ pub(crate) struct Request {
     /// Views generated from each photograph; `None` fills up to thirty views where photographs are few.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) generated_views: Option<usize>,
-    /// The models stay as they are, and those without points get them: see [`super::points`].
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub(crate) only_points: bool,
 }

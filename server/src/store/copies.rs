@@ -37,8 +37,6 @@ statements! {
                 JOIN landmarks l ON l.id = v.landmark_id JOIN maps m ON m.id = l.map_id WHERE v.image_sha256 = ?1 LIMIT 1";
 }
 
-/// First schema with an audit log.
-const AUDIT_SCHEMA: i64 = 30;
 /// Most faults that are listed.
 const MAX_FAULTS: usize = 20;
 
@@ -112,10 +110,8 @@ pub(crate) async fn examine(file: &Path) -> Result<(Contents, Vec<String>), Stor
         faults.push(format!("{dangling} rows refer to others that are not there"));
     }
     check_models(&mut conn, &mut faults).await?;
-    if schema(&mut conn).await? >= AUDIT_SCHEMA {
-        let chain = audit::check(&mut conn, None).await?;
-        faults.extend(chain.fault.map(|fault| format!("the audit log: {fault}")));
-    }
+    let chain = audit::check(&mut conn, None).await?;
+    faults.extend(chain.fault.map(|fault| format!("the audit log: {fault}")));
     let pictures = check_pictures(&mut conn, &mut faults).await?;
     faults.truncate(MAX_FAULTS);
     Ok((Contents { pictures, ..contents(&mut conn).await? }, faults))

@@ -220,15 +220,6 @@ impl StoreError {
         }
     }
 
-    /// Whether the disk has no room, or takes nothing: the same may be written later.
-    pub(crate) fn is_of_the_disk(&self) -> bool {
-        match self {
-            Self::Full | Self::NearlyFull(_) | Self::ReadOnly => true,
-            Self::At { source, .. } => source.is_of_the_disk(),
-            _ => false,
-        }
-    }
-
     /// That of one of several.
     pub(crate) fn at(self, index: usize) -> Self {
         Self::At { index, source: Box::new(self) }

@@ -68,15 +68,6 @@ async fn stamp_of(store: &Store, map: &str, landmark: &str) -> Result<Stamp, Sto
     stamp.ok_or_else(|| StoreError::NotFound { what: Kind::Landmark, name: landmark.to_owned() })
 }
 
-/// Size and place of the one, or of the other where it has none.
-fn filled(into: &LandmarkGeometry, from: &LandmarkGeometry) -> LandmarkGeometry {
-    let (size, size_from_views) = match into.size {
-        Some(size) => (Some(size), into.size_from_views),
-        None => (from.size, from.size_from_views),
-    };
-    LandmarkGeometry { size, size_from_views, place: into.place.or(from.place) }
-}
-
 async fn prepare(store: &Store, Merge { map, into, from, .. }: &Merge) -> Result<Prepared, StoreError> {
     let number = maps::get(store.reads(), map).await?.id;
     // They are read first, so that the write notices whatever changes after it.
@@ -84,7 +75,7 @@ async fn prepare(store: &Store, Merge { map, into, from, .. }: &Merge) -> Result
     let mut captures = landmark_placement::captures(store.reads(), into.landmark()).await?;
     captures.extend(landmark_placement::captures(store.reads(), from.landmark()).await?);
     let walls = teaching::wall_segments(store, number).await?;
-    let geometry = filled(&into.geometry, &from.geometry);
+    let geometry = into.geometry.or(&from.geometry);
     let work = move || Prepared {
         placement: landmark_placement::place_landmark(&captures, &walls, &geometry),
         into,

@@ -216,7 +216,7 @@ pub(super) fn place_landmark(
         captures.iter().take(MAX_CAPTURES).filter_map(taken).collect();
     match placed(&views, walls) {
         Ok(made) => {
-            let by_hand = now.size.filter(|_| !now.size_from_views);
+            let by_hand = now.size_by_hand();
             PlacementOutcome::Placed(Box::new(geometry_of(&made.place, by_hand)), made.used.len())
         }
         Err(error) => PlacementOutcome::NotPlaced(error.to_string()),

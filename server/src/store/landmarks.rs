@@ -10,13 +10,25 @@ use protos::api::{Place, Size, SizeAndPlace};
 use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
 use vision::{model::LandmarkId, pose::LandmarkSize};
 
+/// The columns that [`geometry`] reads, with what names their table.
+macro_rules! geometry_columns {
+    ($of:literal) => {
+        geometry_columns!(@ $of, "width_m" "height_m" "x_m" "y_m" "z_m" "theta_rad" "roll_rad" "tilt_rad"
+            "place_covariance" "size_from_views")
+    };
+    (@ $of:literal, $first:literal $($column:literal)*) => {
+        concat!($of, $first $(, ", ", $of, $column)*)
+    };
+}
+pub(super) use geometry_columns;
+
 /// Columns of [`LandmarkRow`]; views and model are joined so that a list is one query.
 macro_rules! select {
     ($tail:literal) => {
         concat!(
-            "SELECT l.id, l.name, l.id || '.' || l.revision AS revision, l.changed_ms, l.width_m, l.height_m, l.x_m, l.y_m, l.z_m, l.theta_rad, \
-             l.roll_rad, l.tilt_rad, l.place_covariance, l.size_from_views, l.health, l.finding, \
-             (SELECT count(*) FROM views v WHERE v.landmark_id = l.id) AS views, \
+            "SELECT l.id, l.name, l.id || '.' || l.revision AS revision, l.changed_ms, l.health, l.finding, ",
+            geometry_columns!("l."),
+            ", (SELECT count(*) FROM views v WHERE v.landmark_id = l.id) AS views, \
              m.active, m.looks_like, m.reasons, m.facts, m.views AS model_views, m.generated_views, m.learnt_ms \
              FROM landmarks l LEFT JOIN models m ON m.landmark_id = l.id ",
             $tail
@@ -62,6 +74,32 @@ pub(crate) struct LandmarkGeometry {
 }
 
 impl LandmarkGeometry {
+    /// The size, if it was set by hand.
+    pub(crate) fn size_by_hand(&self) -> Option<LandmarkSize> {
+        self.size.filter(|_| !self.size_from_views)
+    }
+
+    /// With the size and the place of `by_hand`, if a person sets them.
+    pub(crate) fn edited(self, by_hand: &Self, (size, place): (bool, bool)) -> Self {
+        Self {
+            size: if size { by_hand.size } else { self.size },
+            place: if place { by_hand.place } else { self.place },
+            size_from_views: self.size_from_views && !size,
+        }
+    }
+
+    /// With the size and place of `other` where it has none.
+    pub(crate) fn or(self, other: &Self) -> Self {
+        let sized = if self.size.is_some() { &self } else { other };
+        Self { place: self.place.or(other.place), ..*sized }
+    }
+
+    /// In what another one differs: `size`, `place`.
+    pub(crate) fn differences(&self, other: &Self) -> impl Iterator<Item = &'static str> {
+        let size = (self.size, self.size_from_views) != (other.size, other.size_from_views);
+        size.then_some("size").into_iter().chain((self.place != other.place).then_some("place"))
+    }
+
     /// Size and place as they are shown.
     pub(crate) fn shown(&self) -> SizeAndPlace {
         let size = self.size.map(|s| Size { width_m: s.width_m, height_m: s.height_m });
@@ -144,8 +182,7 @@ pub(super) fn geometry(row: &SqliteRow) -> Result<LandmarkGeometry, sqlx::Error>
     let size = real("width_m")?.zip(real("height_m")?);
     let (xy, zt) = (real("x_m")?.zip(real("y_m")?), real("z_m")?.zip(real("theta_rad")?));
     let (roll_rad, tilt_rad) = (real("roll_rad")?.unwrap_or(0.0), real("tilt_rad")?.unwrap_or(0.0));
-    let covariance: Option<Vec<u8>> = row.try_get("place_covariance")?;
-    let covariance = covariance.as_deref().and_then(covariance_of);
+    let covariance = row.try_get::<Option<&[u8]>, _>("place_covariance")?.and_then(covariance_of);
     Ok(LandmarkGeometry {
         size: size.map(|(width_m, height_m)| LandmarkSize { width_m, height_m }),
         place: xy.zip(zt).map(|((x_m, y_m), (z_m, theta_rad))| StoredPlace {
@@ -191,8 +228,8 @@ pub(super) async fn set_geometry(
         .bind(size.map(|_| geometry.size_from_views))
         .execute(&mut tx.conn)
         .await
-        .map_err(StoreError::during("measure landmark"))?;
-    Ok(())
+        .map(drop)
+        .map_err(StoreError::during("measure landmark"))
 }
 
 fn landmark_row(row: &SqliteRow) -> Result<LandmarkRow, sqlx::Error> {

@@ -1,6 +1,12 @@
 //! The rows that a version of a map is made of: the map itself and its landmarks.
 
-use super::{StoreError, landmarks, maps, statements::statements, visibility_settings};
+use super::{
+    StoreError,
+    landmarks::{self, geometry_columns},
+    maps,
+    statements::statements,
+    visibility_settings,
+};
 use map::{landmark_health::LandmarkHealth, visibility::VisibilitySettings};
 use sqlx::{Row, SqliteConnection};
 use std::collections::BTreeMap;
@@ -12,8 +18,8 @@ statements! {
     MAP_IDS = "SELECT id FROM maps ORDER BY id";
     ROWS = "SELECT coalesce(group_concat(id || ' ' || revision || ' ' || changed_ms || ' ' || health, ';'), '') \
             FROM landmarks WHERE map_id = ?1";
-    LANDMARKS = "SELECT id, name, width_m, height_m, x_m, y_m, z_m, theta_rad, roll_rad, tilt_rad, place_covariance, \
-                 size_from_views FROM landmarks WHERE map_id = ?1 AND id IN (SELECT value FROM json_each(?2))";
+    LANDMARKS = concat!("SELECT id, name, ", geometry_columns!(""), " FROM landmarks WHERE map_id = ?1 \
+                AND id IN (SELECT value FROM json_each(?2))");
 }
 
 /// A map without what belongs to it.

@@ -10,6 +10,7 @@ pub(crate) mod kind;
 pub(crate) mod migrations;
 pub(crate) mod open;
 mod checkpoint;
+mod derived_schema;
 mod writer;
 mod statements;
 pub(crate) mod map_rows;
@@ -294,5 +295,3 @@ mod io_errors;
 mod power_cuts;
 #[cfg(test)]
 mod tests;
-#[cfg(test)]
-mod upgrades;

@@ -36,19 +36,19 @@ pub(crate) struct ModalitySettings {
     pub(crate) named: Vec<NamedArea>,
 }
 
-/// The word of the column, whose CHECK knows the words of earlier builds.
+/// The word of the column.
 pub(super) fn mode_word(mode: FusionMode) -> &'static str {
     match mode {
         FusionMode::All => "all",
-        FusionMode::NearBest => "fuse",
-        FusionMode::Best => "single",
+        FusionMode::NearBest => "near_best",
+        FusionMode::Best => "best",
     }
 }
 
 pub(super) fn mode_of(word: &str) -> FusionMode {
     match word {
-        "fuse" => FusionMode::NearBest,
-        "single" => FusionMode::Best,
+        "near_best" => FusionMode::NearBest,
+        "best" => FusionMode::Best,
         _ => FusionMode::All,
     }
 }

@@ -23,15 +23,6 @@ statements! {
                JOIN landmarks l ON l.id = m.landmark_id WHERE l.map_id = ?1 AND m.looks_like IS NULL";
     REFUSED = "SELECT m.landmark_id FROM models m JOIN landmarks l ON l.id = m.landmark_id \
                WHERE l.map_id = ?1 AND m.looks_like IS NOT NULL";
-    REPLACE_BYTES = "INSERT INTO model_contents (sha256, bytes) SELECT ?3, ?4 \
-                     WHERE EXISTS (SELECT 1 FROM models WHERE landmark_id = ?1 AND sha256 = ?2) \
-                     ON CONFLICT (sha256) DO UPDATE SET bytes = excluded.bytes";
-    REPLACE = "UPDATE models SET sha256 = ?3, facts = json_set(facts, '$.points', ?4) \
-               WHERE landmark_id = ?1 AND sha256 = ?2";
-    WITHOUT_POINTS_JOB = "SELECT m.landmark_id FROM models m JOIN landmarks l ON l.id = m.landmark_id \
-                        WHERE l.map_id = ?1 AND m.points_asked = 0 \
-                        AND EXISTS (SELECT 1 FROM views v WHERE v.landmark_id = m.landmark_id)";
-    ASK_POINTS = "UPDATE models SET points_asked = 1 WHERE landmark_id = ?1";
     GET = "SELECT c.bytes FROM models m JOIN model_contents c ON c.sha256 = m.sha256 WHERE m.landmark_id = ?1";
 }
 
@@ -79,53 +70,6 @@ pub(crate) async fn put(tx: &mut Tx, map_id: i64, new: &NewModel) -> Result<bool
         .await
         .map_err(StoreError::during("store model"))?;
     Ok(done.rows_affected() == 1)
-}
-
-/// Puts the bytes of the same model with points in the place of the model with the digest `was`; says whether that one was
-/// still there.
-pub(crate) async fn replace(
-    tx: &mut Tx,
-    landmark: LandmarkId,
-    (was, bytes): (ModelDigest, &[u8]),
-    points: usize,
-) -> Result<bool, StoreError> {
-    let sha256 = digest(bytes);
-    sqlx::query(REPLACE_BYTES)
-        .bind(landmark.0 as i64)
-        .bind(&was[..])
-        .bind(&sha256[..])
-        .bind(bytes)
-        .execute(&mut tx.conn)
-        .await
-        .map_err(StoreError::during("store the bytes of a model"))?;
-    let done = sqlx::query(REPLACE)
-        .bind(landmark.0 as i64)
-        .bind(&was[..])
-        .bind(&sha256[..])
-        .bind(points as i64)
-        .execute(&mut tx.conn)
-        .await
-        .map_err(StoreError::during("replace model"))?;
-    Ok(done.rows_affected() == 1)
-}
-
-/// Landmarks of a map that have a model and views, and for whose model points were not asked yet.
-pub(crate) async fn points_not_asked(
-    db: impl SqliteExecutor<'_>,
-    map_id: i64,
-) -> Result<BTreeSet<LandmarkId>, StoreError> {
-    let ids = sqlx::query_scalar::<_, i64>(WITHOUT_POINTS_JOB).bind(map_id).fetch_all(db).await;
-    let ids = ids.map_err(StoreError::during("list models without points"))?;
-    Ok(ids.into_iter().map(|id| LandmarkId(id as u64)).collect())
-}
-
-/// Notes that points were asked for these models.
-pub(crate) async fn ask_points(tx: &mut Tx, landmarks: &[LandmarkId]) -> Result<(), StoreError> {
-    for landmark in landmarks {
-        let done = sqlx::query(ASK_POINTS).bind(landmark.0 as i64).execute(&mut tx.conn).await;
-        done.map_err(StoreError::during("ask for points"))?;
-    }
-    Ok(())
 }
 
 /// Landmarks of a map that are refused because they look like one in use.

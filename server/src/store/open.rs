@@ -12,8 +12,8 @@ use std::{
 };
 
 use super::{
-    StoreError, checkpoint::renew_log, disk_guard, error::is_without_room, history, migrations, pictures,
-    restored, schema,
+    StoreError, checkpoint::renew_log, derived_schema, disk_guard, error::is_without_room, history,
+    migrations, restored, schema,
 };
 use crate::private_file::{self, OpenToOthers};
 
@@ -163,7 +163,7 @@ async fn prepare(
     check_pragmas(writer).await?;
     check_integrity(writer).await?;
     migrations::migrator().run(&mut *writer).await.map_err(OpenError::Migrate)?;
-    pictures::move_underlays(writer).await.map_err(OpenError::Open)?;
+    derived_schema::complete(writer).await.map_err(OpenError::Open)?;
     history::close_outside(writer).await.map_err(OpenError::Open)?;
     let reads = SqlitePoolOptions::new()
         .max_connections(READERS)
@@ -328,6 +328,24 @@ mod tests {
             check_pragmas(&mut opened.writer).await,
             Err(OpenError::Pragma { pragma: "synchronous", .. })
         ));
+    }
+
+    #[tokio::test]
+    async fn another_schema_is_refused() {
+        let newer = "INSERT INTO _sqlx_migrations (version, description, success, checksum, execution_time) \
+                     VALUES (9999, 'later', 1, x'00', 0)";
+        let other = "UPDATE _sqlx_migrations SET checksum = x'00' WHERE version = 1";
+        for (change, says) in [(newer, "migration 9999"), (other, "migration 1 ")] {
+            let dir = tempfile::tempdir().unwrap();
+            let mut opened = open(dir.path(), None).await.unwrap();
+            sqlx::raw_sql(change).execute(&mut opened.writer).await.unwrap();
+            opened.reads.close().await;
+            opened.writer.close().await.unwrap();
+            drop(opened.lock);
+            let refused = open(dir.path(), None).await.err().unwrap();
+            let OpenError::Migrate(cause) = &refused else { panic!("{refused}") };
+            assert!(cause.to_string().contains(says), "{cause}");
+        }
     }
 
     #[tokio::test]

@@ -4,7 +4,7 @@
 
 use super::{Store, StoreError, Tx, error::is_damage, kind::Kind, now_ms, statements::statements};
 use sha2::{Digest as _, Sha256};
-use sqlx::{Row, SqliteConnection, SqliteExecutor};
+use sqlx::{Row, SqliteExecutor};
 use std::time::Duration;
 use tokio::sync::watch;
 
@@ -28,8 +28,6 @@ statements! {
                JOIN underlays u ON u.image_sha256 = d.sha256 JOIN maps m ON m.id = u.map_id) \
                SELECT (SELECT count(*) FROM shown), (SELECT json_group_array(what) FROM (SELECT what FROM shown \
                WHERE ?2 IS NULL OR map IN (SELECT value FROM json_each(?2)) ORDER BY what LIMIT ?1))";
-    UNHASHED = "SELECT map_id, image FROM underlays WHERE image IS NOT NULL LIMIT 1";
-    HASHED = "UPDATE underlays SET image_sha256 = ?2, image = NULL WHERE map_id = ?1";
 }
 
 /// SHA-256 of a picture.
@@ -174,25 +172,6 @@ pub(crate) async fn check_all(store: Store, mut stopping: watch::Receiver<bool>)
         }
     }
     tracing::info!(count, damaged, "pictures_checked");
-}
-
-/// Moves the pictures of underlays that an earlier schema stored in their rows.
-pub(super) async fn move_underlays(conn: &mut SqliteConnection) -> Result<(), sqlx::Error> {
-    sqlx::raw_sql("BEGIN IMMEDIATE").execute(&mut *conn).await?;
-    let moved = move_each(&mut *conn).await;
-    let end = if moved.is_ok() { "COMMIT" } else { "ROLLBACK" };
-    sqlx::raw_sql(end).execute(conn).await?;
-    moved
-}
-
-async fn move_each(conn: &mut SqliteConnection) -> Result<(), sqlx::Error> {
-    while let Some(row) = sqlx::query(UNHASHED).fetch_optional(&mut *conn).await? {
-        let (map, image): (i64, Vec<u8>) = (row.try_get("map_id")?, row.try_get("image")?);
-        let sha256 = digest(&image);
-        sqlx::query(PUT).bind(&sha256[..]).bind(&image).execute(&mut *conn).await?;
-        sqlx::query(HASHED).bind(map).bind(&sha256[..]).execute(&mut *conn).await?;
-    }
-    Ok(())
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use super::{
     Store, StoreError, Tx,
     kind::Kind,
     landmark_placement::{self, PlacementOutcome, PlacementReport},
-    landmarks::{self, LandmarkGeometry},
+    landmarks::{self, LandmarkGeometry, geometry_columns},
     maps, pictures,
     statements::statements,
     views::{self, NewView, QuadCrop, UploadOutcome, ViewRow},
@@ -25,9 +25,8 @@ use vision::{
 };
 
 statements! {
-    STAMP = "SELECT m.id AS map, m.walls_version, l.id AS landmark, l.revision, l.width_m, l.height_m, l.x_m, l.y_m, l.z_m, l.theta_rad, l.roll_rad, \
-             l.tilt_rad, l.place_covariance, l.size_from_views FROM maps m JOIN landmarks l ON l.map_id = m.id \
-             WHERE m.name = ?1 AND l.name = ?2";
+    STAMP = concat!("SELECT m.id AS map, m.walls_version, l.id AS landmark, l.revision, ", geometry_columns!("l."),
+            " FROM maps m JOIN landmarks l ON l.map_id = m.id WHERE m.name = ?1 AND l.name = ?2");
 }
 
 /// Two sizes are the same up to the rounding of their text.
@@ -114,14 +113,14 @@ impl Teaching {
     /// The geometry of the landmark with the size that is given. Errors: `SizeDiffers`.
     fn sized(&self, now: &LandmarkGeometry) -> Result<LandmarkGeometry, StoreError> {
         let Some(given) = self.size else { return Ok(*now) };
-        if let Some(stored) = now.size.filter(|_| !now.size_from_views) {
+        if let Some(stored) = now.size_by_hand() {
             let off_m = (stored.width_m - given.width_m).abs().max((stored.height_m - given.height_m).abs());
             if off_m > SAME_SIZE_M {
                 return Err(StoreError::SizeDiffers { landmark: self.landmark.clone(), stored, given });
             }
             return Ok(*now);
         }
-        Ok(LandmarkGeometry { size: Some(given), size_from_views: false, ..*now })
+        Ok(now.edited(&LandmarkGeometry { size: Some(given), place: None, ..*now }, (true, false)))
     }
 }
 

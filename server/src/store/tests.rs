@@ -17,6 +17,7 @@ async fn every_statement_prepares_on_the_migrated_schema() {
         copies::ALL,
         integrity::ALL,
         schema::ALL,
+        derived_schema::ALL,
         pictures::ALL,
         views::ALL,
         aspect_views::ALL,

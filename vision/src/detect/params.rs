@@ -41,7 +41,6 @@ pub enum Grouping {
     Relaxation,
     /// Corner chains with a searched fourth side, checked against the gradient.
     #[default]
-    #[serde(alias = "hypotheses")]
     Proposals,
 }
 
@@ -56,7 +55,7 @@ pub enum Nested {
     Quads,
 }
 
-/// Parameters of the last stage. Files of parameters may have the words of earlier builds, too.
+/// Parameters of the last stage.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct QuadParams {
@@ -69,7 +68,6 @@ pub struct QuadParams {
     /// scale.
     pub scales: usize,
     /// Quad proposals of the default detector.
-    #[serde(alias = "hypotheses")]
     pub proposals: ProposalParams,
     /// Share of each side that edges must support for the outermost border of a group to be its quad.
     pub min_side_support: f64,
@@ -91,18 +89,10 @@ pub struct QuadParams {
     /// Whether the default detector moves each side to the line beside it that looks most like a border.
     pub choose_sides: bool,
     /// Network that scores the lines of a side; the built-in weights if absent.
-    #[serde(
-        alias = "side_model",
-        skip_serializing_if = "Option::is_none",
-        deserialize_with = "checked::<SIDE_FEATURES, _>"
-    )]
+    #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "checked::<SIDE_FEATURES, _>")]
     pub border_model: Option<Network>,
     /// Network of the quad classifier; the built-in weights if absent.
-    #[serde(
-        alias = "thing_model",
-        skip_serializing_if = "Option::is_none",
-        deserialize_with = "checked::<QUAD_FEATURES, _>"
-    )]
+    #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "checked::<QUAD_FEATURES, _>")]
     pub quad_classifier: Option<Network>,
     /// Smallest probability that a quad of the default detector is an object, for people: in pictures of what was
     /// detected, for teaching and gathering, and in answers for quads that no landmark was recognised in.

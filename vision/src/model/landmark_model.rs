@@ -89,8 +89,8 @@ pub struct LandmarkModel {
     pub photographed_v_c: f64,
     /// Whether it may be used.
     pub status: ModelStatus,
-    /// Points of up to three photographed views (`points/`). Empty where none were given, and in models that were
-    /// stored before there were any: see [`LandmarkModel::knows_points`].
+    /// Points of up to three photographed views (`points/`). Empty where none were given: see
+    /// [`LandmarkModel::knows_points`].
     pub points: Vec<TaughtPoint>,
     /// Whether points were extracted, even if none were found.
     pub knows_points: bool,

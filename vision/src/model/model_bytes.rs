@@ -20,8 +20,6 @@ use std::ops::Range;
 const MAX_BYTES: usize = 3 * MAX_ICON_SIZE * MAX_ICON_SIZE + MAX_LANDMARK_POINTS * POINT_BYTES + 8 * 1024;
 const MAGIC: [u8; 4] = *b"WMLM";
 const VERSION: u16 = 3;
-/// The last version without points.
-const WITHOUT_POINTS: u16 = 2;
 const DIGEST_BYTES: usize = 8;
 /// Where the landmark's number is, in every format: after the magic, the version and the hash of the parameters.
 const ID_AT: Range<usize> = 14..22;
@@ -102,21 +100,18 @@ impl LandmarkModel {
         let (content, stored_digest) = bytes.split_at(bytes.len() - DIGEST_BYTES);
         let mut reader = Reader { rest: &content[MAGIC.len()..] };
         let found = u16::from_le_bytes(reader.take("version")?);
-        if !(WITHOUT_POINTS..=VERSION).contains(&found) {
+        if found != VERSION {
             return Err(StoredModelError::Version { found });
         }
-        let version = found;
         if stored_digest != digest(content).to_le_bytes() {
             return Err(StoredModelError::Damaged);
         }
         let (found, expected) = (u64::from_le_bytes(reader.take("params_hash")?), p.distance_hash());
-        if !p.has_distance_hash(found) {
+        if found != expected {
             return Err(StoredModelError::Params { found, expected });
         }
         let mut model = reader.model(expected, p)?;
-        if version > WITHOUT_POINTS {
-            (model.knows_points, model.points) = reader.points()?;
-        }
+        (model.knows_points, model.points) = reader.points()?;
         if !reader.rest.is_empty() {
             return Err(StoredModelError::Malformed { field: "length" });
         }
@@ -124,7 +119,7 @@ impl LandmarkModel {
     }
 }
 
-/// Bytes of the model of a landmark as those of the same model of another one, of whatever format and parameters. Done twice,
+/// Bytes of the model of a landmark as those of the same model of another one, of whatever parameters. Done twice,
 /// with the first number the second time, it gives the first bytes.
 pub fn renumbered(bytes: &[u8], id: LandmarkId) -> Result<Vec<u8>, StoredModelError> {
     if bytes.len() > MAX_BYTES || bytes.len() < ID_AT.end + DIGEST_BYTES || !bytes.starts_with(&MAGIC) {
@@ -135,7 +130,7 @@ pub fn renumbered(bytes: &[u8], id: LandmarkId) -> Result<Vec<u8>, StoredModelEr
         return Err(StoredModelError::Damaged);
     }
     let found = u16::from_le_bytes([bytes[MAGIC.len()], bytes[MAGIC.len() + 1]]);
-    if !(WITHOUT_POINTS..=VERSION).contains(&found) {
+    if found != VERSION {
         return Err(StoredModelError::Version { found });
     }
     let mut made = content.to_vec();

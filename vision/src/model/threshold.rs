@@ -18,7 +18,7 @@ pub enum LimitedBy {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Threshold {
     /// The threshold; 0 accepts nothing.
-    #[serde(rename = "threshold", alias = "tau")]
+    #[serde(rename = "threshold")]
     pub tau: f64,
     /// Share of other distances below tau.
     pub false_positive_rate: f64,

@@ -20,12 +20,6 @@ impl Params {
         fnv1a(std::iter::once(VERSION).chain(words).flat_map(u64::to_le_bytes))
     }
 
-    /// Whether a threshold stored under `hash` holds for these settings: their own hash, or the one that builds
-    /// before 2026-11-23 wrote for the same settings.
-    pub fn has_distance_hash(&self, hash: u64) -> bool {
-        hash == self.distance_hash() || hash == self.distance_hash_of_text()
-    }
-
     /// Every number that defines the distances, by stage. Only ever appended to; a change of order or meaning raises
     /// [`VERSION`].
     fn distance_numbers(&self) -> [Vec<f64>; 6] {
@@ -51,47 +45,6 @@ impl Params {
             align_numbers.chain(align.min_alike).collect(),
         ]
     }
-
-    /// The hash that builds before 2026-11-23 stored: of a text with the names that types and fields had then. The
-    /// text is frozen; only databases of those builds need it.
-    fn distance_hash_of_text(&self) -> u64 {
-        let (icon, r) = (&self.icon, &self.recognise);
-        let (h, d, c, f, a) = (&r.harris, &r.descriptor, &r.correlation, &r.hausdorff, &r.verdict.align);
-        let text = format!(
-            "(IconParams {{ size: {:?}, min_side_ratio: {:?}, max_outside: {:?}, min_cell_pixels: {:?} }}, \
-             HarrisParams {{ sigma_derivative: {:?}, sigma_integration: {:?}, k: {:?}, relative_threshold: {:?}, \
-             margin_px: {:?}, max_points: {:?}, max_points_per_part: {:?} }}, \
-             DescriptorParams {{ sigma: {:?}, regularisation: {:?}, clip: {:?}, whitening: {:?} }}, \
-             CorrelationParams {{ buckets_per_side: {:?}, rank: {:?}, min_deviation: {:?} }}, \
-             HausdorffParams {{ inlier_fraction: {:?}, min_points: {:?} }}, \
-             AlignParams {{ max_shift: {:?}, sigmas: {:?}, steps: {:?}, min_alike: {:?} }})",
-            icon.size,
-            icon.min_side_ratio,
-            icon.max_outside,
-            icon.min_cell_pixels,
-            h.sigma_derivative,
-            h.sigma_integration,
-            h.k,
-            h.relative_threshold,
-            h.margin_px,
-            h.max_points,
-            h.max_points_per_part,
-            d.sigma,
-            d.regularisation,
-            d.clip,
-            d.whitening,
-            c.buckets_per_side,
-            c.rank,
-            c.min_deviation,
-            f.inlier_fraction,
-            f.min_points,
-            a.max_shift,
-            a.sigmas,
-            a.steps,
-            a.min_alike,
-        );
-        fnv1a(text.bytes())
-    }
 }
 
 /// FNV-1a, 64 bits: stable across builds and machines.
@@ -105,18 +58,12 @@ fn fnv1a(bytes: impl Iterator<Item = u8>) -> u64 {
 mod tests {
     use super::*;
 
-    /// Hash of the default settings. A change here invalidates every stored model of every installation: it needs a
-    /// raised [`VERSION`] and a migration.
+    /// Hash of the default settings. A change here invalidates every stored model of every installation.
     const DEFAULT: u64 = 0xc207_d0a0_41ff_bfb9;
-    /// The hash that builds before 2026-11-23 stored for the default settings.
-    const DEFAULT_OF_TEXT: u64 = 0xe31b_6db6_d7dd_08be;
 
     #[test]
-    fn hashes_of_the_defaults_are_pinned() {
-        let p = Params::default();
-        assert_eq!((p.distance_hash(), p.distance_hash_of_text()), (DEFAULT, DEFAULT_OF_TEXT));
-        assert!(p.has_distance_hash(DEFAULT) && p.has_distance_hash(DEFAULT_OF_TEXT));
-        assert!(!p.has_distance_hash(0));
+    fn the_hash_of_the_defaults_is_pinned() {
+        assert_eq!(Params::default().distance_hash(), DEFAULT);
     }
 
     /// Every number of the six stages changes the hash, and nothing else does.

@@ -122,28 +122,6 @@ async fn a_stored_answer_is_opened_again_with_its_pictures() {
 }
 
 #[tokio::test]
-async fn an_answer_of_an_earlier_build_opens_without_what_it_does_not_have() {
-    let service = Service::start(Limits::default()).await;
-    service.answered("hall", "r1", v1::Status::NoMatch).await;
-    let older = service.store.write(|tx| {
-        Box::pin(async move {
-            let sql = "UPDATE stored_answers SET prior_check = NULL; \
-                       UPDATE stored_answer_icons SET matched = NULL, matches = NULL";
-            sqlx::raw_sql(sql)
-                .execute(tx.conn())
-                .await
-                .map(drop)
-                .map_err(crate::store::StoreError::during("age"))
-        })
-    });
-    older.await.unwrap();
-    let (status, found) = service.get("/api/v1/answers/1").await;
-    assert_eq!((status, &found["prior_check"]), (200, &Value::Null), "{found}");
-    let quad = &found["quads"][0];
-    assert!(quad["matched"].is_null() && quad["icon"].is_string(), "{quad}");
-}
-
-#[tokio::test]
 async fn stored_answers_are_listed_newest_first_and_the_oldest_go() {
     let service = Service::start(Limits::default()).await;
     for (robot, status) in [

@@ -109,8 +109,6 @@ pub(crate) struct ModelContents {
     /// Hash of the distance parameters, little-endian.
     pub(crate) params_hash: [u8; 8],
     pub(crate) summary: ModelSummary,
-    /// A job was queued that gives it its points.
-    pub(crate) points_asked: bool,
 }
 
 /// A quad that is no landmark, beside one in a training picture.

@@ -6,7 +6,7 @@ use super::{
 };
 use crate::store::{
     StoreError,
-    landmarks::{self, ModelSummary},
+    landmarks::{self, ModelSummary, geometry_columns},
     map_locations, maps,
     maps::MapRow,
     modality_stats,
@@ -20,13 +20,13 @@ use vision::model::LandmarkId;
 
 statements! {
     SETTINGS = "SELECT fusion, areas, sight FROM maps WHERE id = ?1";
-    LANDMARKS = "SELECT id, name, width_m, height_m, x_m, y_m, z_m, theta_rad, roll_rad, tilt_rad, place_covariance, \
-                 size_from_views, health, finding, created_ms FROM landmarks WHERE map_id = ?1 ORDER BY id";
+    LANDMARKS = concat!("SELECT id, name, health, finding, created_ms, ", geometry_columns!(""), " FROM landmarks \
+                WHERE map_id = ?1 ORDER BY id");
     VIEWS = "SELECT v.landmark_id, v.image_sha256, v.image_kind, v.width_px, v.height_px, v.corners_px, v.created_ms, \
              v.icon_side, v.icon_scale, v.capture, v.icon FROM views v JOIN landmarks l ON l.id = v.landmark_id \
              WHERE l.map_id = ?1 ORDER BY v.id";
     MODELS = "SELECT m.landmark_id, m.params_hash, m.active, m.reasons, m.facts, m.views, m.generated_views, \
-              m.learnt_ms, m.points_asked, m.looks_like, c.bytes FROM models m \
+              m.learnt_ms, m.looks_like, c.bytes FROM models m \
               JOIN model_contents c ON c.sha256 = m.sha256 JOIN landmarks l ON l.id = m.landmark_id WHERE l.map_id = ?1";
     DISTRACTORS = "SELECT image_sha256, corners_px, icon_side, icon, icon_scale FROM strangers WHERE map_id = ?1 ORDER BY id";
     RUNS = "SELECT robot, created_ms, way_m, cells FROM runs WHERE map_id = ?1 ORDER BY id";
@@ -162,7 +162,6 @@ fn model(row: &SqliteRow) -> Result<ModelContents, sqlx::Error> {
             generated_views: row.try_get::<i64, _>("generated_views")? as u64,
             learnt_ms: row.try_get("learnt_ms")?,
         },
-        points_asked: row.try_get("points_asked")?,
     })
 }
 

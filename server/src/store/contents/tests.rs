@@ -126,7 +126,6 @@ pub(crate) async fn filled(store: &Catalogue) {
             for (landmark, seed) in [(1, 0), (2, 5)] {
                 models::put(tx, 1, &model_of(landmark, seed)).await?;
             }
-            models::ask_points(tx, &[LandmarkId(1)]).await?;
             let known = walls::StoredWall {
                 ends: [0.0, 0.0, 1.0 / 3.0, 0.0],
                 covariance: Some([1e-6, 1e-7 / 3.0, 1e-4]),

@@ -27,11 +27,11 @@ statements! {
             icon_scale, capture, icon) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11)";
     MODEL_BYTES = "INSERT INTO model_contents (sha256, bytes) VALUES (?1, ?2) ON CONFLICT (sha256) DO NOTHING";
     MODEL = "INSERT INTO models (landmark_id, sha256, params_hash, active, reasons, facts, views, generated_views, learnt_ms, \
-             points_asked, looks_like) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11) \
+             looks_like) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10) \
              ON CONFLICT (landmark_id) DO UPDATE SET sha256 = excluded.sha256, params_hash = excluded.params_hash, \
              active = excluded.active, reasons = excluded.reasons, facts = excluded.facts, views = excluded.views, \
              generated_views = excluded.generated_views, learnt_ms = excluded.learnt_ms, \
-             points_asked = excluded.points_asked, looks_like = excluded.looks_like";
+             looks_like = excluded.looks_like";
     DISTRACTOR = "INSERT INTO strangers (map_id, image_sha256, corners_px, icon_side, icon, icon_scale) \
                   VALUES (?1, ?2, ?3, ?4, ?5, ?6) ON CONFLICT DO NOTHING";
     RUN = "INSERT INTO runs (map_id, robot, created_ms, way_m, cells) VALUES (?1, ?2, ?3, ?4, ?5)";
@@ -174,7 +174,6 @@ pub(in crate::store) async fn model(
         .bind(new.summary.views as i64)
         .bind(new.summary.generated_views as i64)
         .bind(new.summary.learnt_ms)
-        .bind(new.points_asked)
         .bind(&new.summary.looks_like)
         .execute(&mut tx.conn)
         .await;

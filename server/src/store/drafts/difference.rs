@@ -71,18 +71,12 @@ fn landmark_change(
     (old, new): (Option<&LandmarkContents>, Option<&LandmarkContents>),
     is_there: bool,
 ) {
-    change.present = [old.is_some(), new.is_some()];
+    let side = |landmark: Option<&LandmarkContents>| landmark.map(|l| (l.name.clone(), l.geometry));
+    let whole = LandmarkChange::of(side(old).as_ref(), side(new).as_ref());
+    (change.present, change.geometry) = (whole.present, whole.geometry);
     change.names = [old.map(|l| l.name.clone()), new.or(old).map(|l| l.name.clone())];
-    change.geometry = [old, new].map(|side| side.map(|landmark| landmark.geometry.shown()));
     match key {
-        RowKey::Landmark(_) => {
-            if let Some((old, new)) = old.zip(new) {
-                let (a, b) = (&old.geometry, &new.geometry);
-                let size = (a.size, a.size_from_views) != (b.size, b.size_from_views);
-                let differ = [("name", old.name != new.name), ("size", size), ("place", a.place != b.place)];
-                change.fields = differ.into_iter().filter(|(_, is)| *is).map(|(word, _)| word).collect();
-            }
-        }
+        RowKey::Landmark(_) => change.fields = whole.fields,
         RowKey::View(..) => change.views[usize::from(is_there)] += 1,
         RowKey::Model(_) => change.model = true,
         _ => {}

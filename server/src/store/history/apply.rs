@@ -3,111 +3,24 @@
 //!
 //! A map keeps its name. What robots found out about a landmark that stays where it is (its health) stays too.
 
-use super::{before, get, newest};
+use super::{
+    before, get,
+    kept_tables::{KeptColumn, KeptTable, LANDMARKS, MAPS, PARTS},
+    newest,
+};
 use crate::store::{
     CommittedChange, StoreError, Tx, map_locations,
     maps::{self, MapRow},
-    now_ms,
     statements::statements,
 };
 use map::map_links;
-use sqlx::Row;
-
-/// `a, b` with a prefix for each.
-macro_rules! list {
-    ($prefix:literal, $first:ident $(, $column:ident)*) => {
-        concat!($prefix, stringify!($first) $(, ", ", $prefix, stringify!($column))*)
-    };
-}
-
-/// `a = f.a, b = f.b`.
-macro_rules! assign {
-    ($first:ident $(, $column:ident)*) => {
-        concat!(stringify!($first), " = f.", stringify!($first)
-            $(, ", ", stringify!($column), " = f.", stringify!($column))*)
-    };
-}
-
-/// Deletes the rows that were not there.
-macro_rules! remove {
-    ($table:literal, $past:literal, $key:literal) => {
-        concat!(
-            "DELETE FROM ",
-            $table,
-            " WHERE ",
-            $key,
-            " IN (SELECT ",
-            $key,
-            " FROM ",
-            before!($past, $key),
-            " WHERE present = 0)"
-        )
-    };
-}
-
-/// Gives rows that are there the values that they had.
-macro_rules! change {
-    ($table:literal, $past:literal, $key:literal, $($column:ident),+) => {
-        concat!(
-            "UPDATE ", $table, " SET ", assign!($($column),+), " FROM ", before!($past, $key), " f WHERE f.", $key, " = ",
-            $table, ".", $key, " AND f.present = 1"
-        )
-    };
-}
-
-/// Inserts the rows that are gone; `$more` are further columns and their values.
-macro_rules! restore {
-    ($table:literal, $past:literal, $key:literal, $more:literal = $values:literal, $($column:ident),+) => {
-        concat!(
-            "INSERT INTO ", $table, " (", $key, $more, ", ", list!("", $($column),+), ") SELECT f.", $key, $values, ", ",
-            list!("f.", $($column),+), " FROM ", before!($past, $key), " f WHERE f.present = 1 AND f.", $key,
-            " NOT IN (SELECT ", $key, " FROM ", $table, ") ORDER BY f.", $key
-        )
-    };
-}
+use sqlx::{AssertSqlSafe, Row};
 
 statements! {
-    REMOVE_LANDMARKS = remove!("landmarks", "past_landmarks", "id");
     // Names may have been exchanged; no name begins so.
-    SET_ASIDE = concat!("UPDATE landmarks SET name = '~' || landmarks.id FROM ", before!("past_landmarks", "id"),
+    SET_ASIDE = concat!("UPDATE landmarks SET name = '~' || landmarks.id FROM ", before!("landmarks", "id"),
                 " f WHERE f.id = landmarks.id AND f.present = 1 AND f.name <> landmarks.name");
-    // A finding stays with the place that it is about.
-    HEALTH = concat!("UPDATE landmarks SET health = f.health, finding = f.finding FROM ", before!("past_landmarks", "id"),
-             " f WHERE f.id = landmarks.id AND f.present = 1 AND (f.x_m IS NOT landmarks.x_m OR f.y_m IS NOT landmarks.y_m \
-             OR f.z_m IS NOT landmarks.z_m OR f.theta_rad IS NOT landmarks.theta_rad OR f.width_m IS NOT landmarks.width_m \
-             OR f.height_m IS NOT landmarks.height_m)");
-    CHANGE_LANDMARKS = change!("landmarks", "past_landmarks", "id", name, width_m, height_m, x_m, y_m, z_m, theta_rad,
-                       roll_rad, tilt_rad, place_covariance, size_from_views);
-    // Beyond every revision that it ever had.
-    RESTORE_LANDMARKS = restore!("landmarks", "past_landmarks", "id", ", map_id, revision, changed_ms" =
-                        ", ?1, (SELECT max(p.revision) + 1 FROM past_landmarks p WHERE p.id = f.id), ?4",
-                        name, width_m, height_m, x_m, y_m, z_m, theta_rad, roll_rad, tilt_rad, place_covariance,
-                        size_from_views, health, finding, created_ms);
-    REMOVE_VIEWS = remove!("views", "past_views", "id");
-    CHANGE_VIEWS = change!("views", "past_views", "id", landmark_id, image_sha256, image_kind, width_px, height_px,
-                   corners_px, created_ms, icon_side, icon_scale, capture, icon);
-    RESTORE_VIEWS = restore!("views", "past_views", "id", "" = "", landmark_id, image_sha256, image_kind, width_px,
-                    height_px, corners_px, created_ms, icon_side, icon_scale, capture, icon);
-    REMOVE_MODELS = remove!("models", "past_models", "landmark_id");
-    CHANGE_MODELS = change!("models", "past_models", "landmark_id", sha256, params_hash, active, reasons, facts, views,
-                    generated_views, learnt_ms, points_asked, looks_like);
-    RESTORE_MODELS = restore!("models", "past_models", "landmark_id", "" = "", sha256, params_hash, active, reasons, facts,
-                     views, generated_views, learnt_ms, points_asked, looks_like);
-    REMOVE_DISTRACTORS = remove!("strangers", "past_strangers", "id");
-    CHANGE_DISTRACTORS = change!("strangers", "past_strangers", "id", image_sha256, corners_px, icon_side, icon_scale, icon);
-    RESTORE_DISTRACTORS = restore!("strangers", "past_strangers", "id", ", map_id" = ", ?1", image_sha256, corners_px,
-                          icon_side, icon_scale, icon);
-    REMOVE_RUNS = remove!("runs", "past_runs", "id");
-    CHANGE_RUNS = change!("runs", "past_runs", "id", robot, created_ms, way_m, cells);
-    RESTORE_RUNS = restore!("runs", "past_runs", "id", ", map_id" = ", ?1", robot, created_ms, way_m, cells);
-    REMOVE_UNDERLAY = remove!("underlays", "past_underlays", "map_id");
-    CHANGE_UNDERLAY = change!("underlays", "past_underlays", "map_id", image_sha256, image_kind, width_px, height_px,
-                      metres_per_pixel, x_m, y_m, theta_rad, created_ms);
-    RESTORE_UNDERLAY = restore!("underlays", "past_underlays", "map_id", "" = "", image_sha256, image_kind, width_px,
-                       height_px, metres_per_pixel, x_m, y_m, theta_rad, created_ms);
-    CHANGE_SETTINGS = change!("maps", "past_maps", "id", site, building, floor, parent_id, parent_from_map, fusion, areas,
-                      sight);
-    LOST_PARENT = concat!("SELECT count(*) FROM ", before!("past_maps", "id"),
+    LOST_PARENT = concat!("SELECT count(*) FROM ", before!("maps", "id"),
                   " f WHERE f.parent_id IS NOT NULL AND f.parent_id NOT IN (SELECT id FROM maps)");
     OLDEST_WALLS = "SELECT min(id) FROM commits WHERE map_id = ?1 AND id > ?2 AND id <= ?3 AND walls = 1";
     CLEAR_WALLS = "DELETE FROM laser_segments WHERE map_id = ?1";
@@ -147,29 +60,46 @@ statements! {
              ) ORDER BY by DESC LIMIT 1";
 }
 
-/// In order: what is removed or set aside comes first, so that nothing restored meets it.
-const STEPS: [(&str, &str); 20] = [
-    ("remove landmarks", REMOVE_LANDMARKS),
-    ("set names aside", SET_ASIDE),
-    ("restore health", HEALTH),
-    ("change landmarks", CHANGE_LANDMARKS),
-    ("restore landmarks", RESTORE_LANDMARKS),
-    ("remove views", REMOVE_VIEWS),
-    ("change views", CHANGE_VIEWS),
-    ("restore views", RESTORE_VIEWS),
-    ("remove models", REMOVE_MODELS),
-    ("change models", CHANGE_MODELS),
-    ("restore models", RESTORE_MODELS),
-    ("remove distractors", REMOVE_DISTRACTORS),
-    ("change distractors", CHANGE_DISTRACTORS),
-    ("restore distractors", RESTORE_DISTRACTORS),
-    ("remove runs", REMOVE_RUNS),
-    ("change runs", CHANGE_RUNS),
-    ("restore runs", RESTORE_RUNS),
-    ("remove underlay", REMOVE_UNDERLAY),
-    ("change underlay", CHANGE_UNDERLAY),
-    ("restore underlay", RESTORE_UNDERLAY),
-];
+/// Gives rows that are there the values that they had.
+fn change(KeptTable { name, key, before, .. }: &KeptTable, columns: &[&str]) -> String {
+    let values: Vec<String> = columns.iter().map(|column| format!("{column} = f.{column}")).collect();
+    let values = values.join(", ");
+    format!("UPDATE {name} SET {values} FROM {before} f WHERE f.{key} = {name}.{key} AND f.present = 1")
+}
+
+/// Inserts the rows that are gone.
+fn restore(KeptTable { name, key, before, restored_as, .. }: &KeptTable, columns: &[KeptColumn]) -> String {
+    let is_as_it_was = |column: &&KeptColumn| restored_as.iter().all(|(other, _)| *other != column.name);
+    let columns = columns.iter().filter(is_as_it_was).map(|c| (c.name.clone(), format!("f.{}", c.name)));
+    let others = restored_as.iter().map(|(column, value)| ((*column).to_owned(), (*value).to_owned()));
+    let (into, values): (Vec<String>, Vec<String>) = others.chain(columns).unzip();
+    format!(
+        "INSERT INTO {name} ({key}, {}) SELECT f.{key}, {} FROM {before} f WHERE f.present = 1 \
+         AND f.{key} NOT IN (SELECT {key} FROM {name}) ORDER BY f.{key}",
+        into.join(", "),
+        values.join(", ")
+    )
+}
+
+/// What makes the rows of a table what they were. In order: what is removed or set aside comes first, so that nothing restored
+/// meets it.
+fn steps(table: &KeptTable, columns: &[KeptColumn]) -> Vec<String> {
+    let KeptTable { name, key, before, .. } = table;
+    let gone = format!("SELECT {key} FROM {before} WHERE present = 0");
+    let mut steps = vec![format!("DELETE FROM {name} WHERE {key} IN ({gone})")];
+    let versioned: Vec<&str> =
+        columns.iter().filter(|column| column.is_versioned).map(|column| column.name.as_str()).collect();
+    if *name == LANDMARKS.name {
+        steps.push(SET_ASIDE.to_owned());
+        // A finding stays with the place that it is about.
+        let place = versioned.iter().filter(|column| **column != "name");
+        let differs: Vec<String> = place.map(|c| format!("f.{c} IS NOT landmarks.{c}")).collect();
+        let health = change(table, &["health", "finding"]);
+        steps.push(format!("{health} AND ({})", differs.join(" OR ")));
+    }
+    steps.extend([change(table, &versioned), restore(table, columns)]);
+    steps
+}
 
 /// Makes a map what it was at a kept commit; says whether that changed anything. Errors: `NotFound`; `InUse` while a job works
 /// on the map, or if the map that it lay in is gone.
@@ -219,10 +149,12 @@ pub(in crate::store) async fn no_job_on(tx: &mut Tx, map: &MapRow) -> Result<(),
 
 /// Restores the rows before the commits after `from`, up to `to`; says whether that changed anything.
 async fn apply(tx: &mut Tx, map: &MapRow, (from, to): (i64, i64)) -> Result<bool, StoreError> {
-    for (operation, sql) in STEPS {
-        let done = sqlx::query(sql).bind(map.id).bind(from).bind(to);
-        let done = if sql == RESTORE_LANDMARKS { done.bind(now_ms()) } else { done };
-        done.execute(&mut tx.conn).await.map_err(|error| in_the_way(operation, error))?;
+    for table in &PARTS {
+        let columns = table.columns(&mut tx.conn).await.map_err(StoreError::during("read the schema"))?;
+        for sql in steps(table, &columns) {
+            let done = sqlx::query(AssertSqlSafe(sql)).bind(map.id).bind(from).bind(to);
+            done.execute(&mut tx.conn).await.map_err(|error| in_the_way(table.name, error))?;
+        }
     }
     settings(tx, map, (from, to)).await?;
     walls(tx, map, (from, to)).await?;
@@ -239,12 +171,12 @@ async fn apply(tx: &mut Tx, map: &MapRow, (from, to): (i64, i64)) -> Result<bool
 }
 
 /// What of today is in the way of an old row.
-fn in_the_way(operation: &'static str, error: sqlx::Error) -> StoreError {
+fn in_the_way(table: &str, error: sqlx::Error) -> StoreError {
     match &error {
         sqlx::Error::Database(e) if e.is_unique_violation() => StoreError::InUse(format!(
-            "cannot {operation}: a name or a view of it is taken by something newer; rename or delete that first"
+            "cannot restore {table}: a name or a view of it is taken by something newer; rename or delete that first"
         )),
-        _ => StoreError::during(operation)(error),
+        _ => StoreError::during("restore rows")(error),
     }
 }
 
@@ -260,8 +192,11 @@ async fn settings(tx: &mut Tx, map: &MapRow, (from, to): (i64, i64)) -> Result<(
         let why = format!("the map that map `{}` lay in then is deleted", map.name);
         return Err(StoreError::InUse(why));
     }
-    let changed = sqlx::query(CHANGE_SETTINGS).bind(map.id).bind(from).bind(to).execute(&mut tx.conn).await;
-    if changed.map_err(StoreError::during("restore settings"))?.rows_affected() > 0 {
+    let at = || StoreError::during("restore settings");
+    let columns = MAPS.columns(&mut tx.conn).await.map_err(at())?;
+    let columns: Vec<&str> = columns.iter().map(|c| c.name.as_str()).filter(|name| *name != "name").collect();
+    let changed = sqlx::query(AssertSqlSafe(change(&MAPS, &columns))).bind(map.id).bind(from).bind(to);
+    if changed.execute(&mut tx.conn).await.map_err(at())?.rows_affected() > 0 {
         let locations = map_locations::all(&mut tx.conn).await?;
         map_links::check_all(&map_locations::links(&locations))?;
     }

@@ -2,17 +2,22 @@
 //! Distractors are left out: nobody edits them.
 
 use super::before;
-use crate::store::{StoreError, statements::statements, walls::StoredWall};
-use protos::api::{ChangeSummary, Place, Size, SizeAndPlace, WallsDifference};
+use crate::store::{
+    StoreError,
+    landmarks::{LandmarkGeometry, geometry, geometry_columns},
+    statements::statements,
+    walls::StoredWall,
+};
+use protos::api::{ChangeSummary, SizeAndPlace, WallsDifference};
 use sqlx::{Row, SqliteConnection, sqlite::SqliteRow};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// How much of a row there is at ?3: as the oldest later commit has stored it, or as it is.
 macro_rules! is_present {
-    ($table:literal, $past:literal) => {
+    ($table:literal) => {
         concat!(
-            "coalesce((SELECT l.present FROM ",
-            $past,
+            "coalesce((SELECT l.present FROM past_",
+            $table,
             " l WHERE l.id = f.id AND l.commit_id > ?3 \
              ORDER BY l.commit_id LIMIT 1), EXISTS (SELECT 1 FROM ",
             $table,
@@ -23,12 +28,12 @@ macro_rules! is_present {
 
 /// The columns of a row before, and of the same row at ?3.
 macro_rules! with_later {
-    ($table:literal, $past:literal, $key:literal, $columns:literal) => {
+    ($table:literal, $key:literal, $columns:expr) => {
         concat!(
             "WITH f AS ",
-            before!($past, $key),
-            ", later AS (SELECT *, min(commit_id) FROM ",
-            $past,
+            before!($table, $key),
+            ", later AS (SELECT *, min(commit_id) FROM past_",
+            $table,
             " WHERE commit_id > ?3 AND ",
             $key,
             " IN (SELECT ",
@@ -59,34 +64,25 @@ macro_rules! with_later {
 }
 
 statements! {
-    LANDMARKS = concat!(with_later!("landmarks", "past_landmarks", "id", "name, width_m, height_m, x_m, y_m, z_m, theta_rad, \
-                roll_rad, tilt_rad, place_covariance, size_from_views"),
-                "SELECT f.id, f.present AS was, coalesce(n.present, 0) AS is_now, f.name AS old_name, n.name AS new_name, \
-                f.width_m AS old_width_m, f.height_m AS old_height_m, f.x_m AS old_x_m, \
-                f.y_m AS old_y_m, f.z_m AS old_z_m, f.theta_rad AS old_theta_rad, \
-                f.roll_rad AS old_roll_rad, f.tilt_rad AS old_tilt_rad, n.width_m AS new_width_m, \
-                n.height_m AS new_height_m, n.x_m AS new_x_m, n.y_m AS new_y_m, n.z_m AS new_z_m, \
-                n.theta_rad AS new_theta_rad, n.roll_rad AS new_roll_rad, n.tilt_rad AS new_tilt_rad, \
-                f.name IS NOT n.name AS name, f.width_m IS NOT n.width_m OR f.height_m IS NOT n.height_m OR \
-                f.size_from_views IS NOT n.size_from_views AS size, f.x_m IS NOT n.x_m OR f.y_m IS NOT n.y_m OR \
-                f.z_m IS NOT n.z_m OR f.theta_rad IS NOT n.theta_rad OR f.roll_rad IS NOT n.roll_rad OR \
-                f.tilt_rad IS NOT n.tilt_rad OR f.place_covariance IS NOT n.place_covariance AS place \
-                FROM f LEFT JOIN n ON n.id = f.id");
+    // The row before and the row at ?3, as far as they are there, under each other.
+    LANDMARKS = concat!(with_later!("landmarks", "id", concat!("name, ", geometry_columns!(""))),
+                "SELECT id, 0 AS side, present, name, ", geometry_columns!(""), " FROM f \
+                UNION ALL SELECT id, 1, present, name, ", geometry_columns!(""), " FROM n ORDER BY id");
     VIEWS = concat!("SELECT landmark_id, sum(was = 0 AND is_now = 1) AS added, sum(was = 1 AND is_now = 0) AS removed FROM \
-            (SELECT f.landmark_id, f.present AS was, ", is_present!("views", "past_views"), " AS is_now FROM ",
-            before!("past_views", "id"), " f) GROUP BY landmark_id HAVING added + removed > 0");
-    MODELS = concat!(with_later!("models", "past_models", "landmark_id", "sha256, active"),
+            (SELECT f.landmark_id, f.present AS was, ", is_present!("views"), " AS is_now FROM ",
+            before!("views", "id"), " f) GROUP BY landmark_id HAVING added + removed > 0");
+    MODELS = concat!(with_later!("models", "landmark_id", "sha256, active"),
              "SELECT f.landmark_id FROM f LEFT JOIN n ON n.landmark_id = f.landmark_id \
              WHERE f.sha256 IS NOT n.sha256 OR f.active IS NOT n.active");
     RUNS = concat!("SELECT coalesce(sum(was = 0 AND is_now = 1), 0) AS added, coalesce(sum(was = 1 AND is_now = 0), 0) AS removed \
-           FROM (SELECT f.present AS was, ", is_present!("runs", "past_runs"), " AS is_now FROM ",
-           before!("past_runs", "id"), " f)");
-    UNDERLAY = concat!(with_later!("underlays", "past_underlays", "map_id", "image_sha256, metres_per_pixel, x_m, y_m, \
+           FROM (SELECT f.present AS was, ", is_present!("runs"), " AS is_now FROM ",
+           before!("runs", "id"), " f)");
+    UNDERLAY = concat!(with_later!("underlays", "map_id", "image_sha256, metres_per_pixel, x_m, y_m, \
                theta_rad"),
                "SELECT count(*) FROM f LEFT JOIN n ON n.map_id = f.map_id WHERE f.image_sha256 IS NOT n.image_sha256 \
                OR f.metres_per_pixel IS NOT n.metres_per_pixel OR f.x_m IS NOT n.x_m OR f.y_m IS NOT n.y_m \
                OR f.theta_rad IS NOT n.theta_rad");
-    SETTINGS = concat!(with_later!("maps", "past_maps", "id", "name, site, building, floor, parent_id, parent_from_map, \
+    SETTINGS = concat!(with_later!("maps", "id", "name, site, building, floor, parent_id, parent_from_map, \
                fusion, areas, sight"),
                "SELECT f.name IS NOT n.name AS name, f.site IS NOT n.site AS site, f.building IS NOT n.building AS building, \
                f.floor IS NOT n.floor AS floor, f.parent_id IS NOT n.parent_id OR f.parent_from_map IS NOT \
@@ -96,20 +92,19 @@ statements! {
     WALLS_AFTER = "SELECT min(id) FROM commits WHERE map_id = ?1 AND walls = 1 AND id > ?2";
     PAST_WALLS = "SELECT ax_m, ay_m, bx_m, by_m, covariance FROM past_walls WHERE commit_id = ?1";
     NOW_WALLS = "SELECT ax_m, ay_m, bx_m, by_m, covariance FROM laser_segments WHERE map_id = ?1";
-    ROW_AT = "SELECT * FROM (SELECT commit_id, name, width_m AS new_width_m, height_m AS new_height_m, x_m AS new_x_m, \
-              y_m AS new_y_m, z_m AS new_z_m, theta_rad AS new_theta_rad, roll_rad AS new_roll_rad, tilt_rad AS new_tilt_rad \
-              FROM past_landmarks WHERE id = ?1 AND commit_id > ?2 AND present = 1 UNION ALL SELECT 9223372036854775807, name, \
-              width_m, height_m, x_m, y_m, z_m, theta_rad, roll_rad, tilt_rad FROM landmarks WHERE id = ?1) \
-              ORDER BY commit_id LIMIT 1";
+    ROW_AT = concat!("SELECT * FROM (SELECT commit_id, name, ", geometry_columns!(""), " FROM past_landmarks \
+             WHERE id = ?1 AND commit_id > ?2 AND present = 1 UNION ALL SELECT 9223372036854775807, name, ",
+             geometry_columns!(""), " FROM landmarks WHERE id = ?1) ORDER BY commit_id LIMIT 1");
 }
 
 /// Words for settings; also the columns of `SETTINGS`.
 const SETTINGS_OF_MAP: [&str; 8] =
     ["name", "site", "building", "floor", "parent", "fusion_mode", "areas", "visibility_settings"];
-/// Words for what a person edits of a landmark; also columns of `LANDMARKS`.
-const FIELDS: [&str; 3] = ["name", "size", "place"];
 /// Landmarks that a summary names.
 const MAX_NAMED: usize = 8;
+
+/// Name, size and place of a landmark.
+type NamedGeometry = (String, LandmarkGeometry);
 
 /// What changed of a landmark.
 #[derive(Debug, Clone, PartialEq)]
@@ -120,7 +115,7 @@ pub(crate) struct LandmarkChange {
     pub(crate) names: [Option<String>; 2],
     /// Size and place before and after; of one whose row has not changed, absent until [`fill_unchanged`].
     pub(crate) geometry: [Option<SizeAndPlace>; 2],
-    /// Of a landmark that stays: which of [`FIELDS`] differ.
+    /// Of a landmark that stays: which of `name`, `size` and `place` differ.
     pub(crate) fields: Vec<&'static str>,
     /// Views added, views removed.
     pub(crate) views: [u64; 2],
@@ -129,6 +124,23 @@ pub(crate) struct LandmarkChange {
 }
 
 impl LandmarkChange {
+    /// Of a landmark with this name and geometry before and after, as far as it is there.
+    pub(in crate::store) fn of(old: Option<&NamedGeometry>, new: Option<&NamedGeometry>) -> Self {
+        let sides = [old, new];
+        let mut fields = Vec::new();
+        if let Some(((old_name, old), (new_name, new))) = old.zip(new) {
+            fields.extend((old_name != new_name).then_some("name"));
+            fields.extend(old.differences(new));
+        }
+        Self {
+            present: sides.map(|side| side.is_some()),
+            names: sides.map(|side| side.map(|(name, _)| name.clone())),
+            geometry: sides.map(|side| side.map(|(_, geometry)| geometry.shown())),
+            fields,
+            ..Self::default()
+        }
+    }
+
     /// Its name after the change, or before it if it is gone; empty where it is not known.
     pub(crate) fn name(&self) -> &str {
         let [before, after] = &self.names;
@@ -171,8 +183,13 @@ pub(crate) async fn between(
 ) -> Result<Difference, StoreError> {
     let at = || StoreError::during("compare versions");
     let mut made = Difference::default();
+    let mut landmarks: BTreeMap<i64, [Option<NamedGeometry>; 2]> = BTreeMap::new();
     for row in rows(conn, LANDMARKS, map, (from, to)).await? {
-        let (id, change) = landmark_change(&row).map_err(at())?;
+        let (id, side, landmark) = landmark_at(&row).map_err(at())?;
+        landmarks.entry(id).or_default()[side] = landmark;
+    }
+    for (id, [old, new]) in landmarks {
+        let change = LandmarkChange::of(old.as_ref(), new.as_ref());
         if change.present[0] != change.present[1] || !change.fields.is_empty() {
             made.landmarks.insert(id, change);
         }
@@ -213,32 +230,11 @@ async fn rows(
     rows.map_err(StoreError::during("compare versions"))
 }
 
-fn landmark_change(row: &SqliteRow) -> Result<(i64, LandmarkChange), sqlx::Error> {
-    let present: [bool; 2] = [row.try_get("was")?, row.try_get("is_now")?];
-    let mut fields = Vec::new();
-    for word in FIELDS {
-        if present == [true; 2] && row.try_get(word)? {
-            fields.push(word);
-        }
-    }
-    let names = [row.try_get("old_name")?, row.try_get("new_name")?];
-    let geometry = [
-        present[0].then(|| size_and_place(row, "old")).transpose()?,
-        present[1].then(|| size_and_place(row, "new")).transpose()?,
-    ];
-    Ok((row.try_get("id")?, LandmarkChange { present, names, geometry, fields, ..LandmarkChange::default() }))
-}
-
-/// Size and place in the columns that begin with `side`.
-fn size_and_place(row: &SqliteRow, side: &str) -> Result<SizeAndPlace, sqlx::Error> {
-    let of = |column: &str| row.try_get::<Option<f64>, _>(format!("{side}_{column}").as_str());
-    let size = of("width_m")?.zip(of("height_m")?).map(|(width_m, height_m)| Size { width_m, height_m });
-    let (z_m, theta_rad) = (of("z_m")?, of("theta_rad")?);
-    let (roll_rad, tilt_rad) = (of("roll_rad")?.unwrap_or(0.0), of("tilt_rad")?.unwrap_or(0.0));
-    let place = of("x_m")?.zip(of("y_m")?).zip(z_m.zip(theta_rad));
-    let place =
-        place.map(|((x_m, y_m), (z_m, theta_rad))| Place { x_m, y_m, z_m, theta_rad, roll_rad, tilt_rad });
-    Ok(SizeAndPlace { size, place })
+/// Number, side (before or after), and name and geometry where it is there.
+fn landmark_at(row: &SqliteRow) -> Result<(i64, usize, Option<NamedGeometry>), sqlx::Error> {
+    let is_present: bool = row.try_get("present")?;
+    let landmark = is_present.then(|| Ok::<_, sqlx::Error>((row.try_get("name")?, geometry(row)?)));
+    Ok((row.try_get("id")?, usize::from(row.try_get::<bool, _>("side")?), landmark.transpose()?))
 }
 
 async fn walls(
@@ -343,7 +339,7 @@ pub(crate) async fn fill_unchanged(
         let Some(row) = row else { continue };
         let name: String = row.try_get("name").map_err(at())?;
         change.names = [Some(name.clone()), Some(name)];
-        change.geometry = [Some(size_and_place(&row, "new").map_err(at())?); 2];
+        change.geometry = [Some(geometry(&row).map_err(at())?.shown()); 2];
     }
     Ok(())
 }

@@ -1,12 +1,13 @@
 //! Maps as versions. A commit is what one transaction changed of a map: who, when, what, why, and the rows as they were before.
-//! The schema writes those rows by triggers (`migrations/0023_commits.sql`); the writer closes the commit in the same
-//! transaction ([`close`]). [`apply`] goes back, [`difference`] compares.
+//! The schema writes those rows by triggers (`store/derived_schema.rs`); the writer closes the commit in the same transaction
+//! ([`close`]). [`kept_tables`] says which rows, [`apply`] goes back, [`difference`] compares.
 //!
 //! The state at a commit is found backwards: a row is as the oldest commit after it has stored it, or else as it is now.
 
 mod apply;
 mod close;
 mod difference;
+mod kept_tables;
 
 pub(in crate::store) use apply::no_job_on;
 pub(crate) use apply::{roll_back, undo};
@@ -14,6 +15,7 @@ pub(crate) use close::HistoryLimits;
 pub(super) use close::{close, close_outside};
 pub(in crate::store) use difference::walls_difference;
 pub(crate) use difference::{Difference, LandmarkChange, between, fill_unchanged, summary};
+pub(in crate::store) use kept_tables::{CONTENTS, KeptColumn, KeptTable, MAPS, PARTS};
 
 use super::{StoreError, actor::Actor, kind::Kind, statements::statements};
 use protos::api::ChangeSummary;
@@ -30,7 +32,8 @@ statements! {
 
 /// Every statement of this folder.
 #[cfg(test)]
-pub(super) const EVERY: [&[(&str, &str)]; 4] = [ALL, apply::ALL, close::ALL, difference::ALL];
+pub(super) const EVERY: [&[(&str, &str)]; 5] =
+    [ALL, apply::ALL, close::ALL, difference::ALL, kept_tables::ALL];
 
 /// Longest reason, in characters.
 pub(crate) const MAX_WHY: usize = 200;
@@ -123,10 +126,10 @@ pub(crate) async fn newest(db: impl SqliteExecutor<'_>, map: i64) -> Result<i64,
 
 /// The rows before the commits of map ?1 after ?2, up to ?3: of each row the oldest.
 macro_rules! before {
-    ($past:literal, $key:literal) => {
+    ($table:literal, $key:literal) => {
         concat!(
-            "(SELECT *, min(commit_id) FROM ",
-            $past,
+            "(SELECT *, min(commit_id) FROM past_",
+            $table,
             " WHERE commit_id IN (SELECT id FROM commits WHERE map_id = ?1 AND id > ?2 AND id <= ?3) GROUP BY ",
             $key,
             ")"

@@ -5,13 +5,12 @@ use crate::{
     store::{
         landmark_placement::tests::seen_from,
         landmarks::{self, LandmarkGeometry},
-        maps, migrations, open,
+        maps, open,
         teaching::{self, Teaching},
         underlays::{self, UnderlayRow},
         views::{self, NewView},
     },
 };
-use sqlx::{ConnectOptions, Connection, migrate::Migrator, sqlite::SqliteConnectOptions};
 use std::path::Path;
 use vision::recognise::DistanceKind;
 
@@ -162,51 +161,4 @@ async fn damaged_pages_of_pictures_stop_neither_the_start_nor_what_needs_no_pict
     store.write(move |tx| Box::pin(views::delete(tx, "a", "p1", taught))).await.unwrap();
     assert_eq!((count(&store).await, damaged(store.reads(), None).await.unwrap().0), (2, 0));
     teach(&store, "p2", b"new").await;
-}
-
-/// A view, a gathered view of the same picture, an underlay; a view with the number 7 was deleted.
-const EARLIER: &str = "
-INSERT INTO maps (id, name, distance, created_ms) VALUES (1, 'a', 'both', 0);
-INSERT INTO landmarks (id, map_id, name, created_ms) VALUES (1, 1, 'p1', 0);
-INSERT INTO views (id, landmark_id, image_sha256, image_kind, image, width_px, height_px, corners_px, icon_side, icon, icon_scale,
-    created_ms, capture) VALUES (7, 1, ?1, 'png', x'6f6e65', 4, 3, ?2, 20, zeroblob(400), 0.5, 8, NULL);
-DELETE FROM views;
-INSERT INTO views (id, landmark_id, image_sha256, image_kind, image, width_px, height_px, corners_px, icon_side, icon, icon_scale,
-    created_ms, capture) VALUES (3, 1, ?1, 'png', x'6f6e65', 4, 3, ?2, 20, zeroblob(400), 0.5, 8, NULL);
-INSERT INTO gatherings (id, map_id, robot, known, open, created_ms) VALUES (1, 1, 'r1', 0, 0, 0);
-INSERT INTO tracks (gathering_id, number, sightings, known) VALUES (1, 1, 3, 0);
-INSERT INTO track_views (gathering_id, track, image_sha256, image_kind, image, width_px, height_px, corners_px, icon_side, icon,
-    icon_scale, created_ms) VALUES (1, 1, ?1, 'png', x'6f6e65', 4, 3, ?2, 20, zeroblob(400), 0.5, 8);
-INSERT INTO underlays (map_id, image, image_kind, width_px, height_px, metres_per_pixel, x_m, y_m, theta_rad, created_ms)
-    VALUES (1, x'74776f', 'png', 5, 6, 0.05, 1.0, 2.0, 0.5, 9);
-";
-
-#[tokio::test]
-async fn pictures_of_the_schema_before_are_moved() {
-    let dir = tempfile::tempdir().unwrap();
-    let options = SqliteConnectOptions::new().filename(dir.path().join(open::FILE)).create_if_missing(true);
-    let mut file = options.connect().await.unwrap();
-    let before = migrations::migrator().iter().filter(|step| step.version <= 15).cloned().collect();
-    Migrator::with_migrations(before).run(&mut file).await.unwrap();
-    let corners = [1.0, 1.0, 9.0, 1.0, 9.0, 9.0, 1.0, 9.0_f64];
-    let corners: Vec<u8> = corners.iter().flat_map(|c| c.to_le_bytes()).collect();
-    let rows = EARLIER.replace("?1", &format!("x'{}'", hex(&digest(b"one"))));
-    let rows = rows.replace("?2", &format!("x'{}'", hex(&corners)));
-    sqlx::raw_sql(sqlx::AssertSqlSafe(rows)).execute(&mut file).await.unwrap();
-    file.close().await.unwrap();
-
-    let (store, _task) = Catalogue::open(&config(dir.path())).await.unwrap();
-    assert_eq!(count(&store).await, 2);
-    let (sha256, kind) = views::picture(store.reads(), "a", "p1", 3).await.unwrap();
-    assert_eq!((read(&store, &sha256).await.unwrap(), kind.as_str()), (b"one".to_vec(), "png"));
-    let row =
-        &views::page(store.reads(), 1, views::ViewFilter::default(), (None, false), 9).await.unwrap()[0];
-    assert_eq!((row.id, row.size_px, row.corners_px[2], row.created_ms), (3, [4, 3], [9.0, 9.0], 8));
-    assert_eq!(views::icon(store.reads(), "a", "p1", 3).await.unwrap().pixels, [0.0; 400]);
-    let underlay = underlays::get(store.reads(), (1, "a")).await.unwrap();
-    assert_eq!((underlay.size_px, underlay.map_from_picture), ([5, 6], [1.0, 2.0, 0.5]));
-    assert_eq!(read(&store, &underlay.image_sha256).await.unwrap(), b"two");
-    assert_eq!(teach(&store, "p1", b"three").await, 8, "the number of a deleted view is not used again");
-    store.write(|tx| Box::pin(maps::delete(tx, "a"))).await.unwrap();
-    assert_eq!(count(&store).await, 0);
 }

@@ -153,26 +153,6 @@ mod tests {
         assert!((probability(&model, &[0.5; QUAD_FEATURES]) - 0.75).abs() < 1e-12);
     }
 
-    /// Files of parameters of earlier builds.
-    #[test]
-    fn parameters_are_read_by_their_earlier_words() {
-        use crate::detect::params::{Grouping, QuadParams};
-        let network = |features: usize| {
-            let all = vec![1.0; features];
-            serde_json::json!({ "features": FeatureDigest::OF_THIS_PROGRAM, "mean": all, "deviation": all, "linear": all,
-                "hidden_in": [], "hidden_bias": [], "hidden_out": [], "bias": 0.25 })
-        };
-        let words = |grouping: &str, proposals: &str, border: &str, classifier: &str| {
-            let mut all = serde_json::json!({ "grouping": grouping, proposals: { "min_support": 0.25 } });
-            all[border] = network(SIDE_FEATURES);
-            all[classifier] = network(QUAD_FEATURES);
-            serde_json::from_value::<QuadParams>(all).unwrap()
-        };
-        let now = words("proposals", "proposals", "border_model", "quad_classifier");
-        assert_eq!(words("hypotheses", "hypotheses", "side_model", "thing_model"), now);
-        assert!(now.grouping == Grouping::Proposals && now.quad_classifier.is_some());
-    }
-
     #[test]
     fn a_network_of_another_input_size_is_refused() {
         let wrong = r#"{"quad_classifier": {"features": "DIGEST", "mean": [0], "deviation": [1], "linear": [0],

@@ -671,9 +671,8 @@ class Commit:
     """Name of the token, `local` for that of the server's machine, `server` for what the server does by itself. Of
     a job: who asked for it."""
     operation: str
-    """Method and path of the request, as `PATCH /maps/{map}/landmarks/{landmark}`; of a job its kind; `upgrade`
-    for the state in which an older server left the map, `outside` for what another program wrote into the
-    database."""
+    """Method and path of the request, as `PATCH /maps/{map}/landmarks/{landmark}`; of a job its kind; `outside`
+    for what another program wrote into the database."""
     summary: ChangeSummary
     """What changed."""
     parent: int | None = None
@@ -987,8 +986,7 @@ class FailedGate:
 
 @dataclass(frozen=True, slots=True)
 class FindingBody:
-    """What robots found of a landmark that is not where the map says. Stored as JSON: the other words are of
-    earlier builds."""
+    """What robots found of a landmark that is not where the map says. Stored as JSON."""
 
     kind: Literal["moved", "missing"]
     """Which of these it is."""
@@ -1188,7 +1186,7 @@ class Job:
     created_ms: int = 0
     """When it was asked for, ms since the Unix epoch."""
     started_ms: int | None = None
-    """When it was begun last; absent while it waits, and for jobs of earlier builds."""
+    """When it was begun last; absent while it waits."""
     ended_ms: int | None = None
     """When it ended."""
 
@@ -2001,15 +1999,14 @@ class Readiness:
     """Maps that another server has, too, with the reason: robots are refused on them here. Only maps of the token
     that asks."""
     database_check: DatabaseCheckBody | None = None
-    """The check of the whole database after the start; absent where an earlier build answers."""
+    """The check of the whole database after the start."""
     backup: BackupHealth | None = None
     """The newest backup, and why the last attempt failed. A token for all maps is told the name and the reason."""
     parts_still_s: dict[str, int] = field(default_factory=dict)
     """For how many seconds each part that has work, or is probed, has not gone on. Beyond a few the server is not
     ready. Empty for whoever does not see all maps."""
     storage: StorageHealth | None = None
-    """The disk of the data directory; absent for whoever does not see all maps, and where an earlier build
-    answers."""
+    """The disk of the data directory; absent for whoever does not see all maps."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -2534,8 +2531,7 @@ class StoredAnswer:
     quads: tuple[StoredQuad, ...]
     """The pictures of its quads, in the order of `answer.quads`."""
     prior_check: PriorCheck | None = None
-    """The pose before the frame and that by the frame; null where none was known before, and for answers of
-    earlier builds."""
+    """The pose before the frame and that by the frame; null where none was known before."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -2575,8 +2571,7 @@ class StoredQuad:
     """Path of its icon; absent for quads that are too small, partly outside of the picture, or beyond the first
     eight."""
     matched: QuadMatches | None = None
-    """Its points that are like those of the best candidate; null without an icon, where that has no points, and
-    for answers of earlier builds."""
+    """Its points that are like those of the best candidate; null without an icon, and where that has no points."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,3 +1,30 @@
+-- Who may do what, and who did it.
+
+-- Tokens of people, programs and robots for the HTTP interface. Of a token only the digest of its secret is stored: who
+-- reads this table cannot use it. AUTOINCREMENT, so that the number of a forgotten token never means another one.
+CREATE TABLE tokens (
+    id         INTEGER PRIMARY KEY AUTOINCREMENT,
+    name       TEXT    NOT NULL CHECK (length(name) BETWEEN 1 AND 64),
+    role       TEXT    NOT NULL CHECK (role IN ('viewer', 'robot', 'teacher', 'operator', 'admin')),
+    -- NULL: all maps. Otherwise a JSON list of numbers of maps: a new map under the name of a deleted one is another map.
+    maps       TEXT    CHECK (maps IS NULL OR json_type(maps) = 'array'),
+    sha256     BLOB    NOT NULL CHECK (length(sha256) = 32),
+    created_ms INTEGER NOT NULL,
+    expires_ms INTEGER,
+    revoked_ms INTEGER
+) STRICT;
+
+-- Sessions of the pages, so that they outlive a restart of the server. Of a cookie only the digest is stored. A bounded
+-- number (MAX_SESSIONS of server/src/identity/sessions.rs). In no history: they are no part of a map.
+CREATE TABLE page_sessions (
+    sha256   BLOB    PRIMARY KEY CHECK (length(sha256) = 32),
+    -- The token that opened it; NULL for the local one of the data directory.
+    token_id INTEGER REFERENCES tokens (id) ON DELETE CASCADE,
+    ends_ms  INTEGER NOT NULL
+) STRICT, WITHOUT ROWID;
+-- A token that is deleted finds its sessions.
+CREATE INDEX page_sessions_by_token ON page_sessions (token_id);
+
 -- Who changed what, when. Each entry is stored in the transaction of its change and carries the digest of the one before, so
 -- that one that is changed, left out or put in between breaks the chain.
 CREATE TABLE audit (

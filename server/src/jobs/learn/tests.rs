@@ -1,6 +1,7 @@
 use super::*;
 use crate::{
-    config::{Config, RawConfig},
+    config::RawConfig,
+    jobs::Jobs,
     publication::CatalogueTasks,
     store::{
         landmarks,
@@ -9,6 +10,7 @@ use crate::{
     },
 };
 use engine::picture;
+use serde_json::{Value, json};
 use sha2::{Digest as _, Sha256};
 use std::time::Duration;
 use tokio::sync::watch;
@@ -59,9 +61,9 @@ fn png(image: &GrayImage) -> Vec<u8> {
     picture::png(image.width(), image.height(), image.data()).unwrap()
 }
 
-/// Map `a` with landmarks `whole` and `damaged`, each with one view and a model as builds before the points stored it.
-/// The picture of `damaged` cannot be decoded.
-async fn earlier(config: &Config) -> (Catalogue, CatalogueTasks) {
+/// Map `a` with landmarks `whole` and `damaged`, each with one view and a model without points. The picture of `damaged` cannot
+/// be decoded.
+async fn taught(config: &Config) -> (Catalogue, CatalogueTasks) {
     let (store, task) = Catalogue::open(config).await.unwrap();
     store.write(|tx| Box::pin(maps::create(tx, "a", DistanceKind::Both, 2))).await.unwrap();
     for (seed, name) in [(1, "whole"), (2, "damaged")] {
@@ -101,13 +103,6 @@ async fn store_model(store: &Catalogue, model: &LandmarkModel) {
     write.await.unwrap();
 }
 
-async fn started(store: &Catalogue, config: &Config) -> (Arc<Jobs>, watch::Sender<bool>) {
-    let (stop, stopping) = watch::channel(false);
-    let (jobs, _) = Jobs::start(store.clone(), Arc::new(config.clone()), stopping).await.unwrap();
-    jobs.renew().await.unwrap();
-    (jobs, stop)
-}
-
 /// The job once it has ended and what it stored is published.
 async fn ended(jobs: &Jobs, job: i64) -> JobRow {
     let begun = Instant::now();
@@ -126,83 +121,10 @@ fn model(store: &Catalogue, id: u64) -> Arc<LandmarkModel> {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn models_of_earlier_builds_get_points_once() {
-    let dir = tempfile::tempdir().unwrap();
-    let config = config(dir.path());
-    let (store, task) = earlier(&config).await;
-    let before = [model(&store, 1), model(&store, 2)];
-    assert!(before.iter().all(|m| !m.knows_points && m.points.is_empty()));
-
-    let (jobs, stop) = started(&store, &config).await;
-    let row = ended(&jobs, 1).await;
-    assert_eq!((row.kind.as_str(), row.map.as_str(), row.state.as_str()), ("learn", "a", "done"), "{row:?}");
-    assert_eq!(row.message, "1 of 2 landmarks have points now");
-    let request = Request::from_json(&row.request);
-    assert_eq!(request.landmarks, Some(vec!["whole".to_owned(), "damaged".to_owned()]));
-    let result: Value = serde_json::from_str(row.result.as_deref().unwrap()).unwrap();
-    assert_eq!((&result["with_points"], &result["failed"][0]["landmark"]), (&json!(1), &json!("damaged")));
-
-    // The same model, with points.
-    let whole = model(&store, 1);
-    assert!(whole.knows_points && whole.points.len() >= 10, "{} points", whole.points.len());
-    let without = LandmarkModel { points: vec![], knows_points: false, ..LandmarkModel::clone(&whole) };
-    assert_eq!(without, *before[0]);
-    assert_eq!(model(&store, 2), before[1]);
-    let kept = landmarks::get(store.reads(), "a", "whole").await.unwrap().model.unwrap();
-    let facts: Value = serde_json::from_str(&kept.facts).unwrap();
-    assert_eq!(facts["points"], json!(whole.points.len()));
-    assert_eq!((&facts["look_alikes"][0]["landmark"], kept.learnt_ms), (&json!("twin"), 7));
-
-    // At later starts there is nothing to do: not for the one that has points, nor for the one that failed.
-    stop.send_replace(true);
-    task.close().await;
-    let (store, _task) = Catalogue::open(&config).await.unwrap();
-    let (_jobs, _stop) = started(&store, &config).await;
-    assert!(jobs::open(store.reads()).await.unwrap().is_empty());
-    assert!(jobs::get(store.reads(), 2).await.is_err(), "a second job");
-    assert_eq!(model(&store, 1), whole);
-}
-
-/// A crash between two starts: the job that waits is the only one.
-#[tokio::test(flavor = "multi_thread")]
-async fn a_job_that_waits_is_not_queued_again() {
-    let dir = tempfile::tempdir().unwrap();
-    let config = config(dir.path());
-    let (store, _task) = earlier(&config).await;
-    let (stop, stopping) = watch::channel(true);
-    let (jobs, _) = Jobs::start(store.clone(), Arc::new(config.clone()), stopping).await.unwrap();
-    for _ in 0..3 {
-        jobs.renew().await.unwrap();
-    }
-    let open = jobs::open(store.reads()).await.unwrap();
-    assert_eq!(open.iter().map(|row| row.id).collect::<Vec<_>>(), [1]);
-    drop(stop);
-}
-
-/// A landmark that has gone, or has points by a lesson meanwhile, is passed over.
-#[tokio::test(flavor = "multi_thread")]
-async fn what_has_changed_since_is_passed_over() {
-    let dir = tempfile::tempdir().unwrap();
-    let config = config(dir.path());
-    let (store, _task) = earlier(&config).await;
-    let (stop, stopping) = watch::channel(true);
-    let (jobs, _) = Jobs::start(store.clone(), Arc::new(config.clone()), stopping).await.unwrap();
-    jobs.renew().await.unwrap();
-    drop((jobs, stop));
-    let learnt = LandmarkModel::clone(&model(&store, 1)).with_points(&[]);
-    store_model(&store, &learnt).await;
-    store.write(|tx| Box::pin(landmarks::delete(tx, "a", "damaged"))).await.unwrap();
-    let (jobs, _stop) = started(&store, &config).await;
-    let row = ended(&jobs, 1).await;
-    assert_eq!((row.state.as_str(), row.message.as_str()), ("done", "0 of 0 landmarks have points now"));
-    assert_eq!(*model(&store, 1), learnt);
-}
-
-#[tokio::test(flavor = "multi_thread")]
 async fn a_lesson_takes_points_of_the_pictures_that_can_be_read() {
     let dir = tempfile::tempdir().unwrap();
     let config = config(dir.path());
-    let (store, _task) = earlier(&config).await;
+    let (store, _task) = taught(&config).await;
     // A second view, whose picture is damaged.
     teach(&store, "whole", &photograph(1), b"no picture either".to_vec()).await;
     let bystander = model(&store, 2).points.clone();
