@@ -11,16 +11,14 @@ use crate::{
     frame::GrayImage,
     geometry::corners::Corners,
     model::{landmark_model::LandmarkModel, model_set::ModelSet},
+    paper::entropy::{entropy_m, entropy_norm, probability},
     params::Params,
     points::{
         search::{LandmarkPoints, search},
         verify::PointEvidence,
     },
     recognise::{
-        decision::{
-            confidence::{entropy_m, entropy_norm, probability},
-            result::{MAX_CANDIDATES, MatchCandidate, MatchRefusal, RecognitionResult, Verdict},
-        },
+        decision::result::{MAX_CANDIDATES, MatchCandidate, MatchRefusal, RecognitionResult, Verdict},
         verification::icon_alignment::{IconAlignment, align_to_icon},
     },
     seen_border::is_same_border,

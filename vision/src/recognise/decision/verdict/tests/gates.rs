@@ -1,6 +1,7 @@
 //! Every gate refuses at its limit: tau, content, margin, the size of the map, points.
 
 use super::*;
+use crate::recognise::verification::content::Content;
 
 #[test]
 fn gates_refuse_at_tau() {
