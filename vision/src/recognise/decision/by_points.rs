@@ -18,7 +18,9 @@ use crate::{
         verify::PointEvidence,
     },
     recognise::{
-        decision::result::{MAX_CANDIDATES, MatchCandidate, MatchRefusal, RecognitionResult, Verdict},
+        decision::result::{
+            Evidence, MAX_CANDIDATES, MatchCandidate, MatchRefusal, RecognitionResult, Verdict,
+        },
         verification::icon_alignment::{IconAlignment, align_to_icon},
     },
     seen_border::is_same_border,
@@ -72,11 +74,7 @@ pub(crate) fn by_points(
             if i == 0 { refusal } else { (alarms[i] > LOG10_EPSILON).then_some(MatchRefusal::Points) };
         Some(MatchCandidate {
             landmark: models.at(f.model)?.id,
-            correlation: 2.0,
-            hausdorff: f64::INFINITY,
-            likeness: if i == 0 { alignment.likeness } else { None },
-            distance: ratio,
-            tau: 1.0,
+            evidence: Evidence::Points { likeness: if i == 0 { alignment.likeness } else { None } },
             ratio,
             probability: probability(alarms[i] <= LOG10_EPSILON, accepted),
             refusal: refused,

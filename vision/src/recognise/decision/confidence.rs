@@ -30,16 +30,21 @@ pub fn chance(weights: &[f64; MEASURES + 1], measures: &[f64; MEASURES]) -> f64 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::landmark_id::LandmarkId;
+    use crate::{
+        model::landmark_id::LandmarkId,
+        recognise::decision::result::{Evidence, IconEvidence},
+    };
 
     fn candidate(ratio: f64, correlation: f64, hausdorff: f64) -> MatchCandidate {
         MatchCandidate {
             landmark: LandmarkId(1),
-            correlation,
-            hausdorff,
-            likeness: None,
-            distance: ratio,
-            tau: 1.0,
+            evidence: Evidence::Icon(IconEvidence {
+                correlation,
+                hausdorff,
+                likeness: None,
+                distance: ratio,
+                tau: 1.0,
+            }),
             ratio,
             probability: 1.0,
             refusal: None,

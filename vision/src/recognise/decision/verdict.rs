@@ -15,7 +15,10 @@ use crate::{
         decision::{
             by_points::by_points,
             confidence::confidence,
-            result::{MAX_CANDIDATES, MatchCandidate, MatchRefusal, RecognitionResult, Verdict},
+            result::{
+                Evidence, IconEvidence, MAX_CANDIDATES, MatchCandidate, MatchRefusal, RecognitionResult,
+                Verdict,
+            },
         },
         distance_kind::DistanceKind,
         params::VerdictParams,
@@ -165,11 +168,13 @@ fn candidate(
     };
     MatchCandidate {
         landmark: near.model.id,
-        correlation: near.correlation,
-        hausdorff: near.hausdorff,
-        likeness: near.likeness,
-        distance,
-        tau: share * tau,
+        evidence: Evidence::Icon(IconEvidence {
+            correlation: near.correlation,
+            hausdorff: near.hausdorff,
+            likeness: near.likeness,
+            distance,
+            tau: share * tau,
+        }),
         ratio: near.ratio(kind) / share,
         probability: probability(refusal.is_none(), accepted),
         refusal,
