@@ -33,7 +33,6 @@ pub(crate) enum CueFitError {
     TooFew {
         /// Pairs of opposite sides.
         pairs: usize,
-        /// Other pairs.
         others: usize,
     },
     /// More pairs than [`MAX_PAIRS_FITTED`].
