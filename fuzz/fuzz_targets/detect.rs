@@ -10,12 +10,14 @@ use vision::{
     detect::{
         DetectParams, Grouping, MAX_QUADS, MAX_SCALES, Nested, Quad, detect,
         edges::edge_map::EdgeMap,
-        relaxation::similarity::{MAX_PAIRS, SegmentPair},
         segments::{edge_segments::EdgeSegment, joining::MAX_SEGMENTS},
-        tiling::tiling_params::FloorView,
     },
     frame::{Distortion, GrayImage, Intrinsics},
     geometry::polygon,
+    paper::{
+        relaxation::similarity::{MAX_PAIRS, SegmentPair},
+        tiling::tiling_params::FloorView,
+    },
     trace::Trace,
 };
 

@@ -39,9 +39,13 @@ enum Command {
     /// Fit parameters of detector and confidence to labelled or rendered pictures.
     #[command(subcommand)]
     Train(train::Command),
-    /// A picture of every stage of the method, drawn from what the program itself works out there.
-    #[command(subcommand)]
-    Plot(plot::Command),
+    /// A picture of a stage of recognition, drawn from what the program itself works out there.
+    ///
+    /// Without an option: the picture of its page in docs/method, the same bytes on every machine. The stages of the
+    /// detector are drawn by `waymark detect --draw`. For example, with a picture of your own on the wall:
+    ///   waymark-lab plot icon --image painting.jpg --out icon.png
+    #[command(verbatim_doc_comment)]
+    Plot(plot::Args),
 }
 
 fn main() -> ExitCode {
@@ -51,7 +55,7 @@ fn main() -> ExitCode {
         Command::Evaluate(command) => evaluate::run(command),
         Command::Bench(args) => bench::run(args),
         Command::Train(command) => train::run(command),
-        Command::Plot(command) => plot::run(command),
+        Command::Plot(args) => plot::run(args),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

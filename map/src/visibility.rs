@@ -22,7 +22,6 @@ mod outline;
 mod area;
 mod chance;
 mod coverage;
-mod geojson;
 mod bytes;
 pub mod pointwise;
 
@@ -30,7 +29,6 @@ pub use area::{MAX_OBSTACLES, VisibilityMap, visibility, within_reach};
 pub use bytes::{COMPUTATION, NotAnArea, inputs};
 pub use chance::{DRAWS, PoseDraws};
 pub use coverage::{Coverage, CoverageGap, CoverageSample, MAX_STEPS, coverage};
-pub use geojson::{Feature, Geometry, Properties};
 pub use obstacle::Obstacle;
 pub use outline::Polygon;
 pub use settings::{PanTiltCamera, VisibilityParams, VisibilitySettings};

@@ -36,19 +36,6 @@ impl Default for OdometryParams {
     }
 }
 
-impl OdometryParams {
-    /// Odometry without any error.
-    pub fn perfect() -> Self {
-        Self {
-            scale_error: 0.0,
-            heading_bias_rad_per_m: 0.0,
-            length_sigma_m: 0.0,
-            heading_sigma_rad: 0.0,
-            turn_sigma_rad: 0.0,
-        }
-    }
-}
-
 /// The odometry of one robot.
 #[derive(Debug, Clone)]
 pub struct Odometry {
@@ -88,6 +75,14 @@ impl Odometry {
 mod tests {
     use super::*;
 
+    const PERFECT: OdometryParams = OdometryParams {
+        scale_error: 0.0,
+        heading_bias_rad_per_m: 0.0,
+        length_sigma_m: 0.0,
+        heading_sigma_rad: 0.0,
+        turn_sigma_rad: 0.0,
+    };
+
     fn drive(params: &OdometryParams, seed: u64) -> Pose2 {
         let mut odometry = Odometry::new(params.clone(), Pose2::default(), seed);
         (0..250).map(|_| odometry.advance(&Pose2::new(0.1, 0.0, 0.0))).last().unwrap()
@@ -95,20 +90,19 @@ mod tests {
 
     #[test]
     fn bias_and_scale_are_exact_without_noise() {
-        let p =
-            OdometryParams { scale_error: 0.02, heading_bias_rad_per_m: 0.004, ..OdometryParams::perfect() };
+        let p = OdometryParams { scale_error: 0.02, heading_bias_rad_per_m: 0.004, ..PERFECT };
         let end = drive(&p, 1);
         assert!((end.theta_rad - 0.1).abs() < 1e-9);
         // A circle of radius 1.02 / 0.004 m: chord and sagitta.
         let radius = 1.02 / 0.004;
         assert!((end.x_m - radius * 0.1_f64.sin()).abs() < 0.02, "{end:?}");
         assert!((end.y_m - radius * (1.0 - 0.1_f64.cos())).abs() < 0.02, "{end:?}");
-        assert!(drive(&OdometryParams::perfect(), 1).minus(&Pose2::new(25.0, 0.0, 0.0)).norm() < 1e-9);
+        assert!(drive(&PERFECT, 1).minus(&Pose2::new(25.0, 0.0, 0.0)).norm() < 1e-9);
     }
 
     #[test]
     fn noise_has_its_sigma_whatever_the_step() {
-        let p = OdometryParams { length_sigma_m: 0.02, heading_sigma_rad: 0.01, ..OdometryParams::perfect() };
+        let p = OdometryParams { length_sigma_m: 0.02, heading_sigma_rad: 0.01, ..PERFECT };
         let ends: Vec<Pose2> = (0..600).map(|seed| drive(&p, seed)).collect();
         let sigma = |f: fn(&Pose2) -> f64| {
             let mean = ends.iter().map(f).sum::<f64>() / 600.0;

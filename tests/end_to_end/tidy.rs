@@ -244,3 +244,23 @@ fn every_section_cited_in_a_comment_exists() {
     assert!(missing.is_empty(), "{missing:#?}");
     assert!(cited > 150, "only {cited} citations found: the comments are no longer read");
 }
+
+/// Product code of `vision` that imports the paper's method: parameters, both detectors, their trace, the decision.
+const PAPER_ENTRIES: [&str; 5] = [
+    "vision/src/detect/detector.rs",
+    "vision/src/detect/params.rs",
+    "vision/src/recognise/decision/by_points.rs",
+    "vision/src/recognise/decision/verdict.rs",
+    "vision/src/trace.rs",
+];
+
+#[test]
+fn the_papers_method_is_imported_at_few_places() {
+    let (folder, source) = (root().join("vision/src/paper"), root().join("vision/src"));
+    let imports = files(&["rs"]).into_iter().filter(|(path, text)| {
+        let is_test = path.components().any(|part| part.as_os_str().to_string_lossy().contains("tests"));
+        path.starts_with(&source) && !path.starts_with(&folder) && !is_test && text.contains("paper::")
+    });
+    let imports: Vec<PathBuf> = imports.map(|(path, _)| path).collect();
+    assert_eq!(imports, PAPER_ENTRIES.map(|path| root().join(path)));
+}

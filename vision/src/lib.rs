@@ -17,6 +17,7 @@ pub mod up;
 pub mod icon;
 pub mod seen_border;
 pub mod recognise;
+pub mod paper;
 pub mod points;
 pub mod model;
 pub mod learn;

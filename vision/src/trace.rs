@@ -1,12 +1,14 @@
 //! An optional record of every stage, for pictures and timings. The pipeline hands each stage's output to a `Trace`;
 //! with [`NoTrace`] that costs nothing. Implementations measure time and draw.
 
-use crate::detect::{
-    edges::edge_map::EdgeMap,
-    proposals::quad_seed::QuadSeed,
-    quad::Quad,
-    relaxation::similarity::SegmentPair,
-    segments::{chains::EdgeChain, edge_segments::EdgeSegment},
+use crate::{
+    detect::{
+        edges::edge_map::EdgeMap,
+        proposals::quad_seed::QuadSeed,
+        quad::Quad,
+        segments::{chains::EdgeChain, edge_segments::EdgeSegment},
+    },
+    paper::relaxation::similarity::SegmentPair,
 };
 
 /// The stages in their order; names appear in timings and picture files.

@@ -6,10 +6,10 @@ use vision::{
         edges::edge_map::EdgeMap,
         proposals::quad_seed::QuadSeed,
         pyramid,
-        relaxation::similarity::SegmentPair,
         segments::{chains::EdgeChain, edge_segments::EdgeSegment},
     },
     frame::{GrayImage, Picture},
+    paper::relaxation::similarity::SegmentPair,
     trace::Trace,
 };
 

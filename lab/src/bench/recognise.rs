@@ -82,7 +82,6 @@ struct Report {
 #[derive(Debug, Serialize)]
 struct Landmark {
     memory_kb: f64,
-    /// Its parts.
     parts_kb: BTreeMap<&'static str, f64>,
     /// Stored form of the model.
     stored_kb: f64,

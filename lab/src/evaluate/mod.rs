@@ -55,17 +55,17 @@ pub(crate) enum Command {
     ///   waymark-lab evaluate viewpoint --plot viewpoint.svg
     ///   waymark-lab evaluate viewpoint --photographs museum-paintings --taught photograph --detector
     #[command(verbatim_doc_comment)]
-    Viewpoint(experiment::viewpoint::Args),
+    Viewpoint(experiment::conditions::ViewpointArgs),
     /// A camera mounted at twelve rolls: names and poses with its mounting, without one, and by expectation.
     ///
     /// Frames are rendered in a corridor whose posters are taught from one level photograph each.
     Roll(roll::Args),
     /// Recognition over the apparent size, from 300 px down to 28.
-    Scale(experiment::scale::Args),
+    Scale(experiment::conditions::Args),
     /// Recognition over illumination: darker, brighter, light from the side, a shadow's edge.
-    Illumination(experiment::illumination::Args),
+    Illumination(experiment::conditions::Args),
     /// Recognition over the share of a landmark's area that is hidden in its middle.
-    Occlusion(experiment::occlusion::Args),
+    Occlusion(experiment::conditions::Args),
     /// False acceptance of distractors: per pair by the paper's thresholds, per quad by the decision.
     ///
     /// Distractors are posters that are not taught, photographs, doors, windows and tiles, and, as strata of their
@@ -133,11 +133,11 @@ pub(crate) fn run(command: &Command) -> anyhow::Result<()> {
         Command::Detection(args) => detection::run(args),
         Command::Recognition(args) => recognition::run(args),
         Command::Outside(args) => outside::run(args),
-        Command::Viewpoint(args) => experiment::viewpoint::run(args),
+        Command::Viewpoint(args) => experiment::conditions::viewpoint(args),
         Command::Roll(args) => roll::run(args),
-        Command::Scale(args) => experiment::scale::run(args),
-        Command::Illumination(args) => experiment::illumination::run(args),
-        Command::Occlusion(args) => experiment::occlusion::run(args),
+        Command::Scale(args) => experiment::conditions::scale(args),
+        Command::Illumination(args) => experiment::conditions::illumination(args),
+        Command::Occlusion(args) => experiment::conditions::occlusion(args),
         Command::Discrimination(args) => experiment::discrimination::run(args),
         Command::Lookalikes(args) => experiment::look_alikes::run(args),
         Command::Confidence(args) => experiment::confidence::run(args),

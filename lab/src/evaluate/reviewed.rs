@@ -23,7 +23,6 @@ const BUILT_IN: [(&str, &str); 6] = [
 pub(crate) struct ReviewedQuad {
     /// Clockwise on screen, pixels of the picture.
     pub(crate) corners: Corners,
-    /// What it is.
     pub(crate) what: String,
     /// Whether it is an object, or lines that meet by chance.
     #[serde(default = "yes")]

@@ -1,8 +1,7 @@
 //! Template alignment: the corners of a quad that is a little off, before and after, and the icons along them.
 
 use super::{
-    icon::SEED,
-    landmark::{LandmarkArgs, oblique},
+    landmark::{Landmark, oblique},
     panels::{around, column, cut, explained, gray, icon as drawn, on, row, titled},
 };
 use anyhow::Context as _;
@@ -30,9 +29,8 @@ const FACTOR: usize = 2;
 /// Enlargement of the icons.
 const ICON_FACTOR: usize = 3;
 
-pub(crate) fn draw(args: &LandmarkArgs) -> anyhow::Result<Picture> {
+pub(crate) fn draw(landmark: &Landmark) -> anyhow::Result<Picture> {
     let p = Params::default();
-    let landmark = args.landmark(SEED)?;
     let taught = landmark.taught(&p)?;
     let seen = landmark.seen(&oblique())?;
     let side = seen.corners.area_px2().sqrt();

@@ -2,8 +2,7 @@
 //! the landmark behind something plain, and for another picture.
 
 use super::{
-    icon::SEED,
-    landmark::{Landmark, LandmarkArgs, Taught, oblique, plain},
+    landmark::{Landmark, Taught, oblique, plain},
     panels::{column, explained, icon as drawn, row, scale, titled},
 };
 use cli::drawing::{GREEN, Picture, RED, WHITE, YELLOW};
@@ -23,14 +22,13 @@ const FACTOR: usize = 3;
 /// The colours of correlations -1, 0 and 1.
 const COLOURS: [[u8; 3]; 3] = [RED, [60, 60, 60], GREEN];
 
-pub(crate) fn draw(args: &LandmarkArgs) -> anyhow::Result<Picture> {
+pub(crate) fn draw(landmark: &Landmark) -> anyhow::Result<Picture> {
     let p = Params::default();
-    let landmark = args.landmark(SEED)?;
     let taught = landmark.taught(&p)?;
     let covered = Conditions { cover: 0.25, cover_grey: 90.0, ..plain() };
     let rows = [
-        compared(&landmark, &oblique(), &taught, "the landmark", &p)?,
-        compared(&landmark, &covered, &taught, "a quarter covered", &p)?,
+        compared(landmark, &oblique(), &taught, "the landmark", &p)?,
+        compared(landmark, &covered, &taught, "a quarter covered", &p)?,
         compared(&landmark.other(1), &oblique(), &taught, "another picture", &p)?,
     ];
     Ok(explained(

@@ -1,8 +1,7 @@
 //! The training views of a landmark in the plane of their two leading modes, and the icons that stand for them.
 
 use super::{
-    icon::SEED,
-    landmark::LandmarkArgs,
+    landmark::Landmark,
     panels::{column, explained, icon as drawn, ring, row, titled},
 };
 use anyhow::Context as _;
@@ -25,9 +24,8 @@ const PER_ROW: usize = 11;
 /// Colours of mean, first and second mode.
 const COLOURS: [Colour; 3] = [GREEN, ORANGE, BLUE];
 
-pub(crate) fn draw(args: &LandmarkArgs) -> anyhow::Result<Picture> {
+pub(crate) fn draw(landmark: &Landmark) -> anyhow::Result<Picture> {
     let p = Params::default();
-    let landmark = args.landmark(SEED)?;
     let taught = landmark.taught(&p)?;
     let pixels: Vec<&[f32]> = taught.views.iter().map(|v| v.icon.pixels.as_slice()).collect();
     let modes = modes(&pixels).context("the views have no principal components")?;

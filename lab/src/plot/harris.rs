@@ -1,8 +1,7 @@
 //! Harris points of an icon and of an exemplar, and the counterparts that the partial Hausdorff distance rests on.
 
 use super::{
-    icon::SEED,
-    landmark::{LandmarkArgs, oblique},
+    landmark::{Landmark, oblique},
     panels::{GAP_PX, explained, icon as drawn, on, ring},
 };
 use cli::drawing::{CYAN, GREEN, ORANGE, Picture, WHITE};
@@ -18,9 +17,8 @@ use vision::{
 /// Enlargement of the icons.
 const FACTOR: usize = 6;
 
-pub(crate) fn draw(args: &LandmarkArgs) -> anyhow::Result<Picture> {
+pub(crate) fn draw(landmark: &Landmark) -> anyhow::Result<Picture> {
     let p = Params::default();
-    let landmark = args.landmark(SEED)?;
     let taught = landmark.taught(&p)?;
     let seen = landmark.seen(&oblique())?;
     let own = features(icon(&seen.image, &seen.corners, &p.icon)?, &p.recognise);

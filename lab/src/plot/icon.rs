@@ -1,21 +1,18 @@
 //! From the quad to the icon: the square of grey levels that is compared, and the exemplar that it is compared with.
 
 use super::{
-    landmark::{LandmarkArgs, oblique},
+    landmark::{Landmark, oblique},
     panels::{around, cut, explained, icon as drawn, on, row, titled},
 };
 use cli::drawing::{CYAN, GREEN, ORANGE, Picture, WHITE, YELLOW};
 use nalgebra::Point2;
 use vision::{geometry::homography::Homography, icon::icon, params::Params, recognise::features};
 
-/// A poster with a frame, letters and large motifs.
-pub(super) const SEED: u64 = 11;
 /// Enlargement of the icons.
 const FACTOR: usize = 4;
 
-pub(crate) fn draw(args: &LandmarkArgs) -> anyhow::Result<Picture> {
+pub(crate) fn draw(landmark: &Landmark) -> anyhow::Result<Picture> {
     let p = Params::default();
-    let landmark = args.landmark(SEED)?;
     let taught = landmark.taught(&p)?;
     let seen = landmark.seen(&oblique())?;
     let cut_out = icon(&seen.image, &seen.corners, &p.icon)?;

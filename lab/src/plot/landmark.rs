@@ -1,7 +1,7 @@
 //! The rendered landmark that a stage of recognition is drawn on: a poster on a plastered wall, taught from one
 //! photograph, and other views of it. With the exact corners: what detection adds is drawn elsewhere.
 
-use super::Target;
+use super::Args;
 use crate::evaluate::experiment::lesson::points_of;
 use anyhow::Context as _;
 use cli::pictures;
@@ -11,7 +11,6 @@ use sim::{
     surfaces::plaster,
     texture::{Edge, Texture},
 };
-use std::path::PathBuf;
 use vision::{
     detect::pyramid::{reduce, working_factor},
     icon::Icon,
@@ -28,24 +27,10 @@ const OTHERS: u64 = 3;
 /// Pictures of one's own are reduced to about this longer side: as fine as rendered posters.
 const SIDE_PX: usize = 640;
 
-/// What a stage of recognition is drawn on.
-#[derive(Debug, clap::Args)]
-pub(crate) struct LandmarkArgs {
-    /// A picture of your own, PNG or JPEG, that hangs on the rendered wall in place of the poster.
-    #[arg(long, value_name = "FILE")]
-    image: Option<PathBuf>,
-    /// Another seed takes another poster, another wall and other noise.
-    #[arg(long)]
-    pub(super) seed: Option<u64>,
-    #[command(flatten)]
-    pub(super) target: Target,
-}
-
-impl LandmarkArgs {
+impl Args {
     /// The landmark that is drawn.
-    pub(crate) fn landmark(&self, default_seed: u64) -> anyhow::Result<Landmark> {
-        let seed = self.seed.unwrap_or(default_seed);
-        let poster = Landmark::poster(seed);
+    pub(super) fn landmark(&self) -> anyhow::Result<Landmark> {
+        let poster = Landmark::poster(self.seed);
         match &self.image {
             Some(path) => {
                 let texture = texture(path).with_context(|| path.display().to_string())?;

@@ -2,8 +2,7 @@
 //! point says where the homography puts it.
 
 use super::{
-    icon::SEED,
-    landmark::{LandmarkArgs, oblique},
+    landmark::{Landmark, oblique},
     panels::{GAP_PX, column, explained, gray, on, ring, row, titled},
 };
 use anyhow::Context as _;
@@ -24,8 +23,7 @@ const SIDE_PX: usize = 440;
 /// Points that say nothing.
 const SILENT: Colour = [140, 140, 140];
 
-pub(crate) fn draw(args: &LandmarkArgs) -> anyhow::Result<Picture> {
-    let landmark = args.landmark(SEED)?;
+pub(crate) fn draw(landmark: &Landmark) -> anyhow::Result<Picture> {
     let taught = landmark.taught(&Params::default())?;
     // Something stands before it, so that some points find no counterpart.
     let seen = landmark.seen(&Conditions { cover: 0.1, cover_grey: 60.0, ..oblique() })?;

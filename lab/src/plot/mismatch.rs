@@ -2,8 +2,7 @@
 //! show nothing. For a quarter that was replaced, and for one that is occluded by something plain.
 
 use super::{
-    icon::SEED,
-    landmark::{Landmark, LandmarkArgs, Taught, oblique, plain},
+    landmark::{Landmark, Taught, oblique, plain},
     panels::{column, explained, icon as drawn, row, titled},
 };
 use anyhow::Context as _;
@@ -28,18 +27,19 @@ use vision::{
     },
 };
 
+/// Which quarter is replaced, and by what.
+const LOOK_ALIKE_SEED: u64 = 11;
 /// Enlargement of the icons.
 const FACTOR: usize = 4;
 
-pub(crate) fn draw(args: &LandmarkArgs) -> anyhow::Result<Picture> {
+pub(crate) fn draw(landmark: &Landmark) -> anyhow::Result<Picture> {
     let p = Params::default();
-    let landmark = args.landmark(SEED)?;
     let taught = landmark.taught(&p)?;
-    let [_, double] = lookalikes(&landmark.texture, LookAlikeKind::Quarter, SEED);
+    let [_, double] = lookalikes(&landmark.texture, LookAlikeKind::Quarter, LOOK_ALIKE_SEED);
     let covered = Conditions { cover: 0.2, cover_grey: 90.0, ..plain() };
     let rows = [
         mapped(&landmark.with(double), &oblique(), &taught, "a quarter replaced", &p)?,
-        mapped(&landmark, &covered, &taught, "something plain before it", &p)?,
+        mapped(landmark, &covered, &taught, "something plain before it", &p)?,
     ];
     let least = format!("in doubt from {MIN_DIFFERING} of a block of 4 x 4 windows on");
     Ok(explained(

@@ -1,8 +1,7 @@
 //! The patch of a quad with its margin, its keypoints, and which of them are taught.
 
 use super::{
-    icon::SEED,
-    landmark::LandmarkArgs,
+    landmark::Landmark,
     panels::{around, cut, explained, gray, on, ring, row, titled},
 };
 use anyhow::Context as _;
@@ -17,8 +16,7 @@ use vision::points::{
 /// Enlargement of the patch.
 const FACTOR: usize = 3;
 
-pub(crate) fn draw(args: &LandmarkArgs) -> anyhow::Result<Picture> {
-    let landmark = args.landmark(SEED)?;
+pub(crate) fn draw(landmark: &Landmark) -> anyhow::Result<Picture> {
     let seen = landmark.photograph()?;
     let taught = view_points(&seen.image, &seen.corners);
     let patch = Patch::new(&seen.image, &seen.corners, inner_px(&seen.corners))

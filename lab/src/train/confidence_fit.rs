@@ -27,12 +27,7 @@ pub(crate) struct Answer {
 pub(crate) enum ConfidenceError {
     /// All answers are right, or all wrong.
     #[error("{right} of {answers} answers are right: there must be both")]
-    OneClass {
-        /// Right ones.
-        right: usize,
-        /// All.
-        answers: usize,
-    },
+    OneClass { right: usize, answers: usize },
     /// A measure is not finite.
     #[error("answer {0} is malformed")]
     Malformed(usize),

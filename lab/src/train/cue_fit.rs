@@ -5,11 +5,9 @@
 
 use nalgebra::Point2;
 use vision::{
-    detect::{
-        relaxation::similarity::{SegmentPair, SimilarityParams},
-        segments::edge_segments::EdgeSegment,
-    },
+    detect::segments::edge_segments::EdgeSegment,
     geometry::{corners::Corners, polygon},
+    paper::relaxation::similarity::{SegmentPair, SimilarityParams},
 };
 
 /// Most labelled pairs of one fit.
@@ -35,7 +33,6 @@ pub(crate) enum CueFitError {
     TooFew {
         /// Pairs of opposite sides.
         pairs: usize,
-        /// Other pairs.
         others: usize,
     },
     /// More pairs than [`MAX_PAIRS_FITTED`].
@@ -57,12 +54,12 @@ pub(crate) struct LabelledPair {
     pub(crate) photograph: usize,
 }
 
-/// Parameters of [`vision::detect::relaxation::similarity::pairs`] that keep every pair that passes the gates,
+/// Parameters of [`vision::paper::relaxation::similarity::pairs`] that keep every pair that passes the gates,
 /// whatever its score.
 pub(crate) fn ungraded(p: &SimilarityParams) -> SimilarityParams {
     SimilarityParams {
         min_score: 0.0,
-        max_candidates: vision::detect::relaxation::labelling::MAX_ROW_CANDIDATES,
+        max_candidates: vision::paper::relaxation::labelling::MAX_ROW_CANDIDATES,
         ..p.clone()
     }
 }

@@ -96,7 +96,6 @@ struct Report {
 const CORRIDOR: &str = "corridor";
 const SCENES: &str = "scenes";
 
-/// Runs it.
 pub(super) fn run(args: &DetectorArgs) -> anyhow::Result<()> {
     anyhow::ensure!(args.seed != args.held_out_seed, "--held-out-seed: must differ from --seed");
     let params = args.parameters.parameters()?;

@@ -44,7 +44,6 @@ pub(crate) struct LabelledExample {
     pub(crate) group: usize,
     /// Weight, above 0.
     pub(crate) weight: f64,
-    /// Its measurements.
     pub(crate) features: Vec<f64>,
     /// Whether it is one.
     pub(crate) is_one: bool,

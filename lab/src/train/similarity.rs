@@ -11,10 +11,10 @@ use vision::{
     detect::{
         DetectParams,
         edges::edge_map::edges,
-        relaxation::similarity::{self, SimilarityParams},
         segments::{chains::chains, edge_segments::segments},
     },
     geometry::Corners,
+    paper::relaxation::similarity::{self, SimilarityParams},
 };
 
 /// Names of the cues c1 to c6.

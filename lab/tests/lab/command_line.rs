@@ -11,7 +11,7 @@ use tests::{
 };
 
 /// Options that each command must name in its help.
-const OPTIONS: [(&str, &[&str]); 28] = [
+const OPTIONS: [(&str, &[&str]); 26] = [
     (
         "evaluate navigation",
         &["--drives", "--posters", "--length-m", "--rate-hz", "--seed", "--json", "--plot"],
@@ -115,9 +115,7 @@ const OPTIONS: [(&str, &[&str]); 28] = [
         ],
     ),
     ("train similarity", &["--out", "--json", "--without", "--views", "--seed", "<SETS>"]),
-    ("plot tiling", &["--out", "--image", "--seed"]),
-    ("plot icon", &["--out", "--image", "--seed"]),
-    ("plot expected", &["--out", "--seed"]),
+    ("plot", &["--out", "--image", "--seed", "<STAGE>"]),
     ("bench", &["--frames", "--landmarks", "--rounds", "--seed", "--json"]),
     (
         "bench detect",

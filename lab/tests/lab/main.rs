@@ -4,7 +4,6 @@ mod command_line;
 mod evaluate;
 mod outside;
 mod plot;
-mod plot_map;
 mod real_pictures;
 mod train;
 

@@ -28,7 +28,6 @@ pub(super) struct Spatial<'a> {
     corners_m: Vec<[Vector3<f64>; 4]>,
 }
 
-/// A minimum.
 #[derive(Debug, Clone)]
 pub(super) struct SpatialFit {
     pub(super) camera_from_map: Isometry3<f64>,

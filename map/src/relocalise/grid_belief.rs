@@ -2,14 +2,12 @@
 
 use crate::{
     check::{self, OutOfRange},
-    place::LandmarkPlace,
     pose2::{Pose2, wrap_rad},
     relocalise::{
         grid::{PoseGrid, PoseHypothesis},
         observation::{AssociationHypothesis, MAX_MEMBERS, PossibleLandmark, RelativeObservation},
         params::GridBeliefParams,
     },
-    visibility::VisibilityMap,
 };
 use nalgebra::{Matrix3, Point2, Vector3};
 use std::f64::consts::{PI, TAU};
@@ -112,22 +110,6 @@ impl GridBelief {
                 likelihood[i] += member.probability * scale * (-0.5 * e.dot(&(inverse * e))).exp();
             },
         );
-    }
-
-    /// Update by a landmark that was not observed, although the camera covered the bearings between two (radians,
-    /// left positive).
-    pub fn update_missed(&mut self, place: &LandmarkPlace, visible: &VisibilityMap, bearings_rad: [f64; 2]) {
-        let detection = self.p.detection;
-        self.grid.weigh(|_, pose| {
-            let (dx, dy) = (place.x_m - pose.x_m, place.y_m - pose.y_m);
-            let bearing = wrap_rad(dy.atan2(dx) - pose.theta_rad);
-            let is_covered = (bearings_rad[0]..=bearings_rad[1]).contains(&bearing);
-            if is_covered && visible.contains(&Point2::new(pose.x_m, pose.y_m)) {
-                1.0 - detection
-            } else {
-                1.0
-            }
-        });
     }
 
     /// Pose hypotheses, most probable first.

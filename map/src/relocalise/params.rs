@@ -18,8 +18,6 @@ pub struct GridBeliefParams {
     pub clutter_reach_m: f64,
     /// Share of the belief that is spread uniformly at every motion, for a kidnapped robot, 0 to 1.
     pub carried: f64,
-    /// Probability that a visible landmark is recognised, 0 to 1.
-    pub detection: f64,
     /// Standard deviation of a motion after 1 m, metres; grows with the square root of the distance.
     pub along_m: f64,
     /// Standard deviation of the heading after 1 m or 1 rad, radians.
@@ -40,7 +38,6 @@ impl Default for GridBeliefParams {
             clutter: 0.1,
             clutter_reach_m: 8.0,
             carried: 0.01,
-            detection: 0.8,
             along_m: 0.05,
             turn_rad: 0.02,
             decided: 0.95,
@@ -59,12 +56,9 @@ impl GridBeliefParams {
         check::within("mode_rad", self.mode_rad, 0.0, PI)?;
         check::within("along_m", self.along_m, 0.0, 10.0)?;
         check::within("turn_rad", self.turn_rad, 0.0, 10.0)?;
-        for (field, value) in [
-            ("clutter", self.clutter),
-            ("carried", self.carried),
-            ("detection", self.detection),
-            ("decided", self.decided),
-        ] {
+        for (field, value) in
+            [("clutter", self.clutter), ("carried", self.carried), ("decided", self.decided)]
+        {
             check::within(field, value, 0.0, 1.0)?;
         }
         Ok(())

@@ -179,31 +179,6 @@ fn a_kidnapped_robot_is_localised_again() {
 }
 
 #[test]
-fn a_missed_landmark_lowers_the_probability_of_a_pose() {
-    let p = sharp();
-    let mut belief = corridor(&p);
-    // The robot may be at either of two doors; from one of them a poster is visible.
-    let places = [door(4.1, 1.1, -FRAC_PI_2), door(14.1, 1.1, -FRAC_PI_2)];
-    belief.update(&beside(), &members(&places, 0.1)).unwrap();
-    let poster = {
-        let size = LandmarkSize { width_m: 0.6, height_m: 0.6 };
-        LandmarkPlace::by_hand(Vector3::new(16.1, 0.1, 1.2), PI, size, PlaceSigmas::default()).unwrap()
-    };
-    let visible = visibility(&poster, &[], &PanTiltCamera::default(), &VisibilityParams::default()).unwrap();
-    for _ in 0..2 {
-        belief.update_missed(&poster, &visible, [-0.5, 0.5]);
-    }
-    let modes = belief.modes();
-    assert!((modes[0].pose.pose.x_m - 4.1).abs() < 0.1, "{modes:?}");
-    // Each miss leaves 0.2 of its probability: 1 to 0.04.
-    assert!((modes[0].mass / modes[1].mass - 25.0).abs() < 1.0, "{modes:?}");
-    let mut aside = corridor(&p);
-    aside.update(&beside(), &members(&places, 0.1)).unwrap();
-    aside.update_missed(&poster, &visible, [0.5, 1.5]);
-    assert!((aside.modes()[0].mass - 0.5).abs() < 0.01, "the camera did not cover its bearing");
-}
-
-#[test]
 fn a_landmark_is_not_observed_from_outside_its_area() {
     let p = sharp();
     let mut belief = corridor(&p);

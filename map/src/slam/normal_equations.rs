@@ -46,7 +46,6 @@ impl BlockPattern {
         Self { place, symbolic: CscSymbolicCholesky::factor(scalars.clone()), scalars, columns }
     }
 
-    /// A matrix of zeros.
     pub(super) fn zeros(&self) -> BlockMatrix<'_> {
         BlockMatrix { pattern: self, values: vec![0.0; self.scalars.nnz()] }
     }

@@ -3,8 +3,9 @@
 use super::visibility_settings::VisibilitySettingsBody;
 use map::{
     gaze::{Criterion, PanTiltUnit},
-    visibility::PanTiltCamera,
+    visibility::{PanTiltCamera, Polygon, VisibilityMap},
 };
+use nalgebra::Point2;
 use serde::{Deserialize, Serialize};
 
 /// The floor area from which a landmark is seen: a GeoJSON `Feature` in metres of the map, not degrees.
@@ -46,6 +47,34 @@ pub struct VisibilityAreaProperties {
     pub centroid_m: Option<[f64; 2]>,
     /// Furthest possible distance from the landmark.
     pub reach_m: f64,
+}
+
+/// Coordinates of areas are written to a tenth of a millimetre.
+const STEPS_PER_M: f64 = 1e4;
+
+impl VisibilityAreaBody {
+    /// The area of the landmark of this name.
+    pub fn new(area: &VisibilityMap, landmark: &str) -> Self {
+        let rounded = |value: f64| (value * STEPS_PER_M).round() / STEPS_PER_M;
+        let point = |p: &Point2<f64>| [rounded(p.x), rounded(p.y)];
+        let ring =
+            |corners: &[Point2<f64>]| corners.iter().chain(corners.first()).map(point).collect::<Vec<_>>();
+        let rings = |p: &Polygon| {
+            let hole = (!p.hole.is_empty()).then(|| ring(&p.hole));
+            std::iter::once(ring(&p.corners)).chain(hole).collect()
+        };
+        let coordinates = area.polygons().iter().map(rings).collect();
+        Self {
+            kind: "Feature".to_owned(),
+            geometry: MultiPolygon { kind: "MultiPolygon".to_owned(), coordinates },
+            properties: VisibilityAreaProperties {
+                landmark: landmark.to_owned(),
+                area_m2: rounded(area.area_m2()),
+                centroid_m: area.centroid().map(|c| point(&c)),
+                reach_m: rounded(area.reach_m()),
+            },
+        }
+    }
 }
 
 /// A pose in the map.
@@ -217,4 +246,44 @@ pub struct GazeRankingBody {
     pub map_version: u64,
     /// Best first; empty when nothing is in sight.
     pub ranked: Vec<GazeTargetBody>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use map::{
+        place::{LandmarkPlace, PlaceSigmas},
+        visibility::{Obstacle, VisibilityParams, visibility},
+    };
+    use nalgebra::Vector3;
+    use vision::pose::LandmarkSize;
+
+    fn area(z_m: f64, obstacles: &[Obstacle], tilt: Option<f64>) -> VisibilityAreaBody {
+        let size = LandmarkSize { width_m: 0.6, height_m: 0.84 };
+        let mut place =
+            LandmarkPlace::by_hand(Vector3::new(0.0, 0.0, z_m), 0.0, size, PlaceSigmas::default()).unwrap();
+        place.tilt_rad = tilt.unwrap_or(place.tilt_rad);
+        let viewer = PanTiltCamera { tilt_rad: [-0.35, 1.0], ..PanTiltCamera::default() };
+        let area = visibility(&place, obstacles, &viewer, &VisibilityParams::default()).unwrap();
+        VisibilityAreaBody::new(&area, "poster-1")
+    }
+
+    #[test]
+    fn as_geojson() {
+        let wall = Obstacle { a: Point2::new(3.0, -9.0), b: Point2::new(3.0, 9.0), height_m: None };
+        let feature = area(1.5, &[wall], None);
+        assert_eq!((feature.kind.as_str(), feature.geometry.kind.as_str()), ("Feature", "MultiPolygon"));
+        let ring = &feature.geometry.coordinates[0][0];
+        assert_eq!(ring.first(), ring.last());
+        assert!(ring.len() > 10 && feature.properties.area_m2 > 5.0);
+        let signed: f64 = ring.windows(2).map(|w| w[0][0] * w[1][1] - w[1][0] * w[0][1]).sum();
+        assert!((0.5 * signed - feature.properties.area_m2).abs() < 0.01, "counter-clockwise");
+    }
+
+    #[test]
+    fn a_sign_under_the_ceiling_has_a_hole() {
+        let rings = &area(2.5, &[], Some(std::f64::consts::FRAC_PI_2)).geometry.coordinates[0];
+        assert_eq!(rings.len(), 2, "the outer one and the hole");
+        assert_eq!(rings[1].first(), rings[1].last());
+    }
 }

@@ -8,7 +8,9 @@ use vision::{
     model::LandmarkId,
     points::{agreement::Part, verify::PointEvidence},
     pose::{LandmarkPose, PoseSolution},
-    recognise::{MatchCandidate, MatchRefusal, RecognitionResult, Verdict, log10_false_alarms},
+    recognise::{
+        Evidence, IconEvidence, MatchCandidate, MatchRefusal, RecognitionResult, Verdict, log10_false_alarms,
+    },
 };
 
 /// Four corners, TL, TR, BR, BL.
@@ -36,17 +38,24 @@ pub fn verdict(recognition: Verdict) -> v1::Verdict {
 
 /// A candidate; `name` gives the landmark's name.
 pub fn candidate(c: &MatchCandidate, name: impl Fn(LandmarkId) -> String) -> v1::Candidate {
+    let icon = match c.evidence {
+        Evidence::Icon(icon) => icon,
+        // The wire has no absent C^r and threshold: the largest C^r, and the ratio as the distance.
+        Evidence::Points { likeness } => {
+            IconEvidence { correlation: 2.0, hausdorff: f64::INFINITY, likeness, distance: c.ratio, tau: 1.0 }
+        }
+    };
     v1::Candidate {
         landmark: name(c.landmark),
-        correlation: c.correlation,
+        correlation: icon.correlation,
         // JSON has no infinity: an infinite distance (too few points) is absent.
-        hausdorff: c.hausdorff.is_finite().then_some(c.hausdorff),
-        distance: finite(c.distance),
-        threshold: finite(c.tau),
+        hausdorff: icon.hausdorff.is_finite().then_some(icon.hausdorff),
+        distance: finite(icon.distance),
+        threshold: finite(icon.tau),
         ratio: finite(c.ratio),
         probability: c.probability,
         refusal: c.refusal.map_or("", refusal).to_owned(),
-        gradient_similarity: c.likeness.filter(|l| l.is_finite()),
+        gradient_similarity: icon.likeness.filter(|l| l.is_finite()),
     }
 }
 
@@ -135,11 +144,13 @@ mod tests {
     fn an_infinite_distance_stays_writable() {
         let c = MatchCandidate {
             landmark: LandmarkId(4),
-            correlation: 0.25,
-            hausdorff: f64::INFINITY,
-            likeness: Some(0.25),
-            distance: f64::INFINITY,
-            tau: 0.5,
+            evidence: Evidence::Icon(IconEvidence {
+                correlation: 0.25,
+                hausdorff: f64::INFINITY,
+                likeness: Some(0.25),
+                distance: f64::INFINITY,
+                tau: 0.5,
+            }),
             ratio: f64::INFINITY,
             probability: 0.0,
             refusal: Some(MatchRefusal::Hausdorff),
@@ -213,11 +224,7 @@ mod tests {
     fn a_doubtful_landmark_is_named_apart() {
         let refused = |refusal| MatchCandidate {
             landmark: LandmarkId(1),
-            correlation: 0.2,
-            hausdorff: 1.0,
-            likeness: None,
-            distance: 0.3,
-            tau: 1.0,
+            evidence: Evidence::Points { likeness: None },
             ratio: 0.3,
             probability: 1.0,
             refusal: Some(refusal),

@@ -3,7 +3,7 @@
 //! Source: `eclipse-zenoh/zenoh-plugin-ros2dds src/ros2_utils.rs` (`ros2_name_to_key_expr`). The namespace also
 //! precedes `/tf` and `/tf_static`, so robots with namespaces do not share them.
 
-use crate::topic_name::{TopicName, TopicNameError};
+use crate::topic_name::TopicName;
 
 /// The key of a topic under a bridge's `namespace`, which is `/` by default.
 pub fn key_of(topic: TopicName<'_>, namespace: &str) -> String {
@@ -11,15 +11,6 @@ pub fn key_of(topic: TopicName<'_>, namespace: &str) -> String {
         "" => topic.as_key().to_owned(),
         namespace => format!("{namespace}/{}", topic.as_key()),
     }
-}
-
-/// The topic of a key, as the robot names it; `None` where the key is outside of the namespace.
-pub fn topic_of<'a>(key: &'a str, namespace: &str) -> Option<Result<TopicName<'a>, TopicNameError>> {
-    let topic = match namespace.trim_matches('/') {
-        "" => key,
-        namespace => key.strip_prefix(namespace)?.strip_prefix('/')?,
-    };
-    Some(TopicName::from_key(topic))
 }
 
 #[cfg(test)]
@@ -33,9 +24,6 @@ mod tests {
             [("/", "tf"), ("", "tf"), ("/bot1", "bot1/tf"), ("fleet/bot1", "fleet/bot1/tf")]
         {
             assert_eq!(key_of(topic, namespace), key);
-            assert_eq!(topic_of(key, namespace), Some(Ok(topic)));
         }
-        assert_eq!(topic_of("bot12/tf", "/bot1"), None);
-        assert!(matches!(topic_of("bot1/1", "/bot1"), Some(Err(TopicNameError::Part(0)))));
     }
 }

@@ -109,11 +109,6 @@ impl DdsQos {
         let user_data = parts.next().unwrap_or_default().to_owned();
         Ok(Self { is_keyed, reliability, durability, history, user_data })
     }
-
-    /// The hash of the type's definition, where the endpoint says it.
-    pub fn type_hash(&self) -> Option<&str> {
-        self.user_data.split(';').find_map(|pair| pair.strip_prefix("typehash="))
-    }
 }
 
 impl fmt::Display for DdsQos {

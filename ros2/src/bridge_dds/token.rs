@@ -64,7 +64,7 @@ pub struct BridgeEndpoint {
     pub zid: String,
     /// What it is.
     pub kind: BridgeKind,
-    /// The key of its data: see [`super::topic_of`].
+    /// The key of its data: see [`super::key_of`].
     pub key: String,
     /// Its type in the form of ROS; services and actions have other types than topics.
     pub ros_type: String,

@@ -26,11 +26,6 @@ impl<'a> Reader<'a> {
         Ok(Self { body: &payload[HEADER_BYTES..], at: 0, order })
     }
 
-    /// Byte order of the payload.
-    pub fn byte_order(&self) -> ByteOrder {
-        self.order
-    }
-
     /// One number.
     pub fn scalar<T: Scalar>(&mut self, field: &str) -> Result<T, CdrError> {
         self.align(T::BYTES);

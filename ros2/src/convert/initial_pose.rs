@@ -59,6 +59,6 @@ mod tests {
         let send = |x_m, m| initial_pose("map", Time::default(), at(x_m), &m);
         assert_eq!(send(f64::NAN, Matrix3::identity()), Err(InitialPoseError::Pose));
         let bad = send(0.0, Matrix3::from_diagonal_element(f64::NAN));
-        assert_eq!(bad, Err(InitialPoseError::Covariance(CovarianceError::NotFinite(0))));
+        assert_eq!(bad, Err(InitialPoseError::Covariance(CovarianceError(0))));
     }
 }

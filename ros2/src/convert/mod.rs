@@ -19,14 +19,13 @@ mod image;
 
 pub use camera::{CameraError, CameraModel, LensModel};
 pub use covariance::{
-    CovarianceError, MAX_INITIAL_VARIANCE, UNKNOWN_VARIANCE, clip_for_initial_pose, planar_of_ros,
-    ros_of_planar,
+    CovarianceError, MAX_INITIAL_VARIANCE, UNKNOWN_VARIANCE, clip_for_initial_pose, ros_of_planar,
 };
 pub use image::{Compression, ImageError, ImageRows, PixelLayout};
 pub use initial_pose::{InitialPoseError, initial_pose};
 pub use laser::{LaserError, LaserMounting, MAX_LASER_TILT_RAD, MAX_SCAN_S, PlanarScan};
 pub use map_from_odom::{map_from_odom, transform_stamped};
-pub use optical::{body_from_optical, optical_from_body};
+pub use optical::body_from_optical;
 pub use planar::PlanarPose;
 pub use pose::{PoseError, isometry_of_pose, isometry_of_transform, pose_of, transform_of};
 pub use rotation::{MAX_NORM2_ERROR, RotationError, quaternion, rotation};

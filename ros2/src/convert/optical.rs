@@ -10,11 +10,6 @@ pub fn body_from_optical() -> UnitQuaternion<f64> {
     UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(axes))
 }
 
-/// Takes coordinates of the body frame to those of the optical frame.
-pub fn optical_from_body() -> UnitQuaternion<f64> {
-    body_from_optical().inverse()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -26,7 +21,6 @@ mod tests {
         let axes = [Vector3::x(), Vector3::y(), Vector3::z()].map(|optical| body * optical);
         let expected = [-Vector3::y(), -Vector3::z(), Vector3::x()];
         assert!(axes.iter().zip(expected).all(|(a, b)| (a - b).norm() < 1e-12));
-        assert!((optical_from_body() * Vector3::x() - Vector3::z()).norm() < 1e-12);
         // Drivers write it as roll -90, yaw -90 degrees: quaternion (-0.5, 0.5, -0.5, 0.5).
         let q = crate::convert::quaternion(&body);
         assert!([q.x + 0.5, q.y - 0.5, q.z + 0.5, q.w - 0.5].iter().all(|d| d.abs() < 1e-12));

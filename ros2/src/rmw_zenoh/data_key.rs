@@ -95,12 +95,6 @@ impl<'a> DataKey<'a> {
         Ok(Self { domain, topic: TopicName::from_key(topic)?, type_name, hash, channel })
     }
 
-    /// What to subscribe to for a type on every topic, whatever the hash; `None` for every domain.
-    pub fn every_topic(domain: Option<u32>, type_name: TypeName<'_>) -> String {
-        let domain = domain.map_or_else(|| "*".to_owned(), |domain| domain.to_string());
-        format!("{domain}/**/{}/*", type_name.to_dds())
-    }
-
     /// What to subscribe to for a type on one topic, whatever the hash.
     pub fn every_hash(domain: u32, topic: TopicName<'_>, type_name: TypeName<'_>) -> String {
         format!("{domain}/{}/{}/*", topic.as_key(), type_name.to_dds())

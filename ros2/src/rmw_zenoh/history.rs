@@ -13,11 +13,6 @@ const PUBLISHERS: &str = "/@adv/pub/";
 /// Longest part of a cache's key after the data key, in parts: session, entity, `_`.
 const CACHE_PARTS: usize = 3;
 
-/// What to ask for the cached samples of every publisher of a key or pattern.
-pub fn caches_of(key: &str) -> String {
-    format!("{key}/@adv/**")
-}
-
 /// Where publishers with a cache declare their tokens: each one that appears is asked for its samples.
 pub fn publishers_of(key: &str) -> String {
     format!("{key}/@adv/pub/**")
@@ -58,7 +53,6 @@ mod tests {
 
     #[test]
     fn queries_are_those_of_advanced_subscribers() {
-        assert_eq!(caches_of(KEY), format!("{KEY}/@adv/**"));
         assert_eq!(publishers_of(KEY), format!("{KEY}/@adv/pub/**"));
         assert_eq!(newest(1), "_max=1");
     }

@@ -23,7 +23,7 @@ pub use attachment::{Attachment, AttachmentError};
 pub use buffers::{CPU_BACKEND, cpu_buffers_of};
 pub use data_key::{Channel, DataKey, DataKeyError, HASH_NOT_SUPPORTED, MAX_KEY_BYTES};
 pub use gid::Gid;
-pub use history::{ACCEPT_ANY_KEY, CacheKey, caches_of, newest, publishers_of};
+pub use history::{ACCEPT_ANY_KEY, CacheKey, newest, publishers_of};
 pub use local_node::{LocalNode, Sender};
 pub use namespace::{inside_namespace, strip_namespace};
 pub use qos::{Durability, History, Liveliness, Qos, QosDuration, QosError, Reliability};

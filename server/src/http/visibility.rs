@@ -16,13 +16,13 @@ use map::{
     gaze::{GazeParams, GazeTarget},
     place::LandmarkPlace,
     pose2::{Pose2, Pose2Covariance},
-    visibility::{Feature, PoseDraws, VisibilitySettings, coverage},
+    visibility::{PoseDraws, VisibilitySettings, coverage},
 };
 use nalgebra::{Matrix3, Point2, Vector2};
 use protos::api::{
     CoverageGapBody, CoverageRequest, CoverageResponse, CoverageSampleBody, GazeQueryBody, GazeRankingBody,
-    GazeTargetBody, MultiPolygon, PoseBody, Problem, VisibilityAreaBody, VisibilityAreaProperties,
-    VisibilitySettingsBody, VisibleLandmark, VisibleRequest, VisibleResponse,
+    GazeTargetBody, PoseBody, Problem, VisibilityAreaBody, VisibilitySettingsBody, VisibleLandmark,
+    VisibleRequest, VisibleResponse,
 };
 use std::sync::Arc;
 use utoipa_axum::{router::OpenApiRouter, routes};
@@ -74,21 +74,7 @@ async fn area(
         let detail = "without size and place it is not known from where it is seen";
         ApiError::new(StatusCode::CONFLICT, "not_placed", detail).field("landmark")
     })?;
-    Ok(Json(area_shown(area.feature(&landmark))))
-}
-
-fn area_shown(feature: Feature) -> VisibilityAreaBody {
-    let (geometry, properties) = (feature.geometry, feature.properties);
-    VisibilityAreaBody {
-        kind: feature.kind.to_owned(),
-        geometry: MultiPolygon { kind: geometry.kind.to_owned(), coordinates: geometry.coordinates },
-        properties: VisibilityAreaProperties {
-            landmark: properties.landmark,
-            area_m2: properties.area_m2,
-            centroid_m: properties.centroid_m,
-            reach_m: properties.reach_m,
-        },
-    }
+    Ok(Json(VisibilityAreaBody::new(area, &landmark)))
 }
 
 fn checked(pose: &PoseBody) -> Result<Pose2Covariance, ApiError> {

@@ -181,7 +181,6 @@ impl Painter {
         });
     }
 
-    /// One grey.
     pub(crate) fn fill(&mut self, plane: &Plane, polygon: &[[f64; 2]], grey: f32) {
         self.paint(plane, polygon, |_, _| grey);
     }

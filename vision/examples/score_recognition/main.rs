@@ -117,10 +117,7 @@ fn labelled(
         if verbose {
             print!("{kind:?} {} {:?} {} conf {:.2}", q.file, q.landmark, word.1, v.confidence);
             for c in v.candidates.iter().take(3) {
-                print!(
-                    " | {} C {:.3} H {:.2} L {:.2?} r {:.2} {:?}",
-                    c.landmark.0, c.correlation, c.hausdorff, c.likeness, c.ratio, c.refusal
-                );
+                print!(" | {} {:.3?} r {:.2} {:?}", c.landmark.0, c.evidence, c.ratio, c.refusal);
             }
             println!();
         }

@@ -37,7 +37,6 @@ pub(super) struct Linear<'a> {
     pub(super) reach_px: f64,
 }
 
-/// One reading.
 #[derive(Debug, Clone)]
 pub(super) struct Reading {
     /// The perturbation of the pose, and the depth.

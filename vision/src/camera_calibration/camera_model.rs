@@ -24,7 +24,6 @@ pub(crate) const POSTER: usize = 6;
 
 pub(crate) const HEIGHT: usize = 7;
 
-/// The unknowns.
 #[derive(Debug, Clone)]
 pub(crate) struct State {
     pub camera: [f64; CAMERA],

@@ -6,7 +6,7 @@ use crate::{
         edge_support::gradients::Gradients,
         edges::edge_map::EdgeMap,
         params::{DetectParams, Grouping, Nested},
-        proposals::{quad_proposals::proposals, three_sided::leftover},
+        proposals::quad_proposals::proposals,
         pyramid::{reduce, working_factor},
         quad::Quad,
         refine::{
@@ -14,7 +14,6 @@ use crate::{
             rating::{ScoredQuad, rate},
             refit::refit_corners,
         },
-        relaxation::{grouping::match_pairs, paired_quads::quads as quads_of_pairs, similarity::pairs},
         segments::{
             chains::chains,
             edge_segments::{EdgeSegment, segments as straight_segments},
@@ -25,9 +24,13 @@ use crate::{
             nested_quads::absorb,
             non_maximum::{snap_sides, suppress_non_maxima, suppress_overlaps},
         },
-        tiling::floor_tiling::{Untiled, untile},
     },
     frame::PictureRef,
+    paper::{
+        detector::quads_by_relaxation,
+        three_sided::leftover,
+        tiling::floor_tiling::{Untiled, untile},
+    },
     trace::{Stage, Trace},
 };
 
@@ -81,7 +84,7 @@ fn finished(mut quads: Vec<Quad>, trace: &mut impl Trace) -> Vec<Quad> {
     quads
 }
 
-/// The paper's grouping: pairs by similarity, both relaxations, sets of three sides.
+/// The paper's grouping, at full size.
 fn by_relaxation(
     memory: &mut DetectBuffers,
     image: PictureRef,
@@ -89,13 +92,8 @@ fn by_relaxation(
     trace: &mut impl Trace,
 ) -> Vec<Quad> {
     let (edges, segments) = traced_segments(memory, image, p, trace);
-    let candidates = pairs(&segments, image.grey(), &p.similarity);
-    let matched = match_pairs(&segments, &candidates, p.similarity.min_score, &p.relaxation);
-    let pairs: Vec<_> = matched.iter().map(|i| candidates[*i].clone()).collect();
-    trace.pairs(&pairs);
-    trace.finished(Stage::Pairs);
     let gradients = Gradients { image: image.grey(), gx: edges.gx(), gy: edges.gy() };
-    let quads = quads_of_pairs(&segments, &pairs, &gradients, p);
+    let quads = quads_by_relaxation(&segments, &gradients, p, trace);
     memory.give_back(edges);
     quads
 }

@@ -5,13 +5,11 @@ pub mod params;
 pub mod pyramid;
 pub mod edges;
 pub mod segments;
-pub mod tiling;
 pub mod edge_support;
 pub mod proposals;
 pub mod refine;
 pub mod border_model;
 pub mod suppression;
-pub mod relaxation;
 pub mod edge_buffers;
 pub mod detector;
 #[cfg(test)]

@@ -1,15 +1,19 @@
 //! Parameters from image to quads.
 
-use crate::detect::{
-    border_model::{
-        network::Network, network_weights, quad_classifier::QUAD_FEATURES, side_features::SIDE_FEATURES,
+use crate::{
+    detect::{
+        border_model::{
+            network::Network, network_weights, quad_classifier::QUAD_FEATURES, side_features::SIDE_FEATURES,
+        },
+        edges::edge_map::EdgeParams,
+        proposals::quad_proposals::ProposalParams,
+        quad::{Quad, QuadKind},
+        segments::{bridging::ChainParams, joining::SegmentParams},
     },
-    edges::edge_map::EdgeParams,
-    proposals::quad_proposals::ProposalParams,
-    quad::{Quad, QuadKind},
-    relaxation::{labelling::RelaxationParams, similarity::SimilarityParams},
-    segments::{bridging::ChainParams, joining::SegmentParams},
-    tiling::tiling_params::TilingParams,
+    paper::{
+        relaxation::{labelling::RelaxationParams, similarity::SimilarityParams},
+        tiling::tiling_params::TilingParams,
+    },
 };
 use serde::{Deserialize, Deserializer, Serialize, de::Error as _};
 

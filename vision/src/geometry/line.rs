@@ -15,9 +15,6 @@ pub struct Line {
 }
 
 impl Line {
-    /// Smallest |sin| of the angle between two lines that still have a usable intersection.
-    const MIN_SIN: f64 = 1e-9;
-
     /// The line through two points; its normal points to the right on screen (u right, v down) when walking from `a`
     /// to `b`. None when the points coincide or are not finite.
     pub fn from_points(a: &Point2<f64>, b: &Point2<f64>) -> Option<Self> {
@@ -48,18 +45,6 @@ impl Line {
     /// Foot of the perpendicular from `p`.
     pub fn project(&self, p: &Point2<f64>) -> Point2<f64> {
         p - self.normal * self.distance(p)
-    }
-
-    /// Where two lines cross; None when they are parallel.
-    pub fn intersect(&self, other: &Line) -> Option<Point2<f64>> {
-        let sin = self.normal.perp(&other.normal);
-        if sin.abs() < Self::MIN_SIN || !sin.is_finite() {
-            return None;
-        }
-        Some(Point2::new(
-            (self.rho_px * other.normal.y - other.rho_px * self.normal.y) / sin,
-            (self.normal.x * other.rho_px - other.normal.x * self.rho_px) / sin,
-        ))
     }
 
     /// The same line with the opposite normal.
@@ -220,16 +205,6 @@ mod tests {
         assert!((line.project(&p(3.0, 7.0)) - p(3.0, 2.0)).norm() < 1e-12);
         assert!(Line::from_points(&p(1.0, 1.0), &p(1.0, 1.0)).is_none());
         assert!(Line::from_points(&p(1.0, 1.0), &p(f64::NAN, 1.0)).is_none());
-    }
-
-    #[test]
-    fn crossing_lines_meet_and_parallels_do_not() {
-        let a = Line::from_points(&p(0.0, 0.0), &p(4.0, 4.0)).unwrap();
-        let b = Line::from_points(&p(0.0, 4.0), &p(4.0, 0.0)).unwrap();
-        assert!((a.intersect(&b).unwrap() - p(2.0, 2.0)).norm() < 1e-12);
-        assert!((a.intersect(&b.flipped()).unwrap() - p(2.0, 2.0)).norm() < 1e-12);
-        let parallel = Line::from_points(&p(1.0, 0.0), &p(5.0, 4.0)).unwrap();
-        assert!(a.intersect(&parallel).is_none());
     }
 
     #[test]

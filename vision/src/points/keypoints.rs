@@ -17,7 +17,6 @@ pub const SCALES: usize = 3;
 const LEVELS: usize = SCALES + 3;
 /// No octave is smaller than this.
 const MIN_OCTAVE_PX: usize = 16;
-/// Most octaves.
 const MAX_OCTAVES: usize = 4;
 /// Smallest response in a patch, in grey levels.
 const MIN_RESPONSE: f32 = 0.25;

@@ -13,7 +13,9 @@ pub(crate) mod fixture;
 
 pub use decision::{
     by_points::{DOUBTFUL_PARTS, LOG10_EPSILON, log10_false_alarms},
-    result::{MAX_CANDIDATES, MatchCandidate, MatchRefusal, RecognitionResult, Verdict},
+    result::{
+        Evidence, IconEvidence, MAX_CANDIDATES, MatchCandidate, MatchRefusal, RecognitionResult, Verdict,
+    },
     verdict::{recognise, recognise_watched},
 };
 pub use distance_kind::DistanceKind;

@@ -132,7 +132,6 @@ fn options(plan: &Plan, robot: &PlannedRobot) -> RobotOptions {
     }
 }
 
-/// One robot.
 struct Sender {
     plan: Arc<Plan>,
     drive: Arc<Drive>,

@@ -70,7 +70,6 @@ pub(super) enum End {
     Unanswered,
 }
 
-/// One frame.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub(super) struct Sent {
     /// When it was to be sent, s after the start.

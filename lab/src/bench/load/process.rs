@@ -69,7 +69,6 @@ impl ServerChild {
         self.child.id().unwrap_or_default()
     }
 
-    /// Ends it.
     pub(super) async fn stop(mut self) -> anyhow::Result<()> {
         Ok(self.child.kill().await?)
     }

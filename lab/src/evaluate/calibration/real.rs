@@ -33,7 +33,6 @@ pub(super) struct OfViews {
     pub(super) median: f64,
 }
 
-/// One board.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct RealSet {
     pub(super) name: String,

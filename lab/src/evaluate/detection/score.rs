@@ -76,7 +76,6 @@ impl ImageScore {
         self.labels.iter().map(label).sum::<f64>() + self.false_left() as f64
     }
 
-    /// Missed quads.
     pub(crate) fn missed(&self) -> usize {
         self.labels.iter().filter(|l| l.iou < FOUND).count()
     }

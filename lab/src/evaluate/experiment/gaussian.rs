@@ -4,7 +4,6 @@
 /// Normal model of a class of distances.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Gaussian {
-    /// Mean.
     pub(crate) mean: f64,
     /// Standard deviation, positive.
     pub(crate) deviation: f64,

@@ -180,16 +180,12 @@ fn outcome(verdict: &RecognitionResult, id: LandmarkId) -> Outcome {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use vision::recognise::MatchCandidate;
+    use vision::recognise::{Evidence, MatchCandidate};
 
     fn verdict(recognition: Verdict, refusal: Option<MatchRefusal>) -> RecognitionResult {
         let candidate = MatchCandidate {
             landmark: LandmarkId(3),
-            correlation: 0.1,
-            hausdorff: 1.0,
-            likeness: Some(0.5),
-            distance: 0.5,
-            tau: 0.55,
+            evidence: Evidence::Points { likeness: Some(0.5) },
             ratio: 0.9,
             probability: 0.0,
             refusal,

@@ -26,7 +26,6 @@ fn at(x_m: f64, y_m: f64) -> (f64, f64) {
     (LEFT_PX + x_m * SCALE, TOP_PX + (HALF_M - y_m) * SCALE)
 }
 
-/// The picture.
 pub(super) fn svg(world: &World, areas: &ModalityMap, ways: &[(&'static str, Vec<Driven>)]) -> String {
     let mut svg = String::new();
     let height = TOP_PX + 2.0 * HALF_M * SCALE + 60.0 + ERROR_PX + 60.0;

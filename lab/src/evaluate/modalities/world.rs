@@ -35,7 +35,6 @@ const SIZE: LandmarkSize = LandmarkSize { width_m: 0.6, height_m: 0.84 };
 const POSTER_HEIGHT_M: f64 = 1.5;
 
 pub(super) struct World {
-    /// True walls.
     pub(super) walls: Vec<WallSegment>,
     /// Walls of the map.
     pub(super) index: WallIndex,

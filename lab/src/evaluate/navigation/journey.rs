@@ -64,7 +64,6 @@ pub(super) struct Moment {
     pub(super) corrected: bool,
 }
 
-/// A drive.
 #[derive(Default)]
 pub(super) struct Journey {
     pub(super) moments: Vec<Moment>,

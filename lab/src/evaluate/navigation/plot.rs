@@ -21,7 +21,6 @@ const TRUE: &str = "#333333";
 const ODOMETRY: &str = COLOURS[0];
 const CORRECTED: &str = COLOURS[1];
 
-/// The picture.
 pub(super) fn svg(world: &World, journey: &Journey) -> String {
     let mut svg = String::new();
     let plan = Plan::new(world);

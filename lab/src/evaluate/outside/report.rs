@@ -68,7 +68,6 @@ pub(super) struct Partial {
     pub(super) named: usize,
 }
 
-/// Camera poses.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct CameraFigures {
     /// Pictures with a true pose and at least one full view; of those, how many got a pose.

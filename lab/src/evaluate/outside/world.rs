@@ -59,7 +59,6 @@ pub(super) enum CameraSigmas {
     Absent,
 }
 
-/// One world.
 #[derive(Debug, Clone)]
 pub(super) struct World {
     pub(super) truth: Truth,

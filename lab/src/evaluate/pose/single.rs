@@ -22,7 +22,6 @@ const ROWS: [(f64, f64, [f64; 3], [f64; 3]); 5] = [
 ];
 /// Corner noise of the table.
 const ROW_SIGMA_PX: f64 = 0.5;
-/// Draws of a row.
 const ROW_DRAWS: usize = 2_000;
 /// Error of the squared Mahalanobis distance from which an unflagged pose nearer to the mirror image is a flip.
 const FLIP_NEES: f64 = 30.0;

@@ -2,7 +2,7 @@
 
 use super::*;
 use nalgebra::Vector2;
-use vision::{detect::relaxation::similarity::pairs, frame::GrayImage, random::Random};
+use vision::{frame::GrayImage, paper::relaxation::similarity::pairs, random::Random};
 
 /// A segment between two points, as an ideal extractor would give it. The brighter side is right of p to q.
 fn segment(p: [f64; 2], q: [f64; 2]) -> EdgeSegment {

@@ -36,7 +36,6 @@ const MIN_LOG10_MATCHES: f64 = -8.0;
 /// A picture and its candidate borders.
 #[derive(Debug, Clone)]
 pub(crate) struct Picture<'a> {
-    /// The picture.
     pub(crate) image: &'a GrayImage,
     /// Borders that may be the object's, likeliest first, px.
     pub(crate) borders_px: Vec<Corners>,

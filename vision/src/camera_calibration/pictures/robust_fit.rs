@@ -47,7 +47,6 @@ pub(crate) struct Start<'a> {
     pub(crate) image_px: [f64; 2],
 }
 
-/// A solution.
 pub(crate) struct RobustFit {
     pub(crate) problem: Adjustment,
     pub(crate) state: State,

@@ -4,7 +4,6 @@
 use crate::{frame::GrayImage, geometry::homography::Homography};
 use nalgebra::{Matrix2, Matrix4, Point2, Vector2, Vector4};
 
-/// Most steps.
 const MAX_STEPS: usize = 20;
 /// A step below this ends the search, px of the reference.
 const SETTLED_PX: f64 = 0.005;

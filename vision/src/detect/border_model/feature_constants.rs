@@ -114,7 +114,6 @@ pub(crate) const INWARD_SECTION: Length = Length { share: 0.07, least_px: 6.0 };
 pub(crate) const OUTWARD_PX: f64 = 6.0;
 /// What is left out on both sides of the corner, px.
 pub(crate) const CORNER_GAP_PX: f64 = 1.5;
-/// Samples of a section.
 pub(crate) const SECTION_SAMPLES: usize = 10;
 /// Least usual step that others are compared with, grey levels.
 pub(crate) const MIN_USUAL_STEP: f64 = 2.0;

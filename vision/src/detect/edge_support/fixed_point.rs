@@ -22,7 +22,6 @@ impl Fixed {
         Self::new(p.x + 0.5, p.y + 0.5)
     }
 
-    /// A step.
     pub(crate) fn step(by: &Vector2<f64>) -> Self {
         Self::new(by.x, by.y)
     }

@@ -3,4 +3,3 @@
 pub mod quad_seed;
 pub mod facing;
 pub mod quad_proposals;
-pub mod three_sided;

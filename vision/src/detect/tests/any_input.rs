@@ -12,7 +12,6 @@ use crate::{
         pyramid,
         quad::Quad,
         refine::rating::MAX_REFITTED,
-        relaxation::similarity::{MAX_PAIRS, SegmentPair},
         segments::{
             chains::{EdgeChain, MAX_CHAIN_POINTS},
             edge_segments::EdgeSegment,
@@ -22,6 +21,7 @@ use crate::{
     },
     frame::{GrayImage, MAX_AREA_PX, MAX_SIDE_PX},
     geometry::polygon,
+    paper::relaxation::similarity::{MAX_PAIRS, SegmentPair},
     trace::{NoTrace, Trace},
 };
 

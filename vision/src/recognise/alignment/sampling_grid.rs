@@ -16,7 +16,6 @@ const MIN_POINTS_ALONG: usize = 5;
 /// Which pixels are compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Pattern {
-    /// Every one.
     All,
     /// Every second one along both axes.
     Fourth,

@@ -99,7 +99,6 @@ fn corner_moves<const D: usize>(step: &SVector<f64, D>) -> [Vector2<f64>; 4] {
 
 /// Contribution of one bucket to the normal equations.
 struct BucketTerm<const D: usize> {
-    /// Its index.
     bucket: usize,
     weight: f64,
     /// Contribution to the right-hand side.

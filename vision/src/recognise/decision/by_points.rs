@@ -11,15 +11,15 @@ use crate::{
     frame::GrayImage,
     geometry::corners::Corners,
     model::{landmark_model::LandmarkModel, model_set::ModelSet},
+    paper::entropy::{entropy_m, entropy_norm, probability},
     params::Params,
     points::{
         search::{LandmarkPoints, search},
         verify::PointEvidence,
     },
     recognise::{
-        decision::{
-            confidence::{entropy_m, entropy_norm, probability},
-            result::{MAX_CANDIDATES, MatchCandidate, MatchRefusal, RecognitionResult, Verdict},
+        decision::result::{
+            Evidence, MAX_CANDIDATES, MatchCandidate, MatchRefusal, RecognitionResult, Verdict,
         },
         verification::icon_alignment::{IconAlignment, align_to_icon},
     },
@@ -74,11 +74,7 @@ pub(crate) fn by_points(
             if i == 0 { refusal } else { (alarms[i] > LOG10_EPSILON).then_some(MatchRefusal::Points) };
         Some(MatchCandidate {
             landmark: models.at(f.model)?.id,
-            correlation: 2.0,
-            hausdorff: f64::INFINITY,
-            likeness: if i == 0 { alignment.likeness } else { None },
-            distance: ratio,
-            tau: 1.0,
+            evidence: Evidence::Points { likeness: if i == 0 { alignment.likeness } else { None } },
             ratio,
             probability: probability(alarms[i] <= LOG10_EPSILON, accepted),
             refusal: refused,

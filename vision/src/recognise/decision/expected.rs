@@ -45,11 +45,9 @@ pub struct ExpectedLandmark {
 
 /// Outcome of the points for an expected landmark.
 enum PointOutcome {
-    /// Verified.
     Found(Box<ExpectedLandmark>),
     /// Points agree, but a part mismatches.
     Doubtful,
-    /// No evidence.
     Silent,
 }
 

@@ -1,6 +1,6 @@
 //! Match candidates in, the features of the confidence model out.
 
-use crate::recognise::decision::result::MatchCandidate;
+use crate::recognise::decision::result::{Evidence, MatchCandidate};
 
 /// Distances are capped here.
 pub(crate) const FAR: f64 = 2.0;
@@ -24,13 +24,18 @@ pub fn measures(candidates: &[MatchCandidate], best: usize, landmarks: usize) ->
     // An infinitely far runner-up is no reason for doubt, unless the best is infinitely far, too.
     let margin = if next.is_finite() || alone { margin } else { 0.0 };
     let (ratio, margin) = (within(answer.ratio), within(margin));
+    // Distances that were not measured count as far.
+    let (correlation, hausdorff) = match answer.evidence {
+        Evidence::Icon(icon) => (icon.correlation, icon.hausdorff),
+        Evidence::Points { .. } => (FAR, f64::INFINITY),
+    };
     Some([
         ratio,
         0.5 * ratio * ratio,
         margin,
         0.5 * margin * margin,
-        within(answer.correlation),
-        within(answer.hausdorff / HAUSDORFF_UNIT),
+        within(correlation),
+        within(hausdorff / HAUSDORFF_UNIT),
         within(0.1 * (1.0 + landmarks as f64).ln()),
     ])
 }

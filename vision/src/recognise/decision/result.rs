@@ -29,11 +29,36 @@ pub enum MatchRefusal {
     Plain,
 }
 
-/// A landmark compared with one icon.
+/// A landmark compared with one quad.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MatchCandidate {
     /// The landmark.
     pub landmark: LandmarkId,
+    /// What was compared.
+    pub evidence: Evidence,
+    /// The deciding distance over its threshold; accepted only below 1.
+    pub ratio: f64,
+    /// `P(C_l | Q)` of method 10.
+    pub probability: f64,
+    /// The gate that refused it, if one did.
+    pub refusal: Option<MatchRefusal>,
+}
+
+/// What a landmark was compared by.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Evidence {
+    /// Points, by their expected false alarms.
+    Points {
+        /// Likeness of the picture to the learnt icon after alignment, -1 to 1; `None` where it was not aligned.
+        likeness: Option<f64>,
+    },
+    /// Icons.
+    Icon(IconEvidence),
+}
+
+/// Distances between the icon of a quad and those of a landmark.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct IconEvidence {
     /// C^r in [0, 2] (method 6.1): to the nearest exemplar, or, where the likeness refuses already, at the detected
     /// corners to the exemplar nearest by its signature.
     pub correlation: f64,
@@ -41,19 +66,12 @@ pub struct MatchCandidate {
     /// gate refuses first.
     pub hausdorff: f64,
     /// Likeness of the picture to the learnt icon after alignment, -1 to 1; 0 where the coarse level rejected it
-    /// and nothing was accepted; `None` where the map's distances decide alone, and where points identify a
-    /// landmark at the detected border.
+    /// and nothing was accepted; `None` where the map's distances decide alone.
     pub likeness: Option<f64>,
     /// The deciding distance of the map's [`DistanceKind`](crate::recognise::distance_kind::DistanceKind).
     pub distance: f64,
     /// The deciding threshold.
     pub tau: f64,
-    /// `distance / tau`; accepted only below 1.
-    pub ratio: f64,
-    /// `P(C_l | Q)` of method 10.
-    pub probability: f64,
-    /// The gate that refused it, if one did.
-    pub refusal: Option<MatchRefusal>,
 }
 
 /// The paper's three cases. "Unknown" is an answer, not a failure.

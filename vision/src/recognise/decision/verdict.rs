@@ -6,21 +6,25 @@ use crate::{
     detect::quad::Quad,
     frame::GrayImage,
     model::model_set::ModelSet,
+    paper::{
+        deciding_distance::verified_nearest,
+        entropy::{entropy_m, entropy_norm, probability},
+    },
     params::Params,
     recognise::{
         decision::{
             by_points::by_points,
-            confidence::{confidence, entropy_m, entropy_norm, probability},
-            result::{MAX_CANDIDATES, MatchCandidate, MatchRefusal, RecognitionResult, Verdict},
+            confidence::confidence,
+            result::{
+                Evidence, IconEvidence, MAX_CANDIDATES, MatchCandidate, MatchRefusal, RecognitionResult,
+                Verdict,
+            },
         },
         distance_kind::DistanceKind,
         params::VerdictParams,
-        retrieval::nearest::{NearLandmark, QuadReading, nearest, quad_readings, short_list},
+        retrieval::nearest::{NearLandmark, QuadReading, quad_readings, short_list},
         step_listener::{NoListener, RecogniseStep, StepListener},
-        verification::{
-            content::Content,
-            short_list::{VerifiedLandmark, verify, verify_short_list},
-        },
+        verification::short_list::{VerifiedLandmark, verify_short_list},
     },
 };
 
@@ -56,24 +60,18 @@ pub fn recognise_watched(
     }
     let readings = quad_readings(image, quad, p);
     watch.finished(RecogniseStep::Icons);
-    let near = match kind {
-        DistanceKind::Both => short_list(&readings, models, p.recognise.verdict.short_list),
+    let found = match kind {
+        DistanceKind::Both => {
+            let near = short_list(&readings, models, p.recognise.verdict.short_list);
+            watch.finished(RecogniseStep::ShortList);
+            let mut found: Vec<VerifiedLandmark> = near.into_iter().map(VerifiedLandmark::new).collect();
+            verify_short_list(image, &readings, &mut found, models.lattices(), p, watch);
+            found
+        }
         DistanceKind::Correlation | DistanceKind::Hausdorff => {
-            nearest(&readings, models, kind, MAX_CANDIDATES, p)
+            verified_nearest(image, &readings, models, kind, p, watch)
         }
     };
-    watch.finished(RecogniseStep::ShortList);
-    let mut found: Vec<VerifiedLandmark> = near
-        .into_iter()
-        .map(|near| VerifiedLandmark { near, moved: None, contradicting: 0.0, content: Content::NONE })
-        .collect();
-    match kind {
-        DistanceKind::Both => verify_short_list(image, &readings, &mut found, models.lattices(), p, watch),
-        DistanceKind::Correlation | DistanceKind::Hausdorff => {
-            verify(image, &readings, &mut found, kind, models.lattices(), p);
-            watch.finished(RecogniseStep::Alignment);
-        }
-    }
     let verdict = decide(&found, &readings, kind, models.len(), &p.recognise.verdict);
     watch.finished(RecogniseStep::Decision);
     verdict
@@ -170,11 +168,13 @@ fn candidate(
     };
     MatchCandidate {
         landmark: near.model.id,
-        correlation: near.correlation,
-        hausdorff: near.hausdorff,
-        likeness: near.likeness,
-        distance,
-        tau: share * tau,
+        evidence: Evidence::Icon(IconEvidence {
+            correlation: near.correlation,
+            hausdorff: near.hausdorff,
+            likeness: near.likeness,
+            distance,
+            tau: share * tau,
+        }),
         ratio: near.ratio(kind) / share,
         probability: probability(refusal.is_none(), accepted),
         refusal,

@@ -41,6 +41,11 @@ pub(crate) struct VerifiedLandmark {
 }
 
 impl VerifiedLandmark {
+    /// Not aligned.
+    pub(crate) fn new(near: NearLandmark) -> Self {
+        Self { near, moved: None, contradicting: 0.0, content: Content::NONE }
+    }
+
     /// The first gate that refuses it.
     /// `share` scales tau of the likeness for the size of the map.
     pub(crate) fn refusal(&self, kind: DistanceKind, share: f64, p: &VerdictParams) -> Option<MatchRefusal> {
@@ -131,38 +136,9 @@ fn compare_as_found(readings: &[QuadReading], found: &mut [VerifiedLandmark], c:
     }
 }
 
-/// Aligns the quad's picture with each candidate within reach, nearest first, and keeps the better of both results.
-pub(crate) fn verify(
-    image: &GrayImage,
-    readings: &[QuadReading],
-    found: &mut [VerifiedLandmark],
-    kind: DistanceKind,
-    on: &SamplingGrids,
-    p: &Params,
-) {
-    let v = &p.recognise.verdict;
-    let aligner = Aligner::new(on, &v.align);
-    for candidate in found.iter_mut().filter(|j| j.near.ratio(kind) < v.verify_reach).take(v.max_verified) {
-        let reading = &readings[candidate.near.reading];
-        let Some((icon, corners_px)) = aligned_with(image, reading, &candidate.near, &aligner, p) else {
-            continue;
-        };
-        let (correlation, hausdorff) = distances(&icon, &candidate.near.model, p);
-        let near = NearLandmark { correlation, hausdorff, ..candidate.near.clone() };
-        let moved =
-            VerifiedLandmark { near, moved: Some(corners_px), contradicting: 0.0, content: Content::NONE };
-        // A landmark accepted at the detected corners is not lost by a worse alignment.
-        let lost = candidate.refusal(kind, 1.0, v).is_none() && moved.refusal(kind, 1.0, v).is_some();
-        if moved.near.ratio(kind) < candidate.near.ratio(kind) && !lost {
-            *candidate = moved;
-        }
-    }
-    found.sort_by(|a, b| a.near.ratio(kind).total_cmp(&b.near.ratio(kind)));
-}
-
 /// C^r and H^r of an icon to the nearest of a model's exemplars. For a landmark that only points identify, H^r is
 /// not computed and stays infinite.
-fn distances(icon: &Icon, model: &LandmarkModel, p: &Params) -> (f64, f64) {
+pub(crate) fn distances(icon: &Icon, model: &LandmarkModel, p: &Params) -> (f64, f64) {
     let c = &p.recognise.correlation;
     let own = Buckets::new(icon, c);
     let each = model.exemplars.iter().map(|e| correlation(&own, &Buckets::new(&e.icon(), c), c));
@@ -175,7 +151,7 @@ fn distances(icon: &Icon, model: &LandmarkModel, p: &Params) -> (f64, f64) {
 }
 
 /// The quad's picture after its corners were moved to fit the nearest exemplar, and those corners.
-fn aligned_with(
+pub(crate) fn aligned_with(
     image: &GrayImage,
     reading: &QuadReading,
     near: &NearLandmark,

@@ -9,10 +9,6 @@ use crate::{
         landmark_model::{Gate, ModelStatus},
     },
     recognise::{
-        features::{
-            correlation::correlation,
-            icon_features::{IconFeatures, features},
-        },
         fixture::{Dice, model_set, oblique, photograph, poster, quad, trained_model, trained_models, whole},
         retrieval::nearest,
     },
@@ -146,47 +142,4 @@ fn the_only_landmark_needs_no_margin() {
     let image = photograph(&poster(4), &oblique(), 1.0, 0.0);
     let v = recognise(&image, &quad(oblique()), &set, DistanceKind::Both, &PARAMS);
     assert_eq!(v.verdict, Verdict::Unique(LandmarkId(7)), "{:?}", v.candidates);
-}
-
-#[test]
-fn nearest_equals_a_full_comparison() {
-    // Oracle: C^r and H^r of every reading with every exemplar, sorted.
-    let image = photograph(&poster(4), &oblique(), 0.9, 5.0);
-    let mut q = quad(oblique());
-    q.upright_ambiguous = true;
-    let read = quad_readings(&image, &q, &PARAMS);
-    assert_eq!(read.len(), 4);
-    for kind in [DistanceKind::Hausdorff, DistanceKind::Correlation] {
-        let mut expected: Vec<(f64, LandmarkId)> = SIX
-            .iter()
-            .map(|m| {
-                let read: Vec<IconFeatures> =
-                    read.iter().map(|s| features(s.icon.clone(), &PARAMS.recognise)).collect();
-                let learnt = m.features(&PARAMS.recognise);
-                let least = |d: &dyn Fn(&IconFeatures, &IconFeatures) -> f64| {
-                    let pairs = read.iter().flat_map(|s| learnt.iter().map(move |e| (s, e)));
-                    pairs.map(|(a, b)| d(a, b)).fold(f64::INFINITY, f64::min)
-                };
-                let r = &PARAMS.recognise;
-                let ratio = if kind == DistanceKind::Hausdorff {
-                    let d = |a: &IconFeatures, b: &IconFeatures| {
-                        crate::recognise::features::hausdorff::hausdorff(&a.points, &b.points, &r.hausdorff)
-                    };
-                    least(&d) / m.hausdorff.tau
-                } else {
-                    least(&|a, b| correlation(&a.buckets, &b.buckets, &r.correlation)) / m.correlation.tau
-                };
-                (ratio, m.id)
-            })
-            .collect();
-        expected.sort_by(|a, b| a.0.total_cmp(&b.0));
-        for count in 1..=5 {
-            let found = nearest(&read, &SIX, kind, count, &PARAMS);
-            assert_eq!(found.len(), count);
-            for (near, (ratio, id)) in found.iter().zip(&expected) {
-                assert!((near.ratio(kind) - ratio).abs() < 1e-6);
-                assert_eq!(near.model.id, *id);
-            }
-        }
-    }
 }

@@ -1,6 +1,7 @@
 //! Every gate refuses at its limit: tau, content, margin, the size of the map, points.
 
 use super::*;
+use crate::recognise::verification::content::Content;
 
 #[test]
 fn gates_refuse_at_tau() {
@@ -181,7 +182,8 @@ fn tau_shrinks_in_large_maps() {
     );
     // What is reported is what decided.
     let reported = &large.candidates[0];
-    assert!(reported.ratio > 1.0 && (reported.distance / reported.tau - reported.ratio).abs() < 1e-9);
+    let Evidence::Icon(icon) = reported.evidence else { panic!("{reported:?}") };
+    assert!(reported.ratio > 1.0 && (icon.distance / icon.tau - reported.ratio).abs() < 1e-9);
 }
 
 /// A picture that identifies a landmark where icons decide does not where points decide and give no evidence.

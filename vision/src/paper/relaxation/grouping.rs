@@ -5,13 +5,13 @@
 use crate::{
     detect::{
         proposals::quad_seed::{Bounds, QuadSeed, corner_of, overlap_exceeds, plausible},
-        relaxation::{
-            labelling::{Label, Problem, RelaxationParams, mutual, relax},
-            similarity::SegmentPair,
-        },
         segments::edge_segments::EdgeSegment,
     },
     geometry::polygon::{self, Relation},
+    paper::relaxation::{
+        labelling::{Label, Problem, RelaxationParams, mutual, relax},
+        similarity::SegmentPair,
+    },
 };
 use nalgebra::Point2;
 
@@ -167,7 +167,7 @@ fn mean_gap(segments: &[EdgeSegment], sides: &[usize; 4], corners_px: &[Point2<f
     let gap = |i: usize| {
         let s = &segments[sides[i]];
         let (from, to) = (corners_px[i], corners_px[(i + 1) % 4]);
-        let [p, q] = crate::detect::relaxation::similarity::along(s, &(to - from));
+        let [p, q] = crate::paper::relaxation::similarity::along(s, &(to - from));
         ((p - from).norm() + (q - to).norm()) / s.length_px
     };
     (0..4).map(gap).sum::<f64>() / 8.0

@@ -1,6 +1,6 @@
 //! Offsets of parallel lines in, the distance at which they repeat out (method 1.5, period accumulator).
 
-use crate::detect::tiling::tiling_params::TilingParams;
+use crate::paper::tiling::tiling_params::TilingParams;
 use std::f64::consts::TAU;
 
 /// Most periods that are tried.
@@ -54,21 +54,10 @@ impl Trials {
     }
 }
 
-/// The concentration of the offsets at every period that is tried, as (period, concentration), and the least
-/// concentration of a pattern; nothing where none is tried.
-pub(crate) fn concentrations(offsets: &[(f64, f64)], p: &TilingParams) -> (Vec<(f64, f64)>, f64) {
-    let Some(trials) = Trials::new(offsets, p) else { return (Vec::new(), f64::INFINITY) };
-    let at = |i: usize| {
-        let frequency = trials.frequency(i);
-        (frequency.recip(), concentration(offsets, trials.low, frequency).0)
-    };
-    ((0..=trials.count).map(at).collect(), trials.enough)
-}
-
 /// Evenly spaced places on a line: `phase + i * period`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Lattice {
-    period: f64,
+    pub(super) period: f64,
     phase: f64,
 }
 
@@ -106,14 +95,6 @@ impl Lattice {
     pub(crate) fn residual(&self, offset: f64) -> f64 {
         let places = (offset - self.phase) / self.period;
         (places - places.round()).abs()
-    }
-
-    pub(crate) fn period(&self) -> f64 {
-        self.period
-    }
-
-    pub(crate) fn phase(&self) -> f64 {
-        self.phase
     }
 }
 

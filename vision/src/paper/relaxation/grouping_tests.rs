@@ -1,7 +1,7 @@
 use super::*;
-use crate::detect::{
-    relaxation::similarity::{SimilarityParams, pairs},
-    tests::fixtures::{render, sides},
+use crate::{
+    detect::tests::fixtures::{render, sides},
+    paper::relaxation::similarity::{SimilarityParams, pairs},
 };
 
 type Quadrangle = [[f64; 2]; 4];

@@ -1,10 +1,12 @@
 //! Sets of three sides of the paper's grouping (method 3.5): pairs that pass 2 left over, closed by a segment that
 //! pass 1 left over. Doors and occluded posters. They stay three-sided.
 
-use crate::detect::{
-    proposals::quad_seed::{QuadSeed, corner_of, plausible},
-    relaxation::similarity::SegmentPair,
-    segments::edge_segments::EdgeSegment,
+use crate::{
+    detect::{
+        proposals::quad_seed::{QuadSeed, corner_of, plausible},
+        segments::edge_segments::EdgeSegment,
+    },
+    paper::relaxation::similarity::SegmentPair,
 };
 
 /// Three-sided seeds, best first: greedy, every segment used once. `left` are the pairs without a quad, `taken` says

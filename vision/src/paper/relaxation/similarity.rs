@@ -3,13 +3,10 @@
 //! the relaxation.
 
 use crate::{
-    detect::{
-        proposals::quad_seed::corner_of,
-        relaxation::{labelling::MAX_ROW_CANDIDATES, profiles::Profiles},
-        segments::edge_segments::EdgeSegment,
-    },
+    detect::{proposals::quad_seed::corner_of, segments::edge_segments::EdgeSegment},
     frame::GrayImage,
     geometry::polygon,
+    paper::relaxation::{labelling::MAX_ROW_CANDIDATES, profiles::Profiles},
 };
 use nalgebra::{Point2, Vector2};
 use serde::{Deserialize, Serialize};

@@ -16,7 +16,6 @@ use crate::{
         proposals::quad_seed::{corner_of, plausible},
         quad::{Quad, QuadKind},
         refine::corners::upright_ambiguous,
-        relaxation::similarity::{closing_cue, shape_similarity},
         segments::edge_segments::{CLIP_MARGIN_PX, EdgeSegment},
         suppression::nested_borders::by_corners,
     },
@@ -24,6 +23,7 @@ use crate::{
         corners::Corners,
         polygon::{self, Relation},
     },
+    paper::relaxation::similarity::{closing_cue, shape_similarity},
 };
 use nalgebra::{Matrix2, Point2, Vector2};
 

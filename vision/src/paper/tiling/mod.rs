@@ -4,4 +4,3 @@ pub mod tiling_params;
 pub(crate) mod floor;
 pub(crate) mod period;
 pub mod floor_tiling;
-pub mod floor_pattern;

@@ -3,8 +3,9 @@
 //! camera. The row h of the horizon is one on which the image's lines meet.
 
 use crate::{
-    detect::{segments::edge_segments::EdgeSegment, tiling::tiling_params::TilingParams},
+    detect::segments::edge_segments::EdgeSegment,
     frame::{Distortion, Intrinsics},
+    paper::tiling::tiling_params::TilingParams,
 };
 use nalgebra::{Point2, Vector2};
 
@@ -21,13 +22,6 @@ pub(crate) struct FloorLine {
 }
 
 impl FloorLine {
-    /// Its ends, to the right and ahead of the camera's foot.
-    pub(crate) fn ends(&self) -> [Point2<f64>; 2] {
-        let (sin, cos) = self.direction_rad.sin_cos();
-        let half = Vector2::new(cos, sin) * (0.5 * self.length);
-        [self.middle - half, self.middle + half]
-    }
-
     /// Distance of the line's middle across a direction. The direction is the family's: a short line's own would
     /// throw its offset far off.
     pub(crate) fn offset_along(&self, direction_rad: f64) -> f64 {

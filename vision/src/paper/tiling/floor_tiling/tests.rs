@@ -5,9 +5,9 @@ use crate::{
         params::DetectParams,
         segments::{chains::chains, edge_segments::segments},
         tests::rendering::Noise,
-        tiling::tiling_params::FloorView,
     },
     frame::{Distortion, GrayImage, Intrinsics},
+    paper::tiling::tiling_params::FloorView,
 };
 use nalgebra::Point2;
 
@@ -229,7 +229,7 @@ fn periods_are_found_at_a_centimetre_of_noise() {
             .map(|i| (0.13 + f64::from(i) * period + 0.01 * random.gaussian(), 0.5 + random.uniform()))
             .collect();
         let lattice = Lattice::find(&lines, &TilingParams::default()).unwrap();
-        assert!((lattice.period() - period).abs() < 0.01, "{} for {period}", lattice.period());
+        assert!((lattice.period - period).abs() < 0.01, "{} for {period}", lattice.period);
         assert!(lines.iter().all(|l| lattice.residual(l.0) < 0.25));
         let mut places: Vec<i64> = lines.iter().map(|l| lattice.index(l.0)).collect();
         places.dedup();

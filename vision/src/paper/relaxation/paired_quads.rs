@@ -1,17 +1,19 @@
 //! Quads of the paper's grouping (method 3.4 to 3.6): matched pairs in, quads with refitted corners out, best first.
 
-use crate::detect::{
-    edge_support::{
-        gradients::Gradients,
-        side_support::{EdgeProbeParams, MAX_SAMPLES},
+use crate::{
+    detect::{
+        edge_support::{
+            gradients::Gradients,
+            side_support::{EdgeProbeParams, MAX_SAMPLES},
+        },
+        params::{DetectParams, QuadParams},
+        proposals::quad_seed::QuadSeed,
+        quad::{Quad, QuadKind},
+        refine::corners::refine,
+        segments::edge_segments::EdgeSegment,
+        suppression::nested_borders::canonical,
     },
-    params::{DetectParams, QuadParams},
-    proposals::quad_seed::QuadSeed,
-    quad::{Quad, QuadKind},
-    refine::corners::refine,
-    relaxation::{grouping::match_quads, similarity::SegmentPair, three_sided::three_sided},
-    segments::edge_segments::EdgeSegment,
-    suppression::nested_borders::canonical,
+    paper::relaxation::{grouping::match_quads, similarity::SegmentPair, three_sided::three_sided},
 };
 
 /// Quads from the matched pairs of pass 1: pass 2, three-sided sets, refitted corners, canonical border. Best first.
