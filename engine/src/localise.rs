@@ -1,12 +1,14 @@
 //! Global localisation without a history: one frame, one scan or both, and the map. In: what a robot senses at one place. Out: its
 //! pose with covariance, the poses that it may be at, or none. Nothing of it changes a robot's fused pose.
 
-use super::{
-    ambiguous_observations::ambiguous_observations,
-    fixes::{NoFix, landmark_observations, robot_fixes},
-    frame_analysis::{StageTimes, analyse_frame, frame_camera},
-    frame_answer::cautions,
-    relocalise::{RelocalisationInput, Relocalisers},
+use crate::{
+    frame::{
+        ambiguous_observations::ambiguous_observations,
+        analysis::{StageTimes, analyse_frame, frame_camera},
+        answer::cautions,
+        fixes::{NoFix, landmark_observations, robot_fixes},
+        relocalise::{RelocalisationInput, Relocalisers},
+    },
     snapshot::MapSnapshot,
 };
 use map::{
@@ -175,7 +177,7 @@ fn by_frame(map: &MapSnapshot, frame: &LocaliseFrame<'_>) -> (Found, v1::Answer)
     let mut times = StageTimes::start();
     let camera = frame_camera(Some(frame.camera), Some(frame.extrinsics), map);
     let analysis = analyse_frame(frame.picture, camera, map, &mut times);
-    let mut answer = crate::frame_answer::answer(&analysis, map);
+    let mut answer = crate::frame::answer::answer(&analysis, map);
     let fixes = landmark_observations(&analysis, map)
         .and_then(|observations| robot_fixes(&observations, Some(frame.extrinsics), None));
     let one = |fix: &map::localise::Fix, probability| LocaliseHypothesis {

@@ -29,13 +29,12 @@ pub use timebase::{
     MAX_LEADS, MAX_STREAMS,
 };
 
-use super::{
+use crate::{
     epochs::Epochs,
     limits::MAX_ROBOTS,
-    live::LiveHub,
     mapping::MappingSessions,
+    observers::{live::LiveHub, robot_activity::Input},
     quotas::{Kind, Quotas},
-    robot_activity::Input,
     snapshot::Snapshots,
 };
 use map::{

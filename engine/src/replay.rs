@@ -5,14 +5,15 @@
 //! to an answer belongs to its time.
 
 use crate::{
-    answer_records::named_landmarks,
-    decode::{ImageLimits, decode_frame},
-    frame_analysis::{StageTimes, analyse_checked},
-    frame_answer::{answer, fill_fixes},
-    frame_context::FrameContext,
-    guided::{GuidedResult, recognise_guided},
-    kept_frames::KeptFrame,
-    landmark_checks::evaluate_frame,
+    frame::{
+        analysis::{StageTimes, analyse_checked},
+        answer::{answer, fill_fixes},
+        context::FrameContext,
+        decode::{ImageLimits, decode_frame},
+        guided::{GuidedResult, recognise_guided},
+        landmark_checks::evaluate_frame,
+    },
+    observers::{answer_records::named_landmarks, kept_frames::KeptFrame},
     snapshot::MapSnapshot,
 };
 use protos::{CheckedFrame, Rejection, v1};

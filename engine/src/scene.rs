@@ -1,16 +1,12 @@
 //! For tests: a rendered corridor, two of its posters taught, and a robot in front of them.
 
-use super::{
-    answer_records::answer_records,
-    findings::findings,
-    kept_frames::KeptFrames,
-    live::LiveHub,
+use crate::frame::decode::ImageLimits;
+use crate::{
+    frame::{slots::Slots, workers::Engine},
     motion::MotionTracker,
-    slots::Slots,
+    observers::{answer_records::answer_records, findings::findings, kept_frames::KeptFrames, live::LiveHub},
     snapshot::{LandmarkInfo, MapSnapshot, Snapshots},
-    workers::Engine,
 };
-use crate::decode::ImageLimits;
 use map::place::{LandmarkPlace, PlaceSigmas};
 use nalgebra::Vector3;
 use sim::{
@@ -119,8 +115,8 @@ pub fn engine(maps: &[Arc<MapSnapshot>]) -> Engine {
         records: answer_records().0,
         kept_frames: Arc::new(KeptFrames::new(1 << 20)),
         relocalisers: Arc::default(),
-        frame_tap: Arc::new(crate::frame_tap::NoTap),
+        frame_tap: Arc::new(crate::observers::frame_tap::NoTap),
         times: Arc::default(),
-        search: crate::search_policy::SearchPolicy::Every,
+        search: crate::frame::search_policy::SearchPolicy::Every,
     }
 }

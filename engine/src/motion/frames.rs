@@ -6,7 +6,7 @@
 //! which role a fix goes to the fusion: landmarks that the prior pose named correct it and do nothing else.
 
 use super::{MAX_POSE_AGE, MotionTracker, lock_robot, robot::RobotState, timebase::Stream};
-use crate::robot_activity::Input;
+use crate::observers::robot_activity::Input;
 use map::{
     fuse::{FixRole, FusedPose},
     guided::{Decision, FramePlan, FrameReport},

@@ -1,7 +1,7 @@
 //! The frames of the scene's robot against its map and against maps that differ from it.
 
 use super::*;
-use crate::{scene::Scene, slots::SlotKey};
+use crate::{frame::slots::SlotKey, scene::Scene};
 use map::{
     extrinsics::CameraExtrinsics,
     place::{LandmarkPlace, PlaceSigmas},

@@ -7,9 +7,9 @@ use super::{
     statistics::{median, quantile},
 };
 use engine::{
+    analysis::{StageTimes, analyse_frame, frame_camera},
+    context::FrameContext,
     fixes::{landmark_observations, photograph_pose, robot_fix, unique_landmarks},
-    frame_analysis::{StageTimes, analyse_frame, frame_camera},
-    frame_context::FrameContext,
     guided::recognise_guided,
     snapshot::{LandmarkInfo, MapSnapshot},
 };
