@@ -66,7 +66,7 @@ fn ambiguous_observation(
     for id in matched.members {
         let place = map.landmarks.get(&id)?.place.as_ref()?;
         let pose = landmark_pose(&matched.corners_px, &matched.covariance_px2, place.size, camera).ok()?;
-        let relative = relative_observations(id, place, &pose, extrinsics);
+        let relative = relative_observations(id, place, (&pose, extrinsics), &map.poses.localise);
         observation.extend(relative.into_iter().map(|relative| (id, relative)));
     }
     (!observation.is_empty()).then_some(observation)
@@ -127,14 +127,14 @@ fn class_members(
 fn relative_observations(
     id: LandmarkId,
     place: &LandmarkPlace,
-    seen: &LandmarkPose,
-    extrinsics: &CameraExtrinsics,
+    (seen, extrinsics): (&LandmarkPose, &CameraExtrinsics),
+    p: &LocaliseParams,
 ) -> Vec<RelativeObservation> {
     // With the landmark at the origin, robot_pose gives the robot in the landmark's own frame.
     let at_origin =
         LandmarkPlace { x_m: 0.0, y_m: 0.0, theta_rad: 0.0, covariance: Matrix6::zeros(), ..*place };
     let observation = LandmarkObservation { landmark: id, seen, place: &at_origin };
-    let fixes = match robot_pose(&[observation], extrinsics, None, &LocaliseParams::default()) {
+    let fixes = match robot_pose(&[observation], extrinsics, None, p) {
         Ok(FixResult::Fixed(fix)) => vec![*fix],
         Ok(FixResult::Ambiguous(fixes)) => fixes,
         Ok(FixResult::Refused(_)) | Err(_) => Vec::new(),

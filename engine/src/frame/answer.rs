@@ -1,17 +1,21 @@
-//! The answer to a frame: names instead of numbers, verdicts, landmark poses, and the robot's pose where placed landmarks
+//! Answers as messages: names instead of numbers, verdicts, landmark poses, and the robot's pose where placed landmarks
 //! give one. What is not known is an absent field, never zero.
 
 use super::{
-    analysis::{StageTimes, analyse_frame, frame_camera},
-    fixes::photograph_pose,
-    guided::{GuidedObservation, GuidedResult},
+    analysis::{AnalysedFrame, FoundQuad, StageTimes, analyse_frame, found_quads, frame_camera},
+    fixes::{PoseRefusal, photograph_pose},
+    guided::GuidedResult,
+    intake::FrameJob,
     landmark_checks::FrameEvaluation,
-    pose_refusal::refusal_wire,
 };
 use crate::snapshot::MapSnapshot;
-use map::localise::{CameraPose, pose_cautions};
+use map::{
+    localise::{CameraPose, FixQuantity, RefusalCause, pose_cautions},
+    relocalise::PoseHypothesis,
+};
 use nalgebra::Point2;
 use protos::{
+    Code, Rejection,
     convert::{
         geometry::{pose2_covariance_wire, pose3_wire},
         result::{corners, fill_pose, fill_verdict, kind, points},
@@ -25,6 +29,65 @@ use vision::{
     model::LandmarkId,
     pipeline::{FrameAnalysis, PoseUnavailable, QuadAnalysis},
 };
+
+/// The answer to a frame of a robot.
+pub fn answer_to_frame(job: &FrameJob, frame: &AnalysedFrame) -> v1::Answer {
+    let mut answer = frame_answer(frame);
+    echo(&mut answer, job);
+    answer
+}
+
+/// The answer to a frame that was not analysed.
+pub fn refusal(job: &FrameJob, reason: &Rejection) -> v1::Answer {
+    let status = if reason.code == Code::Expired { v1::Status::Expired } else { v1::Status::Rejected };
+    let (rejection, map) = (Some(reason.into()), job.map.clone());
+    let mut answer = v1::Answer { status: status.into(), rejection, map, ..v1::Answer::default() };
+    echo(&mut answer, job);
+    answer
+}
+
+fn echo(answer: &mut v1::Answer, job: &FrameJob) {
+    let frame = &job.frame;
+    (answer.epoch, answer.seq, answer.captured_ns) = (frame.epoch, frame.seq, frame.captured_ns);
+    answer.clock_suspect = job.clock_suspect;
+    answer.latency_ms = job.received.elapsed().as_secs_f64() * 1e3;
+}
+
+/// What is answered to a frame, without the echo of its numbers.
+pub fn frame_answer(frame: &AnalysedFrame) -> v1::Answer {
+    let AnalysedFrame { map, analysis, guided, evaluation, relocalisation, stages, .. } = frame;
+    let hypotheses = relocalisation.iter().flat_map(|update| &update.hypotheses).map(hypothesis_wire);
+    v1::Answer {
+        hypotheses: hypotheses.collect(),
+        timings: stages.clone(),
+        ..with_fixes(analysis, guided, evaluation, map)
+    }
+}
+
+/// Status, quads, and the robot's pose or why there is none.
+fn with_fixes(
+    analysis: &FrameAnalysis,
+    guided: &GuidedResult,
+    evaluation: &FrameEvaluation,
+    map: &MapSnapshot,
+) -> v1::Answer {
+    let names = |ids: &[LandmarkId]| ids.iter().map(|id| name(map, *id)).collect();
+    let mut answer = with_quads(&found_quads(analysis, guided), map);
+    answer.only_expected = evaluation.only_expected;
+    if let Some(fix) = &evaluation.guided {
+        answer.guided_map_from_robot = Some(pose2_covariance_wire(&fix.pose));
+        answer.guided_landmarks = names(&fix.landmarks);
+    }
+    match &evaluation.fix {
+        Ok(fix) => {
+            answer.map_from_robot = Some(pose2_covariance_wire(&fix.pose));
+            answer.pose_landmarks = names(&fix.landmarks);
+        }
+        Err(reason) => reason.as_str().clone_into(&mut answer.pose_refusal),
+    }
+    answer.pose_refusal_detail = evaluation.refusal.as_ref().map(|r| refusal_wire(r, |id| name(map, id)));
+    answer
+}
 
 /// The answer to one picture without a robot: an uploaded photograph. Nothing says how the camera was held.
 pub fn answer_to_photograph<'a>(
@@ -43,7 +106,7 @@ pub fn analyse_photograph<'a>(
 ) -> (v1::Answer, FrameAnalysis) {
     let (started, mut times) = (Instant::now(), StageTimes::start());
     let analysis = analyse_frame(picture, frame_camera(camera, None, map), map, &mut times);
-    let mut answer = answer(&analysis, map);
+    let mut answer = quads_answer(&analysis, map);
     if camera.is_some() {
         match photograph_pose(&analysis, map) {
             Ok(pose) => {
@@ -58,9 +121,13 @@ pub fn analyse_photograph<'a>(
     (answer, analysis)
 }
 
-/// Status and quads, without echo, times and robot pose.
-pub fn answer(analysis: &FrameAnalysis, map: &MapSnapshot) -> v1::Answer {
-    let quads: Vec<_> = analysis.quads.iter().map(|q| quad(q, map)).collect();
+/// Status and quads of a picture, without echo, times and robot pose.
+pub fn quads_answer(analysis: &FrameAnalysis, map: &MapSnapshot) -> v1::Answer {
+    with_quads(&found_quads(analysis, &GuidedResult::default()), map)
+}
+
+fn with_quads(found: &[FoundQuad<'_>], map: &MapSnapshot) -> v1::Answer {
+    let quads: Vec<_> = found.iter().map(|found| quad(found, map)).collect();
     let any = |verdict| quads.iter().any(|q: &v1::QuadAnswer| q.verdict() == verdict);
     let status = if any(v1::Verdict::Unique) {
         v1::Status::Matched
@@ -78,9 +145,24 @@ pub fn answer(analysis: &FrameAnalysis, map: &MapSnapshot) -> v1::Answer {
     }
 }
 
-fn quad(analysis: &QuadAnalysis, map: &MapSnapshot) -> v1::QuadAnswer {
+fn quad(found: &FoundQuad<'_>, map: &MapSnapshot) -> v1::QuadAnswer {
+    let mut quad = found.detected.map(|analysis| detected(analysis, map)).unwrap_or_default();
+    quad.corners = found.corners_px().as_ref().map(corners).unwrap_or_default();
+    if let Some(observation) = found.guided {
+        if found.detected.is_none() {
+            quad.set_kind(v1::QuadKind::Expected);
+            quad.set_verdict(v1::Verdict::Unknown);
+            quad.points = observation.points.as_ref().map(|evidence| points(evidence, 1));
+        }
+        quad.set_sighting(v1::Sighting::Guided);
+        quad.guided_landmark = name(map, observation.landmark);
+        fill_pose(&mut quad, &observation.pose);
+    }
+    quad
+}
+
+fn detected(analysis: &QuadAnalysis, map: &MapSnapshot) -> v1::QuadAnswer {
     let mut quad = v1::QuadAnswer {
-        corners: corners(&analysis.quad.corners_px),
         kind: kind(analysis.quad.kind).into(),
         score: analysis.quad.score,
         verdict: v1::Verdict::Unknown.into(),
@@ -90,12 +172,7 @@ fn quad(analysis: &QuadAnalysis, map: &MapSnapshot) -> v1::QuadAnswer {
         fill_verdict(&mut quad, result, |id| name(map, id));
         if quad.verdict() == v1::Verdict::Unique {
             quad.set_sighting(v1::Sighting::Global);
-            // The landmark's own top-left corner comes first, however the picture hangs.
-            quad.corners = corners(&analysis.quad.corners_px.rotated(result.rotation));
         }
-    }
-    if let Some(border_px) = &analysis.border_px {
-        quad.corners = corners(border_px);
     }
     match &analysis.pose {
         Ok(pose) => fill_pose(&mut quad, pose),
@@ -114,6 +191,12 @@ fn pose_refusal(reason: &PoseUnavailable) -> &'static str {
         PoseUnavailable::Border(BorderError::Unclear) => "border_unclear",
         PoseUnavailable::Border(BorderError::Pose(_)) => "degenerate",
     }
+}
+
+/// A hypothesis as a message.
+fn hypothesis_wire(hypothesis: &PoseHypothesis) -> v1::Hypothesis {
+    let map_from_robot = Some(pose2_covariance_wire(&hypothesis.pose));
+    v1::Hypothesis { probability: hypothesis.mass, map_from_robot }
 }
 
 fn camera_pose_wire(pose: &CameraPose, map: &MapSnapshot) -> v1::CameraPose {
@@ -148,46 +231,63 @@ fn name(map: &MapSnapshot, id: LandmarkId) -> String {
     map.landmarks.get(&id).map_or_else(|| format!("#{}", id.0), |info| info.name.clone())
 }
 
-/// The quad of an expected landmark that was found without a detection.
-fn expected_quad(observation: &GuidedObservation) -> v1::QuadAnswer {
-    v1::QuadAnswer {
-        kind: v1::QuadKind::Expected.into(),
-        verdict: v1::Verdict::Unknown.into(),
-        points: observation.points.as_ref().map(|evidence| points(evidence, 1)),
-        ..v1::QuadAnswer::default()
+/// As a message; `name` gives the landmark's name.
+fn refusal_wire(refusal: &PoseRefusal, name: impl Fn(LandmarkId) -> String) -> v1::PoseRefusalDetail {
+    let causes = refusal.causes.iter().map(|cause| cause_wire(cause, &name)).collect();
+    let sentence = sentence(&refusal.causes, &name);
+    v1::PoseRefusalDetail { chi2: refusal.chi2, limit: refusal.limit, causes, sentence }
+}
+
+fn cause_wire(cause: &RefusalCause, name: impl Fn(LandmarkId) -> String) -> v1::PoseRefusalCause {
+    let (quantity, unit) = match cause.quantity {
+        FixQuantity::Size(_) => (v1::FixQuantity::Size, "m"),
+        FixQuantity::CameraHeight => (v1::FixQuantity::CameraHeight, "m"),
+        FixQuantity::CameraTilt => (v1::FixQuantity::CameraTilt, "rad"),
+        FixQuantity::Mounting => (v1::FixQuantity::Mounting, "px"),
+    };
+    v1::PoseRefusalCause {
+        quantity: quantity.into(),
+        landmark: match cause.quantity {
+            FixQuantity::Size(landmark) => name(landmark),
+            FixQuantity::CameraHeight | FixQuantity::CameraTilt | FixQuantity::Mounting => String::new(),
+        },
+        expected: cause.expected,
+        measured: cause.measured,
+        sigma: cause.sigma,
+        unit: unit.to_owned(),
     }
 }
 
-/// Writes the robot's pose, or why there is none, and the guided observations into the answer.
-pub fn fill_fixes(
-    answer: &mut v1::Answer,
-    evaluation: &FrameEvaluation,
-    guided: &GuidedResult,
-    map: &MapSnapshot,
-) {
-    for observation in &guided.observations {
-        let index = observation.quad.unwrap_or(answer.quads.len());
-        if index == answer.quads.len() {
-            answer.quads.push(expected_quad(observation));
+/// What does not fit, by how much, and what to check.
+fn sentence(causes: &[RefusalCause], name: impl Fn(LandmarkId) -> String) -> String {
+    let (mut parts, mut checks) = (Vec::new(), Vec::new());
+    for RefusalCause { quantity, expected, measured, .. } in causes {
+        match quantity {
+            FixQuantity::Size(landmark) => {
+                let landmark = name(*landmark);
+                parts.push(format!("`{landmark}` would be {measured:.2} m wide, not {expected:.2} m"));
+                checks.push("size");
+            }
+            FixQuantity::CameraHeight => {
+                parts.push(format!("the camera would hang at {measured:.2} m, not at {expected:.2} m"));
+                checks.push("camera height");
+            }
+            FixQuantity::CameraTilt => {
+                let [measured, expected] = [measured, expected].map(|a| a.to_degrees());
+                parts
+                    .push(format!("the camera would look up by {measured:.1} degrees, not by {expected:.1}"));
+                checks.push("tilt");
+            }
+            FixQuantity::Mounting => {
+                let sentence = "Landmark seen, but its corners are off by";
+                return format!(
+                    "{sentence} {measured:.1} px with any one of size, camera height and tilt changed: check the mounting and its place."
+                );
+            }
         }
-        let Some(quad) = answer.quads.get_mut(index) else { continue };
-        quad.set_sighting(v1::Sighting::Guided);
-        quad.guided_landmark = name(map, observation.landmark);
-        quad.corners = corners(&observation.corners_px);
-        fill_pose(quad, &observation.pose);
     }
-    if let Some(fix) = &evaluation.guided {
-        answer.guided_map_from_robot = Some(pose2_covariance_wire(&fix.pose));
-        answer.guided_landmarks = fix.landmarks.iter().map(|id| name(map, *id)).collect();
-    }
-    match &evaluation.fix {
-        Ok(fix) => {
-            answer.map_from_robot = Some(pose2_covariance_wire(&fix.pose));
-            answer.pose_landmarks = fix.landmarks.iter().map(|id| name(map, *id)).collect();
-        }
-        Err(reason) => reason.as_str().clone_into(&mut answer.pose_refusal),
-    }
-    answer.pose_refusal_detail = evaluation.refusal.as_ref().map(|r| refusal_wire(r, |id| name(map, id)));
+    checks.dedup();
+    format!("Landmark seen, but {}: check {} and mounting.", parts.join(", or "), checks.join(", "))
 }
 
 #[cfg(test)]

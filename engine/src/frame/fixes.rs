@@ -6,7 +6,7 @@ use map::{
     extrinsics::CameraExtrinsics,
     localise::{
         CameraPose, CameraPoseRefusal, Fix, FixRefusal, FixResult, LandmarkObservation, LocaliseParams,
-        camera_pose, robot_pose,
+        RefusalCause, camera_pose, refusal_causes, robot_pose,
     },
     pose2::Pose2Covariance,
 };
@@ -127,12 +127,13 @@ pub fn robot_fixes(
     observations: &[LandmarkObservation<'_>],
     extrinsics: Option<&CameraExtrinsics>,
     prior: Option<&Pose2Covariance>,
+    p: &LocaliseParams,
 ) -> Result<FixResult, NoFix> {
     let Some(extrinsics) = extrinsics else { return Err(NoFix::NoExtrinsics) };
     if observations.is_empty() {
         return Err(NoFix::WeakObservation);
     }
-    robot_pose(observations, extrinsics, prior, &LocaliseParams::default()).map_err(|error| {
+    robot_pose(observations, extrinsics, prior, p).map_err(|error| {
         tracing::error!(%error, "localisation_refused_checked_input");
         NoFix::Degenerate
     })
@@ -152,8 +153,9 @@ pub fn robot_fix(
     observations: &[LandmarkObservation<'_>],
     extrinsics: Option<&CameraExtrinsics>,
     prior: Option<&Pose2Covariance>,
+    p: &LocaliseParams,
 ) -> Result<Fix, NoFix> {
-    single_fix(&robot_fixes(observations, extrinsics, prior)?)
+    single_fix(&robot_fixes(observations, extrinsics, prior, p)?)
 }
 
 /// Where a photograph was taken, by the landmarks that it shows, or why that is not known.
@@ -163,4 +165,32 @@ pub fn photograph_pose(analysis: &FrameAnalysis, map: &MapSnapshot) -> Result<Ca
         NoFix::Degenerate
     })?;
     found.map_err(NoFix::from)
+}
+
+/// A refusal by re-projection error.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PoseRefusal {
+    /// Weighted squared re-projection error of the best pose.
+    pub chi2: f64,
+    /// The largest that is accepted.
+    pub limit: f64,
+    /// The numbers that explain it, the likeliest first.
+    pub causes: Vec<RefusalCause>,
+}
+
+/// The causes, if the fix was refused by re-projection error.
+pub fn pose_refusal(
+    observations: &[LandmarkObservation<'_>],
+    extrinsics: Option<&CameraExtrinsics>,
+    prior: Option<&Pose2Covariance>,
+    fix: Option<&FixResult>,
+    p: &LocaliseParams,
+) -> Option<PoseRefusal> {
+    let Some(FixResult::Refused(FixRefusal::Room { chi2, limit } | FixRefusal::Disagree { chi2, limit })) =
+        fix
+    else {
+        return None;
+    };
+    let causes = refusal_causes(observations, extrinsics?, prior, p);
+    Some(PoseRefusal { chi2: *chi2, limit: *limit, causes })
 }

@@ -6,13 +6,13 @@
 
 use super::{
     ambiguous_observations::{LookAlikeMatch, are_placed_and_trusted, match_look_alikes},
-    context::FrameContext,
+    analysis::FrameContext,
 };
 use crate::snapshot::MapSnapshot;
 use map::{
     guided::{
-        AssociateParams, CameraView, Candidate, ExpectParams, Expectations, Expected, GuidedReport,
-        KnownLandmark, MAX_OBSERVATIONS, Observation, associate, expect,
+        CameraView, Candidate, Expectations, Expected, GuidedReport, KnownLandmark, MAX_OBSERVATIONS,
+        Observation, associate, expect,
     },
     localise::LandmarkObservation,
     pose2::Pose2Covariance,
@@ -111,10 +111,10 @@ pub fn recognise_guided(
     let known: Vec<_> = known.collect();
     let obstacles: Vec<Obstacle> = map.walls.iter().map(Obstacle::from).collect();
     let camera = CameraView { mounting, intrinsics, image_px: frame.image_px };
-    let named = expect(prior, &camera, &known, &obstacles, &ExpectParams::default()).and_then(|expected| {
+    let named = expect(prior, &camera, &known, &obstacles, &map.poses.expect).and_then(|expected| {
         let matches = quad_matches(image, frame, &expected);
         let observations: Vec<Observation> = matches.iter().map(observation).collect();
-        Ok((associate(&expected, &observations, &AssociateParams::default())?, matches, expected))
+        Ok((associate(&expected, &observations, &map.poses.associate)?, matches, expected))
     });
     let (assigned, matches, expected) = match named {
         Ok(named) => named,
@@ -133,9 +133,9 @@ pub fn recognise_guided(
     };
     let missed = expected.searchable().any(is_missed);
     let report = GuidedReport { contradictions: assigned.contradictions(), missed };
-    let named = assigned.unique().filter(|(i, _)| !matches[*i].is_unique);
+    let by_pose = assigned.unique().filter(|(i, _)| !matches[*i].is_unique);
     let observations =
-        named.filter_map(|(i, id)| guided_observation(image, &matches[i], id, frame)).collect();
+        by_pose.filter_map(|(i, id)| guided_observation(image, &matches[i], id, frame)).collect();
     GuidedResult { observations, report }
 }
 

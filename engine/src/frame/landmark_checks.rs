@@ -6,16 +6,14 @@
 //! landmarks that the prior pose names.
 
 use super::{
-    context::FrameContext,
-    fixes::{self, NoFix},
+    analysis::FrameContext,
+    fixes::{self, NoFix, PoseRefusal, pose_refusal},
     guided::GuidedResult,
-    pose_refusal::{PoseRefusal, pose_refusal},
 };
 use crate::motion::{FrameFixes, PriorPose};
 use map::{
     landmark_health::{
-        ExpectedLandmark, HealthParams, MountedCamera, PlaceCheck, PlaceVerdict, check_place,
-        drop_unreliable, expected,
+        ExpectedLandmark, MountedCamera, PlaceCheck, PlaceVerdict, check_place, drop_unreliable, expected,
     },
     localise::{Fix, FixResult, LandmarkObservation},
     pose2::Pose2Covariance,
@@ -69,27 +67,37 @@ impl FrameEvaluation {
     }
 }
 
-/// Fixes and landmark checks of a searched frame. `guided` holds the landmarks that `prior` names.
+/// Fixes and landmark checks of a searched frame. `guided` holds the landmarks that the prior pose names: `known`, the
+/// server's, or without it the robot's own.
 pub fn evaluate_frame(
     frame: &FrameContext<'_>,
-    prior: Option<PriorPose>,
+    known: Option<PriorPose>,
     guided: &GuidedResult,
 ) -> FrameEvaluation {
-    let global = fixes::landmark_observations(frame.analysis, frame.map);
-    let fused = prior.as_ref().map(|prior| prior.pose);
-    let checks = prior.and_then(|prior| landmark_checks(frame, global.as_deref().ok(), prior));
+    let named = fixes::landmark_observations(frame.analysis, frame.map);
+    let known_pose = known.as_ref().map(|known| known.pose);
+    let checks = known.and_then(|known| landmark_checks(frame, named.as_deref().ok(), known));
     let observed = checks.as_ref().map_or(&[][..], |c| &c.observed);
-    let prior = fused.as_ref().or(frame.prior);
-    let global = global.map(|all| drop_unreliable(&all, observed));
-    let (fix, independent) = match &global {
+    let prior = known_pose.as_ref().or(frame.prior);
+    let reliable = named.map(|all| drop_unreliable(&all, observed));
+    let (fix, independent) = match &reliable {
         Ok(observations) => frame_fixes(frame, observations, prior),
         Err(reason) => (Err(*reason), None),
     };
-    let observations = global.as_deref().unwrap_or_default();
-    let refusal = pose_refusal(observations, frame.extrinsics, prior, independent.as_ref());
-    let with = if fix == Err(NoFix::Ambiguous) { global.as_deref().unwrap_or_default() } else { &[] };
-    let guided = prior.and_then(|prior| guided_fix(frame, guided, with, (prior, checks.as_ref())));
-    FrameEvaluation { prior: fused, fix, refusal, independent, guided, checks, only_expected: false }
+    let observations = reliable.as_deref().unwrap_or_default();
+    let p = &frame.map.poses.localise;
+    let refusal = pose_refusal(observations, frame.extrinsics, prior, independent.as_ref(), p);
+    let with = if fix == Err(NoFix::Ambiguous) { observations } else { &[] };
+    let guided_fix = prior.and_then(|prior| guided_fix(frame, guided, with, (prior, checks.as_ref())));
+    FrameEvaluation {
+        prior: known_pose,
+        fix,
+        refusal,
+        independent,
+        guided: guided_fix,
+        checks,
+        only_expected: false,
+    }
 }
 
 /// The guided fix of a frame in which only the expected landmarks were looked for: it may correct the prior pose. Searched
@@ -101,15 +109,13 @@ pub fn evaluate_expected_only(
 ) -> FrameEvaluation {
     let pose = prior.pose;
     let checks = LandmarkChecks { prior, observed: Vec::new(), missed: Vec::new() };
-    let guided = guided_fix(frame, guided, &[], (&pose, Some(&checks)));
-    let (prior, checks) = (Some(pose), Some(checks));
     FrameEvaluation {
-        prior,
+        prior: Some(pose),
         fix: Err(NoFix::NothingRecognised),
         refusal: None,
         independent: None,
-        guided,
-        checks,
+        guided: guided_fix(frame, guided, &[], (&pose, Some(&checks))),
+        checks: Some(checks),
         only_expected: true,
     }
 }
@@ -121,10 +127,11 @@ fn frame_fixes(
     observations: &[LandmarkObservation<'_>],
     prior: Option<&Pose2Covariance>,
 ) -> (Result<Fix, NoFix>, Option<FixResult>) {
-    let independent = fixes::robot_fixes(observations, frame.extrinsics, frame.prior);
+    let p = &frame.map.poses.localise;
+    let independent = fixes::robot_fixes(observations, frame.extrinsics, frame.prior, p);
     let fix = match &independent {
         Ok(FixResult::Ambiguous(_)) if frame.prior.is_none() && prior.is_some() => {
-            fixes::robot_fix(observations, frame.extrinsics, prior)
+            fixes::robot_fix(observations, frame.extrinsics, prior, p)
         }
         Ok(fix) => fixes::single_fix(fix),
         Err(reason) => Err(*reason),
@@ -143,8 +150,8 @@ fn guided_fix(
     let named = guided.landmark_observations(frame.map);
     let extrinsics = frame.extrinsics.filter(|_| !named.is_empty())?;
     let supporting = checks.map_or(&[][..], |c| &c.prior.supporting_landmarks);
-    let p = HealthParams::default();
-    let checked = named.iter().filter_map(|o| check_place(o, extrinsics, prior, supporting, &p).ok());
+    let p = &frame.map.poses;
+    let checked = named.iter().filter_map(|o| check_place(o, extrinsics, prior, supporting, &p.health).ok());
     let checked: Vec<_> = checked.collect();
     let is_in_place = |o: &&LandmarkObservation<'_>| {
         checked.iter().any(|c| {
@@ -153,7 +160,7 @@ fn guided_fix(
         })
     };
     let all: Vec<LandmarkObservation<'_>> = named.iter().filter(is_in_place).chain(with).copied().collect();
-    fixes::robot_fix(&all, Some(extrinsics), Some(prior)).ok()
+    fixes::robot_fix(&all, Some(extrinsics), Some(prior), &p.localise).ok()
 }
 
 /// A landmark whose best match candidate has a ratio below this does not count as missing.
@@ -175,9 +182,9 @@ fn landmark_checks(
 ) -> Option<LandmarkChecks> {
     let FrameContext { analysis, map, image_px, .. } = *frame;
     let (extrinsics, camera) = (frame.extrinsics?, frame.camera?);
-    let p = HealthParams::default();
+    let p = &map.poses.health;
     let check = |o: &LandmarkObservation<'_>| {
-        check_place(o, extrinsics, &prior.pose, &prior.supporting_landmarks, &p).ok()
+        check_place(o, extrinsics, &prior.pose, &prior.supporting_landmarks, p).ok()
     };
     let observed = observations.unwrap_or_default().iter().filter_map(check).collect();
     let results = || analysis.quads.iter().filter_map(|q| q.recognition.as_ref());
@@ -190,7 +197,7 @@ fn landmark_checks(
     let camera = MountedCamera { mounting: extrinsics, camera, image_px };
     // Only a pose that rests on several other landmarks shows that one is missing, and only in a whole image.
     let missed = if frame.is_whole && prior.supporting_landmarks.len() >= p.supporters {
-        expected(&prior.pose, &camera, &candidates.collect::<Vec<_>>(), &p)
+        expected(&prior.pose, &camera, &candidates.collect::<Vec<_>>(), p)
     } else {
         Vec::new()
     };

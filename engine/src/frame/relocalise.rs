@@ -9,7 +9,7 @@ use map::{
     relocalise::{GridBelief, GridBeliefParams, PoseHypothesis, RelativeObservation},
 };
 use nalgebra::{Matrix3, Point2, Vector2, Vector3};
-use protos::{Name, convert::geometry::pose2_covariance_wire, v1};
+use protos::Name;
 use std::{
     collections::{BTreeMap, BTreeSet, VecDeque},
     sync::{Arc, Mutex, PoisonError},
@@ -40,12 +40,6 @@ const EXPLAINED_RAD: f64 = 0.35;
 const DRIFT: f64 = 0.05;
 /// Margin around the walls: a robot may stand outside of what was mapped.
 const MARGIN_M: f64 = 1.0;
-
-/// A hypothesis as a message.
-pub fn hypothesis_wire(hypothesis: &PoseHypothesis) -> v1::Hypothesis {
-    let map_from_robot = Some(pose2_covariance_wire(&hypothesis.pose));
-    v1::Hypothesis { probability: hypothesis.mass, map_from_robot }
-}
 
 /// A frame of a robot without a pose.
 #[derive(Debug, Clone, Copy)]
@@ -197,12 +191,12 @@ impl Relocaliser {
     fn new(frame: &RelocalisationInput<'_>) -> Option<Self> {
         let corners = extent(frame.map)?;
         let area = (corners[1] - corners[0]).map(|v| v.max(0.1)).product();
-        let fine = GridBeliefParams::default();
+        let fine = &frame.map.poses.grid_belief;
         let cell_m = fine.cell_m.max((area * fine.headings as f64 / MAX_CELLS as f64).sqrt() * 1.01);
         if cell_m > MAX_CELL_M {
             return None;
         }
-        let p = GridBeliefParams { cell_m, ..fine };
+        let p = GridBeliefParams { cell_m, ..fine.clone() };
         let belief = GridBelief::new(corners, |_| 1.0, &p).ok()?;
         let RelocalisationInput { epoch, map, odometry, .. } = *frame;
         let (name, version) = (map.name.clone(), map.version);
@@ -333,7 +327,7 @@ impl Relocaliser {
 fn extent(map: &MapSnapshot) -> Option<[Point2<f64>; 2]> {
     let (points, margin): (Vec<Point2<f64>>, f64) = if map.walls.is_empty() {
         let places = map.landmarks.values().filter_map(|l| l.place.as_ref());
-        (places.map(|p| Point2::new(p.x_m, p.y_m)).collect(), GridBeliefParams::default().clutter_reach_m)
+        (places.map(|p| Point2::new(p.x_m, p.y_m)).collect(), map.poses.grid_belief.clutter_reach_m)
     } else {
         (map.walls.iter().flat_map(|w| [w.a, w.b]).collect(), MARGIN_M)
     };

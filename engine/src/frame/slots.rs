@@ -3,14 +3,12 @@
 //! in exactly one of processed, superseded, expired, rejected, and the counts say so at every moment. Knows no vision and no
 //! transport; time is passed in.
 
-mod missed;
 mod turns;
 
-pub use missed::MissedFrames;
-
+use crate::{epochs::SequenceTracker, limits::MAX_ROBOTS};
 use protos::{Code, Name, Rejection};
 use std::{
-    collections::{BTreeMap, BTreeSet, VecDeque},
+    collections::{BTreeMap, BTreeSet},
     sync::{Condvar, Mutex, MutexGuard, PoisonError},
     time::{Duration, Instant},
 };
@@ -28,8 +26,6 @@ pub const MAX_CAMERAS_PER_ROBOT: usize = 8;
 pub const IDLE_SLOT: Duration = Duration::from_mins(10);
 /// A robot with all the cameras that it may have: a new one replaces the one with the oldest frame, if that is this old.
 pub const IDLE_CAMERA: Duration = Duration::from_secs(5);
-/// Epochs of one camera whose last number is remembered besides the present one's.
-pub const PAST_EPOCHS: usize = 8;
 
 /// A robot and one of its cameras.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
@@ -83,41 +79,23 @@ impl FrameCounts {
     }
 }
 
-/// The last sequence number of a stream in each of its latest epochs. [`crate::epochs::Epochs`] decides which epoch is live;
-/// one that comes back continues after its last number.
-#[derive(Debug, Default)]
-pub struct SequenceTracker {
-    last: Option<(u64, u64)>,
-    past: VecDeque<(u64, u64)>,
+/// Frames whose numbers were left out: sent, and lost on the way.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct MissedFrames {
+    /// Of all robots.
+    pub total: u64,
+    /// By robot, at most [`MAX_ROBOTS`].
+    pub by_robot: BTreeMap<Name, u64>,
 }
 
-impl SequenceTracker {
-    /// Numbers that are left out before (epoch, seq): messages that were sent and did not arrive.
-    pub fn gap(&self, epoch: u64, seq: u64) -> u64 {
-        self.last
-            .filter(|(current, last)| *current == epoch && *last < seq)
-            .map_or(0, |(_, last)| seq - last - 1)
-    }
-
-    /// Takes (epoch, seq) as the newest, or refuses it as not newer than the last of its epoch.
-    pub fn advance(&mut self, epoch: u64, seq: u64) -> Result<(), Rejection> {
-        let place = self.past.iter().position(|(past, _)| *past == epoch);
-        let known = match self.last {
-            Some((current, last)) if current == epoch => Some(last),
-            _ => place.map(|i| self.past[i].1),
-        };
-        if let Some(last) = known.filter(|last| seq <= *last) {
-            return Err(Rejection::new(Code::NotNewer, "seq", format!("{seq} is not newer than {last}")));
+impl MissedFrames {
+    fn add(&mut self, robot: &Name, count: u64) {
+        self.total += count;
+        if let Some(all) = self.by_robot.get_mut(robot) {
+            *all += count;
+        } else if self.by_robot.len() < MAX_ROBOTS {
+            self.by_robot.insert(robot.clone(), count);
         }
-        if let Some(current) = self.last.filter(|(current, _)| *current != epoch) {
-            place.and_then(|i| self.past.remove(i));
-            if self.past.len() == PAST_EPOCHS {
-                self.past.pop_front();
-            }
-            self.past.push_back(current);
-        }
-        self.last = Some((epoch, seq));
-        Ok(())
     }
 }
 

@@ -2,9 +2,16 @@
 //! answers of the workers. Out: some of them, queued for whoever stores them: of each camera the first of every kind and one in
 //! [`LONGEST`], at most one in [`SHORTEST`].
 
-use super::prior_check::{PriorCheck, prior_check};
+use super::{
+    kept_frames::{KeptFrame, KeptFrames},
+    prior_check::{PriorCheck, prior_check},
+};
 use crate::{
-    frame::{landmark_checks::FrameEvaluation, slots::SlotKey},
+    frame::{
+        analysis::{AnalysedFrame, FoundQuad, found_quads},
+        slots::SlotKey,
+        workers::{AnsweredFrame, FrameObserver},
+    },
     snapshot::MapSnapshot,
 };
 use protos::{CheckedFrame, v1};
@@ -18,6 +25,7 @@ use vision::{
     frame::GrayImage,
     geometry::Corners,
     icon::icon,
+    model::LandmarkId,
     points::shown_matches::{ShownMatch, shown_matches},
 };
 
@@ -85,17 +93,18 @@ struct AnswerKind {
     refusal: Option<String>,
 }
 
-/// Takes answers from workers. Never waits.
-#[derive(Debug, Clone)]
+/// Takes answers from workers, and keeps the frames of those that are stored. Never waits.
+#[derive(Debug)]
 pub struct AnswerRecorder {
     records: Sender<AnswerRecord>,
-    last: Arc<Mutex<BTreeMap<SlotKey, (Instant, AnswerKind)>>>,
+    last: Mutex<BTreeMap<SlotKey, (Instant, AnswerKind)>>,
+    kept: Arc<KeptFrames>,
 }
 
 /// A queue of answers: both ends.
-pub fn answer_records() -> (AnswerRecorder, Receiver<AnswerRecord>) {
+pub fn answer_records(kept: Arc<KeptFrames>) -> (AnswerRecorder, Receiver<AnswerRecord>) {
     let (records, receiver) = channel(QUEUE);
-    (AnswerRecorder { records, last: Arc::default() }, receiver)
+    (AnswerRecorder { records, last: Mutex::default(), kept }, receiver)
 }
 
 /// Why a frame gave no pose of the robot: the code of a rejection, the refusal of the pose, or where no landmark was named the
@@ -123,27 +132,21 @@ pub fn named_landmarks(answer: &v1::Answer) -> Vec<&str> {
     names
 }
 
+impl FrameObserver for AnswerRecorder {
+    fn answered(&self, answered: &AnsweredFrame<'_>) {
+        let AnsweredFrame { key, frame, analysed, answer } = *answered;
+        if !self.is_due(key, answer, Instant::now()) {
+            return;
+        }
+        if let Some(found) = analysed {
+            self.kept.keep(KeptFrame { key: key.clone(), map: found.map.name.clone(), frame: frame.clone() });
+        }
+        let basis = analysed.map(|found| answer_basis(found, frame)).unwrap_or_default();
+        self.send(AnswerRecord { key: key.clone(), answer: answer.clone(), basis });
+    }
+}
+
 impl AnswerRecorder {
-    /// What an answer that is to be stored rests on; `None` for one that is not.
-    pub fn take(
-        &self,
-        key: &SlotKey,
-        answer: &v1::Answer,
-        (image, map): (&GrayImage, &MapSnapshot),
-        (evaluation, frame): (&FrameEvaluation, &CheckedFrame),
-    ) -> Option<AnswerBasis> {
-        let basis = || AnswerBasis {
-            icons: quad_icons(answer, image, map),
-            prior_check: prior_check(evaluation, frame.prior.as_ref()),
-        };
-        self.is_due(key, answer, Instant::now()).then(basis)
-    }
-
-    /// Nothing for an answer to a frame that could not be analysed, if it is to be stored.
-    pub fn take_refused(&self, key: &SlotKey, answer: &v1::Answer) -> Option<AnswerBasis> {
-        self.is_due(key, answer, Instant::now()).then(AnswerBasis::default)
-    }
-
     fn is_due(&self, key: &SlotKey, answer: &v1::Answer, now: Instant) -> bool {
         let kind = AnswerKind {
             map: answer.map.clone(),
@@ -168,46 +171,57 @@ impl AnswerRecorder {
     }
 
     /// Queues an answer, or drops it if the queue is full.
-    pub fn send(&self, record: AnswerRecord) {
+    fn send(&self, record: AnswerRecord) {
         if let Err(TrySendError::Full(record)) = self.records.try_send(record) {
             tracing::debug!(key = ?record.key, seq = record.answer.seq, "answer_not_stored");
         }
     }
 }
 
+fn answer_basis(found: &AnalysedFrame, frame: &CheckedFrame) -> AnswerBasis {
+    let limit = found.map.poses.localise.prior_gate;
+    AnswerBasis {
+        icons: quad_icons(&found_quads(&found.analysis, &found.guided), found.picture.grey(), &found.map),
+        prior_check: prior_check(&found.evaluation, frame.prior.as_ref(), limit),
+    }
+}
+
 /// The icons of the first quads that have one, upright as their corners say.
-fn quad_icons(answer: &v1::Answer, image: &GrayImage, map: &MapSnapshot) -> Vec<QuadIcon> {
-    let of_quad = |(quad, found): (usize, &v1::QuadAnswer)| {
-        let corners: [[f64; 2]; 4] =
-            found.corners.iter().map(|c| [c.u_px, c.v_px]).collect::<Vec<_>>().try_into().ok()?;
-        let corners = Corners::try_from(corners).ok()?;
+fn quad_icons(quads: &[FoundQuad<'_>], image: &GrayImage, map: &MapSnapshot) -> Vec<QuadIcon> {
+    let of_quad = |(quad, found): (usize, &FoundQuad<'_>)| {
+        let corners = found.corners_px()?;
         let icon = icon(image, &corners, &map.params.icon).ok()?;
         let pixels = icon.pixels.iter().map(|grey| grey.round().clamp(0.0, 255.0) as u8).collect();
-        let matched = best_candidate(found).and_then(|name| quad_matches(image, &corners, map, name));
+        let matched = found.best_candidate().and_then(|id| quad_matches(image, &corners, map, id));
         Some(QuadIcon { quad, size: icon.size, pixels, matched })
     };
-    answer.quads.iter().enumerate().filter_map(of_quad).take(MAX_ICONS).collect()
+    quads.iter().enumerate().filter_map(of_quad).take(MAX_ICONS).collect()
 }
 
-/// The landmark that a quad is named after, globally, guided or in doubt; else its nearest candidate.
-fn best_candidate(quad: &v1::QuadAnswer) -> Option<&str> {
-    let named = [&quad.landmark, &quad.guided_landmark, &quad.doubtful_landmark];
-    let nearest = quad.candidates.iter().map(|candidate| &candidate.landmark);
-    named.into_iter().chain(nearest).map(String::as_str).find(|name| !name.is_empty())
-}
-
-fn quad_matches(image: &GrayImage, corners: &Corners, map: &MapSnapshot, name: &str) -> Option<QuadMatches> {
-    let (id, _) = map.landmarks.iter().find(|(_, landmark)| landmark.name == name)?;
-    let model = map.models.iter().find(|model| model.id == *id).filter(|model| !model.points.is_empty())?;
+fn quad_matches(
+    image: &GrayImage,
+    corners: &Corners,
+    map: &MapSnapshot,
+    id: LandmarkId,
+) -> Option<QuadMatches> {
+    let landmark = map.landmarks.get(&id)?.name.clone();
+    let model = map.models.get(id).filter(|model| !model.points.is_empty())?;
     let matches = shown_matches(image, corners, &model.points, MAX_MATCHES);
-    Some(QuadMatches { landmark: name.to_owned(), matches })
+    Some(QuadMatches { landmark, matches })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Scene;
+    use crate::{
+        frame::analysis::{StageTimes, analyse_frame, frame_camera},
+        scene::Scene,
+    };
     use protos::Name;
+    use vision::{
+        pipeline::{FrameAnalysis, QuadAnalysis},
+        recognise::Verdict,
+    };
 
     fn key(camera: usize) -> SlotKey {
         SlotKey { robot: Name::new("r1").unwrap(), camera: Name::new(format!("c{camera}")).unwrap() }
@@ -220,7 +234,7 @@ mod tests {
 
     #[test]
     fn of_each_camera_the_first_of_every_kind_and_one_in_ten_seconds_is_stored() {
-        let (recorder, _queue) = answer_records();
+        let (recorder, _queue) = answer_records(Arc::new(KeptFrames::new(0)));
         let start = Instant::now();
         let (none, door) = (answer(v1::Status::NoMatch, ""), answer(v1::Status::Matched, "door"));
         let cases = [
@@ -241,7 +255,7 @@ mod tests {
 
     #[test]
     fn cameras_and_the_queue_are_bounded() {
-        let (recorder, mut queue) = answer_records();
+        let (recorder, mut queue) = answer_records(Arc::new(KeptFrames::new(0)));
         let none = answer(v1::Status::NoMatch, "");
         let start = Instant::now();
         for camera in 0..=MAX_CAMERAS {
@@ -283,24 +297,33 @@ mod tests {
         let mut scene = Scene::new();
         let map = scene.taught();
         let (name, readings) = scene.stops(2, 1).into_iter().next().unwrap();
-        let corners = readings.frame.truth.landmark(&name).unwrap().corners_px;
-        let mut answer = answer(v1::Status::Matched, &name);
-        answer.quads[0].corners = protos::convert::result::corners(&corners);
-        let matched = |answer: &v1::Answer| {
-            let icons = quad_icons(answer, &readings.frame.image, &map);
+        let image = &readings.frame.image;
+        let camera = frame_camera(None, None, &map);
+        let FrameAnalysis { quads } = analyse_frame(image, camera, &map, &mut StageTimes::start());
+        let is_named = |quad: &QuadAnalysis| {
+            let named = FoundQuad { detected: Some(quad), guided: None }.best_candidate();
+            named.is_some_and(|id| map.landmarks[&id].name == name)
+        };
+        let mut quad = quads.into_iter().find(is_named).unwrap();
+        quad.border_px = Some(readings.frame.truth.landmark(&name).unwrap().corners_px);
+        let matched = |quad: &QuadAnalysis| {
+            let icons = quad_icons(&[FoundQuad { detected: Some(quad), guided: None }], image, &map);
             icons.into_iter().next().and_then(|icon| icon.matched)
         };
-        let found = matched(&answer).unwrap();
+        let found = matched(&quad).unwrap();
         assert_eq!(found.landmark, name);
         assert!(found.matches.len() <= MAX_MATCHES, "{}", found.matches.len());
         assert!(found.matches.iter().filter(|m| m.agrees).count() >= 10, "{found:?}");
         // Without a name, the nearest candidate.
-        answer.quads[0].landmark.clear();
-        assert_eq!(matched(&answer), None);
-        answer.quads[0].candidates =
-            vec![v1::Candidate { landmark: name.clone(), ..v1::Candidate::default() }];
-        assert_eq!(matched(&answer), Some(found));
-        answer.quads[0].landmark = "gone".into();
-        assert_eq!(matched(&answer), None);
+        let candidates = {
+            let recognition = quad.recognition.as_mut().unwrap();
+            recognition.verdict = Verdict::Unknown;
+            std::mem::take(&mut recognition.candidates)
+        };
+        assert_eq!(matched(&quad), None);
+        quad.recognition.as_mut().unwrap().candidates = candidates;
+        assert_eq!(matched(&quad), Some(found));
+        quad.recognition.as_mut().unwrap().candidates[0].landmark = LandmarkId(99);
+        assert_eq!(matched(&quad), None);
     }
 }

@@ -3,8 +3,14 @@
 //!
 //! Bounded; nothing is stored on disk.
 
-use crate::frame::fixes::NoFix;
-use crate::{frame::slots::SlotKey, snapshot::MapSnapshot};
+use crate::{
+    frame::{
+        analysis::{AnalysedFrame, Effect},
+        fixes::{NoFix, unique_landmarks},
+        slots::SlotKey,
+    },
+    snapshot::MapSnapshot,
+};
 use map::{
     extrinsics::CameraExtrinsics,
     localise::{
@@ -13,6 +19,7 @@ use map::{
     },
 };
 use nalgebra::{Matrix2, Point2, Vector3};
+use protos::CheckedFrame;
 use std::{
     collections::BTreeMap,
     sync::{Mutex, MutexGuard, PoisonError},
@@ -87,6 +94,16 @@ pub struct CameraSample<'a> {
 }
 
 impl CameraRegistry {
+    /// Records a frame that may change its robot's pose.
+    pub fn record_answered(&self, key: &SlotKey, frame: &CheckedFrame, found: &AnalysedFrame) {
+        let (Effect::Full, Some(intrinsics)) = (found.effect, &frame.intrinsics) else { return };
+        let (landmarks, picture) = (unique_landmarks(&found.analysis), &found.picture);
+        let image_px = [picture.width() as u32, picture.height() as u32];
+        let fix = found.evaluation.fix.as_ref().map_err(|reason| *reason);
+        let (landmarks, map, extrinsics) = (&landmarks[..], &*found.map, frame.mounting.as_ref());
+        self.record_frame(key, &CameraSample { intrinsics, image_px, landmarks, map, extrinsics, fix });
+    }
+
     /// Records a frame; one without recognised landmarks changes nothing.
     pub fn record_frame(&self, key: &SlotKey, sample: &CameraSample<'_>) {
         if sample.landmarks.is_empty() {

@@ -1,6 +1,7 @@
 //! Findings about landmarks (moved, missing, in place again) on their way to whoever stores the map. The store commits a
 //! finding; every frame after that sees the new version of the map.
 
+use crate::{frame::workers::FrameObserver, snapshot::MapSnapshot};
 use map::landmark_health::{Finding, HealthChange, LandmarkHealth};
 use serde_json::json;
 use tokio::sync::mpsc::{Receiver, Sender, channel, error::TrySendError};
@@ -26,7 +27,7 @@ pub struct LandmarkFinding {
 
 impl LandmarkFinding {
     /// The finding for a change of health that a robot's frames led to.
-    pub fn new(map: &str, name: &str, change: &HealthChange) -> Self {
+    fn new(map: &MapSnapshot, change: &HealthChange) -> Self {
         let finding = change.finding.map(|finding| match finding {
             Finding::Moved { observed_place: at, offset_m, sightings } => json!({
                 "kind": "moved", "offset_m": offset_m, "sightings": sightings,
@@ -37,9 +38,9 @@ impl LandmarkFinding {
             }
         });
         Self {
-            map: map.to_owned(),
+            map: map.name.clone(),
             landmark: change.landmark,
-            name: name.to_owned(),
+            name: map.landmarks.get(&change.landmark).map_or_else(String::new, |l| l.name.clone()),
             health: change.health,
             finding: finding.map(|f| f.to_string()),
         }
@@ -56,9 +57,15 @@ pub fn findings() -> (FindingSender, Receiver<LandmarkFinding>) {
     (FindingSender(sender), receiver)
 }
 
+impl FrameObserver for FindingSender {
+    fn health_changed(&self, map: &MapSnapshot, changes: &[HealthChange]) {
+        changes.iter().for_each(|change| self.send(LandmarkFinding::new(map, change)));
+    }
+}
+
 impl FindingSender {
     /// Queues a finding, or drops it if the queue is full.
-    pub fn send(&self, found: LandmarkFinding) {
+    fn send(&self, found: LandmarkFinding) {
         let LandmarkFinding { map, name, health, finding, .. } = &found;
         let follows = match health {
             LandmarkHealth::Quarantined => "excluded from fixes until a person decides",

@@ -1,7 +1,10 @@
 //! How long frames took. In: each answer, when it is about to be published. Out: histograms of the time from receipt to answer
 //! by status, and of the stages.
 
-use crate::histogram::{Histogram, HistogramCopy};
+use crate::{
+    frame::workers::{AnsweredFrame, FrameObserver},
+    histogram::{Histogram, HistogramCopy},
+};
 use protos::v1;
 use std::{
     collections::BTreeMap,
@@ -27,9 +30,15 @@ pub struct FrameTimes {
     stages: Mutex<BTreeMap<String, Histogram>>,
 }
 
+impl FrameObserver for FrameTimes {
+    fn answered(&self, frame: &AnsweredFrame<'_>) {
+        self.add(frame.answer);
+    }
+}
+
 impl FrameTimes {
     /// Adds the times of an answer.
-    pub fn add(&self, answer: &v1::Answer) {
+    fn add(&self, answer: &v1::Answer) {
         let status = answer.status();
         if let Some(at) = STATUSES.iter().position(|(known, _)| *known == status) {
             self.latency[at].add(duration(answer.latency_ms));

@@ -2,7 +2,7 @@
 //! In: frames of the workers. Out: the newest of a map. Bounded by their bytes; the oldest go. A restart forgets them.
 
 use crate::frame::slots::SlotKey;
-use protos::{CheckedFrame, convert::Pixels, v1};
+use protos::{CheckedFrame, convert::Pixels};
 use std::{
     collections::VecDeque,
     sync::{Arc, Mutex, PoisonError},
@@ -51,13 +51,6 @@ impl KeptFrames {
     /// None yet.
     pub fn new(max_bytes: usize) -> Self {
         Self { kept: Mutex::default(), max_bytes }
-    }
-
-    /// Keeps a frame that was answered; of a refused one there is nothing to try again.
-    pub fn keep_answered(&self, key: &SlotKey, answer: &v1::Answer, frame: &CheckedFrame) {
-        if answer.rejection.is_none() {
-            self.keep(KeptFrame { key: key.clone(), map: answer.map.clone(), frame: frame.clone() });
-        }
     }
 
     /// Keeps a frame, and forgets the oldest beyond the bound.

@@ -5,7 +5,7 @@
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 use map::pose2::{Pose2, Pose2Covariance};
 use protos::{
-    Code, Name,
+    CheckedFrame, Code, Name, Rejection,
     convert::{EncodedImage, Encoding, Pixels, geometry::pose2_wire},
     prost::bytes::Bytes,
     v1,
@@ -22,14 +22,19 @@ pub use live_event::LiveEvent;
 
 use super::{
     cameras::CameraRegistry,
-    robot_activity::{Input, Refused, RobotActivities, RobotActivity},
+    robot_activity::{RobotActivities, RobotActivity},
     unknown_robots::{UnknownRobot, UnknownRobots},
 };
-use crate::frame::{
-    decode::{ImageLimits, mosaic::mosaic},
-    slots::SlotKey,
+use crate::{
+    frame::{
+        decode::{ImageLimits, mosaic::mosaic},
+        slots::SlotKey,
+        workers::{AnsweredFrame, FrameObserver},
+    },
+    inputs::{Input, Refused},
+    limits::MAX_ROBOTS,
+    motion::MotionObserver,
 };
-use crate::limits::MAX_ROBOTS;
 
 /// Cameras whose last frame is stored; a further one replaces the one with the oldest frame.
 pub const MAX_CAMERAS: usize = 32;
@@ -141,6 +146,55 @@ impl Default for LiveHub {
     }
 }
 
+impl MotionObserver for LiveHub {
+    fn message(&self, robot: &Name, input: Input, refused: Option<&Rejection>, received: Instant) {
+        match refused {
+            None => self.robots().0.used(robot, input, received),
+            Some(reason) if reason.code == Code::UnknownRobot => self.refused_unknown(robot, None, received),
+            Some(reason) => self.refused(robot, input, reason.into(), received),
+        }
+    }
+
+    fn odometry(&self, robot: &Name, map: &str, map_from_robot: Pose2) {
+        self.extend(robot, TrajectoryKind::Odometry, map_from_robot);
+        let pose = pose2_wire(&map_from_robot);
+        self.send(LiveEvent::Odometry { robot: robot.clone(), map: map.to_owned(), pose });
+    }
+
+    fn pose(
+        &self,
+        robot: &Name,
+        map: &str,
+        pose: &Pose2Covariance,
+        (corrections, age_ms): (u64, f64),
+        trust: v1::PoseTrust,
+    ) {
+        self.extend(robot, TrajectoryKind::Pose, pose.pose);
+        self.set_trust(robot, map, trust);
+        self.send(LiveEvent::Pose {
+            robot: robot.clone(),
+            map: map.to_owned(),
+            pose: pose2_wire(&pose.pose),
+            covariance: pose.covariance.transpose().as_slice().to_vec(),
+            corrections,
+            age_ms,
+            trust,
+        });
+    }
+}
+
+impl FrameObserver for LiveHub {
+    fn answered(&self, answered: &AnsweredFrame<'_>) {
+        let AnsweredFrame { key, frame, analysed, answer } = *answered;
+        let now = Instant::now();
+        let Some(found) = analysed else { return self.publish_refusal(key, answer.clone(), now) };
+        self.cameras.record_answered(key, frame, found);
+        let CheckedFrame { width_px, height_px, .. } = *frame;
+        let (pixels, answer) = (frame.pixels.clone(), answer.clone());
+        self.publish_answer(key, LiveFrame { width_px, height_px, pixels, answer }, now);
+    }
+}
+
 impl LiveHub {
     /// The cameras by their frames.
     pub fn camera_registry(&self) -> &CameraRegistry {
@@ -180,11 +234,6 @@ impl LiveHub {
         self.robots().0.get(robot, now)
     }
 
-    /// An input of a registered robot was used. Frames are counted with their answers.
-    pub fn used(&self, robot: &Name, input: Input, now: Instant) {
-        self.robots().0.used(robot, input, now);
-    }
-
     /// An input of a registered robot was refused. The log is told at once, and then once a minute.
     pub fn refused(&self, robot: &Name, input: Input, refused: Refused<'_>, now: Instant) {
         let Some(count) = self.robots().0.refused(robot, input, refused, now) else { return };
@@ -215,7 +264,7 @@ impl LiveHub {
     }
 
     /// Stores the frame as its camera's last and sends its answer as an event.
-    pub fn publish_answer(&self, key: &SlotKey, frame: LiveFrame, now: Instant) {
+    fn publish_answer(&self, key: &SlotKey, frame: LiveFrame, now: Instant) {
         let answer = frame.answer.clone();
         self.robots().0.answered(&key.robot, &answer, now);
         {
@@ -241,35 +290,6 @@ impl LiveHub {
             None => {}
         }
         self.send(LiveEvent::Answer { robot: key.robot.clone(), camera: key.camera.clone(), answer });
-    }
-
-    /// A fused pose, with the corrections so far, its age (ms), and how far it is trusted.
-    pub fn publish_pose(
-        &self,
-        robot: &Name,
-        map: &str,
-        pose: &Pose2Covariance,
-        (corrections, age_ms): (u64, f64),
-        trust: v1::PoseTrust,
-    ) {
-        self.extend(robot, TrajectoryKind::Pose, pose.pose);
-        self.set_trust(robot, map, trust);
-        self.send(LiveEvent::Pose {
-            robot: robot.clone(),
-            map: map.to_owned(),
-            pose: pose2_wire(&pose.pose),
-            covariance: pose.covariance.transpose().as_slice().to_vec(),
-            corrections,
-            age_ms,
-            trust,
-        });
-    }
-
-    /// Odometry put on the map.
-    pub fn odometry(&self, robot: &Name, map: &str, map_from_robot: Pose2) {
-        self.extend(robot, TrajectoryKind::Odometry, map_from_robot);
-        let pose = pose2_wire(&map_from_robot);
-        self.send(LiveEvent::Odometry { robot: robot.clone(), map: map.to_owned(), pose });
     }
 
     /// Where a simulated robot really is.

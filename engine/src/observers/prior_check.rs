@@ -3,7 +3,7 @@
 
 use crate::frame::landmark_checks::FrameEvaluation;
 use map::{
-    localise::{FixRefusal, FixResult, LocaliseParams},
+    localise::{FixRefusal, FixResult},
     pose2::Pose2Covariance,
 };
 
@@ -34,8 +34,12 @@ pub struct PriorCheck {
     pub is_refused: bool,
 }
 
-/// The check of a frame; `None` where no pose was known before it.
-pub fn prior_check(evaluation: &FrameEvaluation, of_robot: Option<&Pose2Covariance>) -> Option<PriorCheck> {
+/// The check of a frame; `None` where no pose was known before it. `limit` is that of the robot's prior.
+pub fn prior_check(
+    evaluation: &FrameEvaluation,
+    of_robot: Option<&Pose2Covariance>,
+    limit: f64,
+) -> Option<PriorCheck> {
     let (source, prior) = match (of_robot, evaluation.prior) {
         (Some(prior), _) => (PriorSource::Robot, *prior),
         (None, Some(prior)) => (PriorSource::Server, prior),
@@ -52,7 +56,6 @@ pub fn prior_check(evaluation: &FrameEvaluation, of_robot: Option<&Pose2Covarian
         Some(FixResult::Refused(_)) | None => (None, false),
     };
     let distance2 = seen.and_then(|pose| pose.distance2(&prior));
-    let limit = LocaliseParams::default().prior_gate;
     Some(PriorCheck { source, prior, seen, distance2, limit, is_refused })
 }
 
@@ -65,6 +68,9 @@ mod tests {
         pose2::Pose2,
     };
     use nalgebra::Matrix3;
+
+    /// 99 % of chi2 with 3 degrees of freedom.
+    const LIMIT: f64 = 11.3;
 
     fn pose(x_m: f64) -> Pose2Covariance {
         Pose2Covariance::new(Pose2::new(x_m, 0.0, 0.0), Matrix3::identity() * 0.5).unwrap()
@@ -98,28 +104,28 @@ mod tests {
     #[test]
     fn the_robots_prior_comes_first_and_the_distance_is_that_of_the_nearest_solution() {
         let several = || Some(FixResult::Ambiguous(vec![fix(9.0), fix(3.0)]));
-        let of_server = prior_check(&evaluated(Some(1.0), several()), None).unwrap();
+        let of_server = prior_check(&evaluated(Some(1.0), several()), None, LIMIT).unwrap();
         assert_eq!(
             (of_server.source, of_server.prior, of_server.seen),
             (PriorSource::Server, pose(1.0), Some(pose(3.0)))
         );
         // Both covariances add up to 1.
         assert!((of_server.distance2.unwrap() - 4.0).abs() < 1e-9 && !of_server.is_refused, "{of_server:?}");
-        let of_robot = prior_check(&evaluated(Some(1.0), several()), Some(&pose(8.0))).unwrap();
+        let of_robot = prior_check(&evaluated(Some(1.0), several()), Some(&pose(8.0)), LIMIT).unwrap();
         assert_eq!((of_robot.source, of_robot.seen), (PriorSource::Robot, Some(pose(9.0))));
-        assert_eq!(prior_check(&evaluated(None, several()), None), None);
+        assert_eq!(prior_check(&evaluated(None, several()), None, LIMIT), None);
     }
 
     #[test]
     fn a_refused_pose_is_kept_with_its_distance() {
         let refusal = FixRefusal::Prior { nearest: pose(7.0), distance2: 36.0, limit: 11.3 };
-        let check =
-            prior_check(&evaluated(None, Some(FixResult::Refused(refusal))), Some(&pose(1.0))).unwrap();
+        let check = prior_check(&evaluated(None, Some(FixResult::Refused(refusal))), Some(&pose(1.0)), LIMIT)
+            .unwrap();
         assert!(check.is_refused && check.distance2.unwrap() > check.limit, "{check:?}");
         assert_eq!(check.seen, Some(pose(7.0)));
         // Another gate is no matter of the prior.
         let other = FixResult::Refused(FixRefusal::Side);
-        let check = prior_check(&evaluated(Some(1.0), Some(other)), None).unwrap();
+        let check = prior_check(&evaluated(Some(1.0), Some(other)), None, LIMIT).unwrap();
         assert_eq!((check.seen, check.distance2, check.is_refused), (None, None, false));
     }
 }

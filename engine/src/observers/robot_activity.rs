@@ -4,7 +4,8 @@
 
 mod inputs;
 
-pub use inputs::{Input, InputActivity, MAX_REASONS, Reason, Refused};
+pub use crate::inputs::{Input, Refused};
+pub use inputs::{InputActivity, MAX_REASONS, Reason};
 
 use crate::limits::MAX_ROBOTS;
 use inputs::Inputs;

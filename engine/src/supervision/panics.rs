@@ -1,7 +1,7 @@
 //! Caught panics, counted by the edge that caught them. An edge is where work of one kind begins: a frame, a write, a
 //! message, a request. A panic ends that piece of work; the process and all other work go on.
 
-use super::{panic_text::panic_text, threads::Lost};
+use super::threads::{Lost, panic_text};
 use std::{
     any::Any,
     fmt::Display,

@@ -11,7 +11,6 @@
 //! runtime, so that no thread of a pool is begun by a thread of low priority. Elsewhere than on Linux all classes have one
 //! priority.
 
-use super::panic_text::panic_text;
 use std::{
     any::Any,
     io,
@@ -78,6 +77,12 @@ impl std::fmt::Display for Lost {
 }
 
 impl std::error::Error for Lost {}
+
+/// The message of a panic.
+pub(crate) fn panic_text(cause: &(dyn Any + Send)) -> &str {
+    let literal = cause.downcast_ref::<&'static str>().copied();
+    literal.or_else(|| cause.downcast_ref::<String>().map(String::as_str)).unwrap_or("no message")
+}
 
 /// Starts a thread of a class.
 pub fn spawn<T: Send + 'static>(

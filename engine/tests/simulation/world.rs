@@ -7,6 +7,7 @@ use super::{
 use engine::{
     epochs::MESSAGE_LIVE,
     intake::{FrameJob, FrameKind, Intake},
+    live::LiveHub,
     motion::MotionTracker,
     slots::{FrameOutcome, SlotKey, Slots},
     snapshot::{MapSnapshot, Snapshots},
@@ -129,7 +130,7 @@ impl World {
         for robot in &robots {
             snapshots.set_robot(robot.name.as_str(), Some("hall"));
         }
-        let motion = Arc::new(MotionTracker::new(snapshots.clone(), Arc::default()));
+        let motion = Arc::new(MotionTracker::new(snapshots.clone(), Arc::new(LiveHub::default())));
         let intake = Intake {
             slots: Arc::new(Slots::new(16, 64 << 20)),
             snapshots,

@@ -3,7 +3,6 @@
 use super::*;
 use crate::{
     frame::{
-        context::FrameContext,
         fixes::{NoFix, photograph_pose, unique_landmarks},
         guided::recognise_guided,
     },

@@ -1,5 +1,7 @@
 //! Photographs without a robot: where they were taken.
 
+mod pose_refusal;
+
 use super::answer_to_photograph;
 use crate::{frame::fixes::NoFix, scene::Scene, snapshot::MapSnapshot};
 use map::segments::LaserSegment;

@@ -1,4 +1,5 @@
 use super::*;
+use crate::observers::live::LiveHub;
 use map::{
     map_links::MapLink,
     pose2::{Pose2, Pose2Covariance},
@@ -10,7 +11,7 @@ fn intake() -> Intake {
     snapshots.set_robot("r1", Some("hall"));
     snapshots.set_robot("lost", Some("gone"));
     let slots = Arc::new(Slots::new(4, 1 << 20));
-    let motion = Arc::new(MotionTracker::new(snapshots.clone(), Arc::default()));
+    let motion = Arc::new(MotionTracker::new(snapshots.clone(), Arc::new(LiveHub::default())));
     let deadline = Duration::from_millis(500);
     Intake { slots, snapshots, motion, frame_bytes: 1000, deadline, linked_maps_only: false }
 }

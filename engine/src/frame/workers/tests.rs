@@ -1,7 +1,7 @@
 //! Workers without any transport: panics, late work, overload.
 
 use super::*;
-use crate::{frame::intake::Intake, scene};
+use crate::{frame::intake::Intake, observers::live::LiveHub, scene};
 use protos::{
     convert::{EncodedImage, Encoding, Pixels},
     prost::Message,
@@ -41,7 +41,7 @@ fn message(seq: u64, bytes: usize) -> protos::prost::bytes::Bytes {
 }
 
 fn hall() -> Engine {
-    scene::engine(&[Arc::new(MapSnapshot::empty("hall", 1))])
+    scene::engine(&[Arc::new(MapSnapshot::empty("hall", 1))]).0
 }
 
 /// Panics on answers if it is told to.
@@ -61,11 +61,11 @@ impl Publish for Panicking {
 }
 
 /// What the API told of the robot when its answers came: frames answered, frames refused.
-struct ToldAt(Engine, Mutex<Vec<(u64, u64)>>);
+struct ToldAt(Arc<LiveHub>, Mutex<Vec<(u64, u64)>>);
 
 impl Publish for ToldAt {
     fn answer(&self, key: &SlotKey, _: &v1::Answer) {
-        let told = self.0.live.activity(&key.robot, Instant::now());
+        let told = self.0.activity(&key.robot, Instant::now());
         let counts = told.map_or((0, 0), |told| (told.answered, told.inputs.iter().map(|i| i.refused).sum()));
         self.1.lock().unwrap().push(counts);
     }
@@ -76,8 +76,8 @@ impl Publish for ToldAt {
 /// Who has the answer and asks at once finds its frame counted.
 #[test]
 fn a_frame_is_counted_before_its_answer_is_sent() {
-    let engine = hall();
-    let told = ToldAt(engine.clone(), Mutex::default());
+    let (engine, observers) = scene::engine(&[Arc::new(MapSnapshot::empty("hall", 1))]);
+    let told = ToldAt(observers.live, Mutex::default());
     let intake = intake(&engine, Duration::from_mins(1));
     for (seq, camera) in [(1, key(0).camera), (2, Name::new(PLANTED).unwrap())] {
         intake.receive(key(0), message(seq, 768)).unwrap();
@@ -211,7 +211,7 @@ impl RestingRobot {
     fn new(search: SearchPolicy) -> Self {
         let mut scene = scene::Scene::new();
         let map = scene.taught();
-        let engine = Engine { search, ..scene::engine(std::slice::from_ref(&map)) };
+        let engine = Engine { search, ..scene::engine(std::slice::from_ref(&map)).0 };
         let stops = scene.stops(5, 1).into_iter().map(|(_, readings)| readings).collect();
         Self { engine, stops, intrinsics: scene.intrinsics(), seq: 0 }
     }

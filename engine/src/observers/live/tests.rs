@@ -83,7 +83,7 @@ fn events_read_as_the_page_expects() {
     assert_eq!(json["pose"]["y_m"], 2.0);
     assert_eq!(events.try_recv().unwrap().kind(), "presence");
     let pose = Pose2Covariance { pose: Pose2::default(), covariance: nalgebra::Matrix3::identity() };
-    hub.publish_pose(&name("r1"), "hall", &pose, (2, 7.5), v1::PoseTrust::Contradicted);
+    hub.pose(&name("r1"), "hall", &pose, (2, 7.5), v1::PoseTrust::Contradicted);
     let json = serde_json::to_value(&*events.try_recv().unwrap()).unwrap();
     assert_eq!((&json["corrections"], &json["age_ms"]), (&2.into(), &7.5.into()));
     assert_eq!(json["trust"], "contradicted");
@@ -95,7 +95,7 @@ fn the_trust_is_that_of_the_last_pose_on_its_map() {
     let pose = Pose2Covariance { pose: Pose2::default(), covariance: nalgebra::Matrix3::identity() };
     assert_eq!(hub.trust(&r1, "hall"), None);
     for trust in [v1::PoseTrust::Supported, v1::PoseTrust::Stale] {
-        hub.publish_pose(&r1, "hall", &pose, (1, 0.0), trust);
+        hub.pose(&r1, "hall", &pose, (1, 0.0), trust);
         assert_eq!(hub.trust(&r1, "hall"), Some(trust));
     }
     // The robot was given another map, and no pose has been published there yet.

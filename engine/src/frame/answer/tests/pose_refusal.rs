@@ -1,18 +1,14 @@
 //! Rendered frames of a map and a camera with one wrong number: it is named, with its value.
 
-use super::*;
+use super::super::*;
 use crate::{
-    frame::{
-        analysis::{StageTimes, analyse_frame, frame_camera},
-        answer::{answer, fill_fixes},
-        context::FrameContext,
-        guided::GuidedResult,
-        landmark_checks::evaluate_frame,
-    },
+    frame::{analysis::FrameContext, landmark_checks::evaluate_frame},
     scene::Scene,
-    snapshot::MapSnapshot,
 };
-use map::pose2::Pose2;
+use map::{
+    extrinsics::CameraExtrinsics,
+    pose2::{Pose2, Pose2Covariance},
+};
 use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
 use sim::robot::SensorReadings;
 use std::sync::Arc;
@@ -44,9 +40,7 @@ fn answered(
         prior: prior.as_ref(),
     };
     let guided = GuidedResult::default();
-    let mut answer = answer(&analysis, map);
-    fill_fixes(&mut answer, &evaluate_frame(&frame, None, &guided), &guided, map);
-    answer
+    with_fixes(&analysis, &guided, &evaluate_frame(&frame, None, &guided), map)
 }
 
 /// The map with landmarks of `factor` times their size.
