@@ -9,6 +9,7 @@ use crate::{
 };
 use protos::{
     CheckedFrame, Code, Name, Rejection,
+    named_map::{self, FrameHead},
     prost::{Message, bytes::Bytes},
     v1,
 };
@@ -73,47 +74,35 @@ pub struct Intake {
 }
 
 impl Intake {
-    /// Puts the `Frame` in its slot, or counts its refusal and gives the answer that says why.
-    pub fn receive(&self, key: SlotKey, message: Bytes) -> Result<(), Box<v1::Answer>> {
-        self.take(FrameKind::Image, key, message)
-    }
-
-    /// The same for either kind. Quads have the slot of their camera's frames, and one numbering with them.
-    pub fn take(&self, kind: FrameKind, key: SlotKey, message: Bytes) -> Result<(), Box<v1::Answer>> {
-        self.take_at(kind, key, message, Instant::now())
-    }
-
-    /// The same, with the time of receipt.
-    pub fn take_at(
+    /// Puts a frame in its slot, or counts its refusal and gives the answer that says why. Quads have the slot of their
+    /// camera's frames, and one numbering with them.
+    pub fn take(
         &self,
         kind: FrameKind,
         key: SlotKey,
         message: Bytes,
         received: Instant,
     ) -> Result<(), Box<v1::Answer>> {
-        match kind {
-            FrameKind::Image => self.take_message::<v1::Frame>(key, message, received),
-            FrameKind::Quads => self.take_message::<v1::Quads>(key, message, received),
-        }
-    }
-
-    fn take_message<M: FrameMessage>(
-        &self,
-        key: SlotKey,
-        message: Bytes,
-        received: Instant,
-    ) -> Result<(), Box<v1::Answer>> {
         let mut echo = v1::Answer { status: v1::Status::Rejected.into(), ..v1::Answer::default() };
-        let job = match self.check::<M>(&key, message, received, &mut echo) {
-            Ok(job) => job,
+        let checked = match kind {
+            FrameKind::Image => self.check::<v1::Frame>(&key, message, received, &mut echo),
+            FrameKind::Quads => self.check::<v1::Quads>(&key, message, received, &mut echo),
+        };
+        let taken = match checked {
+            // The slot counts its own refusals.
+            Ok(job) => self.slots.offer(key, (job.frame.epoch, job.frame.seq), job, received),
             Err(refusal) => {
                 self.slots.refuse(refusal.code);
-                return Err(refused(echo, &refusal));
+                Err(refusal)
             }
         };
-        let order = (job.frame.epoch, job.frame.seq);
-        // The slot counts its own refusals.
-        self.slots.offer(key, order, job, received).map_err(|refusal| refused(echo, &refusal))
+        taken.map_err(|refusal| Box::new(v1::Answer { rejection: Some((&refusal).into()), ..echo }))
+    }
+
+    /// A `Frame` that is received now.
+    #[cfg(test)]
+    pub(super) fn receive(&self, key: SlotKey, message: Bytes) -> Result<(), Box<v1::Answer>> {
+        self.take(FrameKind::Image, key, message, Instant::now())
     }
 
     fn check<M: FrameMessage>(
@@ -127,9 +116,8 @@ impl Intake {
             let detail =
                 format!("{} bytes are more than {} (limits.frame_bytes)", message.len(), self.frame_bytes);
             // By these numbers the sender knows which of its frames it is.
-            if let Ok(frame) = M::decode(message) {
-                (echo.epoch, echo.seq, echo.captured_ns) = frame.numbers();
-            }
+            let head = M::KIND.head(&message);
+            (echo.epoch, echo.seq, echo.captured_ns) = (head.epoch, head.seq, head.captured_ns);
             return Err(Rejection::new(Code::TooLarge, M::FIELD, detail));
         }
         let message_bytes = message.len();
@@ -185,21 +173,25 @@ pub enum FrameKind {
 }
 
 impl FrameKind {
-    /// An answer with the numbers of a message, as far as it can be read.
-    pub fn echo(self, message: Bytes) -> v1::Answer {
-        fn read<M: FrameMessage>(message: Bytes) -> (u64, u64, i64) {
-            M::decode(message).unwrap_or_default().numbers()
+    /// What a message says of itself, without its pixels.
+    pub fn head(self, message: &[u8]) -> FrameHead {
+        match self {
+            Self::Image => named_map::of_frame(message),
+            Self::Quads => named_map::of_quads(message),
         }
-        let (epoch, seq, captured_ns) = match self {
-            Self::Image => read::<v1::Frame>(message),
-            Self::Quads => read::<v1::Quads>(message),
-        };
-        v1::Answer { epoch, seq, captured_ns, status: v1::Status::Rejected.into(), ..v1::Answer::default() }
     }
+}
+
+/// The answer to a message that was not taken in.
+pub fn refusal_unread(head: &FrameHead, reason: &Rejection) -> v1::Answer {
+    let FrameHead { epoch, seq, captured_ns, .. } = *head;
+    let (status, rejection) = (v1::Status::Rejected.into(), Some(reason.into()));
+    v1::Answer { epoch, seq, captured_ns, status, rejection, ..v1::Answer::default() }
 }
 
 /// A message of a camera image.
 trait FrameMessage: Message + Default + TryInto<CheckedFrame, Error = Rejection> {
+    const KIND: FrameKind;
     /// Its name in the .proto.
     const NAME: &'static str;
     /// The message as a whole in refusals.
@@ -209,6 +201,7 @@ trait FrameMessage: Message + Default + TryInto<CheckedFrame, Error = Rejection>
 }
 
 impl FrameMessage for v1::Frame {
+    const KIND: FrameKind = FrameKind::Image;
     const NAME: &'static str = "Frame";
     const FIELD: &'static str = "frame";
     fn numbers(&self) -> (u64, u64, i64) {
@@ -217,6 +210,7 @@ impl FrameMessage for v1::Frame {
 }
 
 impl FrameMessage for v1::Quads {
+    const KIND: FrameKind = FrameKind::Quads;
     const NAME: &'static str = "Quads";
     const FIELD: &'static str = "quads";
     fn numbers(&self) -> (u64, u64, i64) {
@@ -227,11 +221,6 @@ impl FrameMessage for v1::Quads {
 /// The refusal for a map that does not exist.
 pub fn unknown_map(map: &str) -> Rejection {
     Rejection::new(Code::UnknownMap, "map", format!("there is no map {map}"))
-}
-
-fn refused(mut echo: v1::Answer, refusal: &Rejection) -> Box<v1::Answer> {
-    echo.rejection = Some(refusal.into());
-    Box::new(echo)
 }
 
 /// Whether a capture time is further than [`CLOCK_TOLERANCE`] from this machine's clock. It is reported, and changes nothing.

@@ -230,7 +230,7 @@ impl World {
         let now = self.now;
         let key = id.key.clone();
         let last = self.accepted.get(&(key.clone(), id.epoch)).copied();
-        let result = self.intake.take_at(FrameKind::Image, key.clone(), bytes, now);
+        let result = self.intake.take(FrameKind::Image, key.clone(), bytes, now);
         self.received += 1;
         self.tell(|| format!("{id:?}: {:?}", result.as_ref().err().map(|a| a.rejection.clone())));
         let lives = self.lives.get_mut(&key.robot).expect("a robot of this world");
