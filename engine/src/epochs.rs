@@ -263,5 +263,46 @@ fn make_room(robots: &mut BTreeMap<Name, RobotEpochs>, is_registered: impl Fn(&N
     oldest.map(|name| robots.remove(&name));
 }
 
+/// Epochs of one camera whose last number is remembered besides the present one's.
+pub const PAST_EPOCHS: usize = 8;
+
+/// The last sequence number of a stream in each of its latest epochs. [`Epochs`] decides which epoch is live;
+/// one that comes back continues after its last number.
+#[derive(Debug, Default)]
+pub struct SequenceTracker {
+    last: Option<(u64, u64)>,
+    past: VecDeque<(u64, u64)>,
+}
+
+impl SequenceTracker {
+    /// Numbers that are left out before (epoch, seq): messages that were sent and did not arrive.
+    pub fn gap(&self, epoch: u64, seq: u64) -> u64 {
+        self.last
+            .filter(|(current, last)| *current == epoch && *last < seq)
+            .map_or(0, |(_, last)| seq - last - 1)
+    }
+
+    /// Takes (epoch, seq) as the newest, or refuses it as not newer than the last of its epoch.
+    pub fn advance(&mut self, epoch: u64, seq: u64) -> Result<(), Rejection> {
+        let place = self.past.iter().position(|(past, _)| *past == epoch);
+        let known = match self.last {
+            Some((current, last)) if current == epoch => Some(last),
+            _ => place.map(|i| self.past[i].1),
+        };
+        if let Some(last) = known.filter(|last| seq <= *last) {
+            return Err(Rejection::new(Code::NotNewer, "seq", format!("{seq} is not newer than {last}")));
+        }
+        if let Some(current) = self.last.filter(|(current, _)| *current != epoch) {
+            place.and_then(|i| self.past.remove(i));
+            if self.past.len() == PAST_EPOCHS {
+                self.past.pop_front();
+            }
+            self.past.push_back(current);
+        }
+        self.last = Some((epoch, seq));
+        Ok(())
+    }
+}
+
 #[cfg(test)]
 mod tests;

@@ -1,7 +1,7 @@
 //! Which landmark a robot's pan-tilt camera shall look at, over one version of its map: `map::gaze` with the landmarks that
 //! are learnt, placed and trusted. A robot keeps one landmark until another is clearly better; a page gets the ranking.
 
-use super::snapshot::MapSnapshot;
+use crate::snapshot::MapSnapshot;
 use map::{
     check::OutOfRange,
     gaze::{GazeAction, GazeCandidate, GazeController, GazeParams, GazeTarget, PanTiltUnit, rank},

@@ -1,12 +1,14 @@
 //! Global localisation without a history: one frame, one scan or both, and the map. In: what a robot senses at one place. Out: its
 //! pose with covariance, the poses that it may be at, or none. Nothing of it changes a robot's fused pose.
 
-use super::{
-    ambiguous_observations::ambiguous_observations,
-    fixes::{NoFix, landmark_observations, robot_fixes},
-    frame_analysis::{StageTimes, analyse_frame, frame_camera},
-    frame_answer::cautions,
-    relocalise::{RelocalisationInput, Relocalisers},
+use crate::{
+    frame::{
+        ambiguous_observations::ambiguous_observations,
+        analysis::{StageTimes, analyse_frame, frame_camera},
+        answer::{cautions, quads_answer},
+        fixes::{NoFix, landmark_observations, robot_fixes},
+        relocalise::{RelocalisationInput, Relocalisers},
+    },
     snapshot::MapSnapshot,
 };
 use map::{
@@ -175,9 +177,10 @@ fn by_frame(map: &MapSnapshot, frame: &LocaliseFrame<'_>) -> (Found, v1::Answer)
     let mut times = StageTimes::start();
     let camera = frame_camera(Some(frame.camera), Some(frame.extrinsics), map);
     let analysis = analyse_frame(frame.picture, camera, map, &mut times);
-    let mut answer = crate::frame_answer::answer(&analysis, map);
-    let fixes = landmark_observations(&analysis, map)
-        .and_then(|observations| robot_fixes(&observations, Some(frame.extrinsics), None));
+    let mut answer = quads_answer(&analysis, map);
+    let fixes = landmark_observations(&analysis, map).and_then(|observations| {
+        robot_fixes(&observations, Some(frame.extrinsics), None, &map.poses.localise)
+    });
     let one = |fix: &map::localise::Fix, probability| LocaliseHypothesis {
         pose: fix.pose,
         probability,
@@ -225,12 +228,12 @@ fn look_alike_poses(
 
 /// Poses by landmarks, each corrected by the scan; those that the scan contradicts go.
 fn with_scan(map: &MapSnapshot, found: Vec<LocaliseHypothesis>, scan: &Scan) -> Found {
-    let p = LaserFixParams::default();
+    let p = &map.poses.laser_fix;
     let mut kept = Vec::new();
     for hypothesis in found {
-        match laser_fix(&map.wall_index, scan, &hypothesis.pose, &p) {
+        match laser_fix(&map.wall_index, scan, &hypothesis.pose, p) {
             Ok(Ok(fix)) => {
-                let weight = hypothesis.probability * likelihood(&fix, &p);
+                let weight = hypothesis.probability * likelihood(&fix, p);
                 let pose = fused(&hypothesis.pose, &fix.pose).unwrap_or(hypothesis.pose);
                 kept.push(LocaliseHypothesis {
                     pose,
@@ -249,8 +252,8 @@ fn with_scan(map: &MapSnapshot, found: Vec<LocaliseHypothesis>, scan: &Scan) -> 
 
 /// Poses by the scan alone.
 fn by_scan(map: &MapSnapshot, scan: &Scan, stop: &dyn Fn() -> bool) -> Found {
-    let p = LaserFixParams::default();
-    let found = global_laser_fixes(&map.wall_index, scan, &p, stop);
+    let p = &map.poses.laser_fix;
+    let found = global_laser_fixes(&map.wall_index, scan, p, stop);
     let fixes = match found {
         Ok(Ok(fixes)) => fixes,
         Ok(Err(GlobalRefusal::TooLarge)) => return Err(LocaliseReason::MapTooLarge),
@@ -260,7 +263,7 @@ fn by_scan(map: &MapSnapshot, scan: &Scan, stop: &dyn Fn() -> bool) -> Found {
     };
     let one = |fix: &LaserFix| LocaliseHypothesis {
         pose: fix.pose,
-        probability: likelihood(fix, &p),
+        probability: likelihood(fix, p),
         landmarks: Vec::new(),
         matched: Some(fix.matched),
         by_look_alikes: false,

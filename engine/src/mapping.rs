@@ -7,8 +7,8 @@ mod session;
 
 pub use session::{MAX_SCANS, QUEUE};
 
-use super::panics::Panics;
 use crate::scan_job::ScanJob;
+use crate::supervision::panics::Panics;
 use journal::{Journal, JournalHeader, JournalReader};
 use map::pose2::Pose2;
 use protos::Name;

@@ -29,19 +29,18 @@ pub use timebase::{
     MAX_LEADS, MAX_STREAMS,
 };
 
-use super::{
+use crate::{
     epochs::Epochs,
+    inputs::Input,
     limits::MAX_ROBOTS,
-    live::LiveHub,
     mapping::MappingSessions,
     quotas::{Kind, Quotas},
-    robot_activity::Input,
     snapshot::Snapshots,
 };
 use map::{
     fuse::{FixOutcome, FixRole, FusedPose},
-    laser_fix::{LaserFixParams, laser_fix},
-    pose2::Pose2Covariance,
+    laser_fix::laser_fix,
+    pose2::{Pose2, Pose2Covariance},
 };
 use protos::{
     Code, Name, Rejection,
@@ -52,6 +51,7 @@ use protos::{
 use robot::{RobotState, StatedPose};
 use std::{
     collections::{BTreeMap, BTreeSet},
+    fmt::Debug,
     sync::{Arc, Mutex, MutexGuard, PoisonError},
     time::{Duration, Instant},
 };
@@ -84,11 +84,21 @@ pub struct KnownPose {
     pub age: Duration,
 }
 
+/// Watches what robots send and where they are. Never waits.
+pub trait MotionObserver: Debug + Send + Sync {
+    /// A message was used, or refused. Used frames are counted with their answers.
+    fn message(&self, robot: &Name, input: Input, refused: Option<&Rejection>, received: Instant);
+    /// Odometry put on the map.
+    fn odometry(&self, robot: &Name, map: &str, map_from_robot: Pose2);
+    /// A fused pose, with the corrections so far, its age (ms), and how far it is trusted.
+    fn pose(&self, robot: &Name, map: &str, pose: &Pose2Covariance, counts: (u64, f64), trust: v1::PoseTrust);
+}
+
 /// The motion of all robots.
 #[derive(Debug)]
 pub struct MotionTracker {
     snapshots: Arc<Snapshots>,
-    live: Arc<LiveHub>,
+    observer: Arc<dyn MotionObserver>,
     epochs: Epochs,
     quotas: Quotas,
     state: Mutex<State>,
@@ -100,10 +110,10 @@ pub struct MotionTracker {
 
 impl MotionTracker {
     /// No robot has moved yet.
-    pub fn new(snapshots: Arc<Snapshots>, live: Arc<LiveHub>) -> Self {
+    pub fn new(snapshots: Arc<Snapshots>, observer: Arc<dyn MotionObserver>) -> Self {
         Self {
             snapshots,
-            live,
+            observer,
             epochs: Epochs::default(),
             quotas: Quotas::default(),
             state: Mutex::default(),
@@ -133,7 +143,7 @@ impl MotionTracker {
     /// counted.
     pub fn odometry(&self, robot: &Name, message: Bytes, received: Instant) -> Option<v1::RobotPose> {
         let taken = self.checked_odometry(robot, message, received);
-        self.note_message(robot, Input::Odometry, &taken, received);
+        self.observer.message(robot, Input::Odometry, taken.as_ref().err(), received);
         let (map, odometry, state) = self.lock().odometry.count(taken)?;
         let mut state = lock_robot(&state);
         state.apply_odometry(odometry.captured_ns, odometry.odom_from_robot, received);
@@ -141,7 +151,7 @@ impl MotionTracker {
         let stated = state.pose().map(|fused| state.state_pose(fused, received));
         drop(state);
         if let Some(on_map) = on_map {
-            self.live.odometry(robot, &map, on_map);
+            self.observer.odometry(robot, &map, on_map);
         }
         self.announce(robot, &map, odometry.epoch, stated?)
     }
@@ -169,23 +179,12 @@ impl MotionTracker {
     /// or for the mapping if the robot makes a map.
     pub fn scan(&self, robot: &Name, message: Bytes, received: Instant) {
         let taken = self.checked_scan(robot, message, received);
-        self.note_message(robot, Input::Scan, &taken, received);
+        self.observer.message(robot, Input::Scan, taken.as_ref().err(), received);
         let Some(Some(job)) = self.lock().scans.count(taken) else { return };
         if self.scans.offer(robot, job)
             && let Ok(state) = self.lock().robot(robot)
         {
             lock_robot(&state).log.count(LASER, "superseded");
-        }
-    }
-
-    /// Counts a message for its robot, or for those that are not registered.
-    fn note_message<T>(&self, robot: &Name, input: Input, taken: &Result<T, Rejection>, received: Instant) {
-        match taken {
-            Ok(_) => self.live.used(robot, input, received),
-            Err(rejection) if rejection.code == Code::UnknownRobot => {
-                self.live.refused_unknown(robot, None, received);
-            }
-            Err(rejection) => self.live.refused(robot, input, rejection.into(), received),
         }
     }
 
@@ -247,7 +246,7 @@ impl MotionTracker {
             }
             prior?
         };
-        let matched = laser_fix(&map.wall_index, &job.scan, &prior, &LaserFixParams::default());
+        let matched = laser_fix(&map.wall_index, &job.scan, &prior, &map.poses.laser_fix);
         let state = self.robot_state(robot, &job.map, job.epoch)?;
         let mut state = lock_robot(&state);
         state.switch_epoch_or_map(job.epoch, &job.map, &self.snapshots);
@@ -340,7 +339,7 @@ impl MotionTracker {
             return None;
         }
         let age_ms = age.as_secs_f64() * 1e3;
-        self.live.publish_pose(robot, map, &fused.pose, (fused.corrections, age_ms), trust);
+        self.observer.pose(robot, map, &fused.pose, (fused.corrections, age_ms), trust);
         Some(v1::RobotPose {
             epoch,
             captured_ns: fused.at_ns,

@@ -1,7 +1,7 @@
 //! Uploaded pictures. In: bytes of a file. Out: a picture, upright by the orientation that the file states. Also grey
 //! images to PNG, for pages. [`super::decode`] decodes and holds the limits.
 
-use super::decode::{self, ImageLimits};
+use crate::frame::decode::{self, ImageLimits};
 use image::{
     DynamicImage, ExtendedColorType, ImageDecoder, ImageEncoder,
     codecs::{jpeg::JpegDecoder, png::PngEncoder},

@@ -5,19 +5,16 @@
 //! to an answer belongs to its time.
 
 use crate::{
-    answer_records::named_landmarks,
-    decode::{ImageLimits, decode_frame},
-    frame_analysis::{StageTimes, analyse_checked},
-    frame_answer::{answer, fill_fixes},
-    frame_context::FrameContext,
-    guided::{GuidedResult, recognise_guided},
-    kept_frames::KeptFrame,
-    landmark_checks::evaluate_frame,
+    frame::{
+        analysis::{Effect, OpenedFrame, StageTimes},
+        answer::frame_answer,
+        decode::{ImageLimits, decode_frame},
+    },
+    observers::{answer_records::named_landmarks, kept_frames::KeptFrame},
     snapshot::MapSnapshot,
 };
-use protos::{CheckedFrame, Rejection, v1};
-use std::{collections::BTreeSet, f64::consts::TAU};
-use vision::frame::Picture;
+use protos::{Rejection, v1};
+use std::{collections::BTreeSet, f64::consts::TAU, sync::Arc};
 
 /// A pose that differs by less in both is the same.
 const SAME_M: f64 = 0.001;
@@ -62,23 +59,16 @@ impl AnswerChange {
 /// Answers a kept frame by two versions of its map. Errors: its image cannot be decoded.
 pub fn replay(
     kept: &KeptFrame,
-    [before, after]: [&MapSnapshot; 2],
+    [before, after]: [&Arc<MapSnapshot>; 2],
     limits: ImageLimits,
 ) -> Result<AnswerChange, Rejection> {
-    let picture = decode_frame(&kept.frame, limits)?;
-    let of = |map| answered(&kept.frame, &picture, map);
-    Ok(change(&of(before), &of(after)))
-}
-
-fn answered(frame: &CheckedFrame, picture: &Picture, map: &MapSnapshot) -> v1::Answer {
-    let analysis = analyse_checked(frame, picture, map, &mut StageTimes::start());
-    let mut answer = answer(&analysis, map);
-    let context = FrameContext::new(frame, &analysis, map);
-    let guide = frame.prior.as_ref();
-    let guided =
-        guide.map_or_else(GuidedResult::default, |pose| recognise_guided(picture.grey(), &context, pose));
-    fill_fixes(&mut answer, &evaluate_frame(&context, None, &guided), &guided, map);
-    answer
+    let (frame, picture) = (&kept.frame, Arc::new(decode_frame(&kept.frame, limits)?));
+    let answered = |map: &Arc<MapSnapshot>| {
+        let (picture, map, effect) = (picture.clone(), map.clone(), Effect::AnswerOnly);
+        let opened = OpenedFrame { frame, picture, map, effect, prior: None };
+        frame_answer(&opened.searched(&mut StageTimes::start()))
+    };
+    Ok(change(&answered(before), &answered(after)))
 }
 
 /// The pose that a robot would use: of its landmarks, else by its own estimate.

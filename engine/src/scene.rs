@@ -1,16 +1,15 @@
 //! For tests: a rendered corridor, two of its posters taught, and a robot in front of them.
 
-use super::{
-    answer_records::answer_records,
-    findings::findings,
-    kept_frames::KeptFrames,
-    live::LiveHub,
+use crate::{
+    frame::{
+        decode::ImageLimits,
+        slots::Slots,
+        workers::{Engine, SearchPolicy},
+    },
     motion::MotionTracker,
-    slots::Slots,
+    observers::{Observers, answer_records::answer_records, findings::findings},
     snapshot::{LandmarkInfo, MapSnapshot, Snapshots},
-    workers::Engine,
 };
-use crate::decode::ImageLimits;
 use map::place::{LandmarkPlace, PlaceSigmas};
 use nalgebra::Vector3;
 use sim::{
@@ -100,27 +99,29 @@ impl Scene {
     }
 }
 
-/// An engine with these maps; robot `r1` is on the first.
-pub fn engine(maps: &[Arc<MapSnapshot>]) -> Engine {
+/// An engine with these maps, and what watches its frames; robot `r1` is on the first map.
+pub fn engine(maps: &[Arc<MapSnapshot>]) -> (Engine, Observers) {
     let snapshots = Arc::new(Snapshots::default());
     for map in maps {
         snapshots.publish(map.clone());
     }
     snapshots.set_robot("r1", Some(&maps[0].name));
-    let live = Arc::new(LiveHub::default());
-    Engine {
+    let observers = Observers::new(1 << 20);
+    let records = answer_records(observers.kept_frames.clone()).0;
+    let engine = Engine {
         slots: Arc::new(Slots::new(8, 256 << 20)),
-        motion: Arc::new(MotionTracker::new(snapshots.clone(), live.clone())),
+        motion: Arc::new(MotionTracker::new(snapshots.clone(), observers.live.clone())),
         snapshots,
-        live,
         limits: ImageLimits::FRAME,
         vitals: Arc::default(),
-        findings: findings().0,
-        records: answer_records().0,
-        kept_frames: Arc::new(KeptFrames::new(1 << 20)),
         relocalisers: Arc::default(),
-        frame_tap: Arc::new(crate::frame_tap::NoTap),
-        times: Arc::default(),
-        search: crate::search_policy::SearchPolicy::Every,
-    }
+        search: SearchPolicy::Every,
+        observers: vec![
+            Arc::new(records),
+            observers.live.clone(),
+            observers.times.clone(),
+            Arc::new(findings().0),
+        ],
+    };
+    (engine, observers)
 }

@@ -27,11 +27,11 @@ use crate::{
     },
 };
 use engine::{
+    Observers,
     answer_records::{AnswerRecord, answer_records},
     decode::ImageLimits,
     findings::{FindingSender, LandmarkFinding, findings},
     intake::Intake,
-    kept_frames::KeptFrames,
     live::LiveHub,
     motion::MotionTracker,
     panics::Panics,
@@ -68,14 +68,17 @@ impl Server {
         let (tap, offered) = gather::gathering_tap();
         let teaching = Teaching::start(&config, &store, (&tap, offered), &stopping).await?;
         let (findings, found) = findings();
-        let (engine, recorded) = engine(&config, snapshots.clone(), vitals.clone(), (findings, tap));
+        let observers = Observers::new(config.limits.replay_bytes);
+        let (engine, recorded) =
+            engine(&config, (snapshots.clone(), vitals.clone()), &observers, (findings, tap));
         resume_mappings(&engine, &config, &snapshots);
-        let recorders = recorders(&config, &store, (found, recorded, &engine.live), &stopping);
+        let recorders = recorders(&config, &store, (found, recorded, &observers.live), &stopping);
         let disk = watch_disk(&store, &local_token, &engine, &stopping);
         let checks = checks(&store, &stopping);
         // Whoever owns the router decides who is a robot.
         let of_robots = certificates.as_ref().filter(|_| config.router.is_none());
-        let to = receivers(&config, &engine, of_robots.map(|_| store.certificates().clone()))?;
+        let to =
+            receivers(&config, (&engine, &observers.live), of_robots.map(|_| store.certificates().clone()))?;
         let (server, fleet) = (to.server.clone(), to.fleet.clone());
         let Robots { mut bus, ros2, publisher, workers } =
             Robots::connect(&config, &engine, to, (sockets, certificates.clone())).await?;
@@ -93,7 +96,8 @@ impl Server {
             fleet,
         };
         let probed = ((*store).clone(), publisher.outbox().clone(), bus.take_pinger());
-        let app = Arc::new(App::new(config.clone(), store, services, &engine, stopping.clone()));
+        let app =
+            Arc::new(App::new(config.clone(), store, services, (&engine, &observers), stopping.clone()));
         let serving = Serving::start(listeners, &app, probed, &stopping);
         let zenoh_endpoint = bus.endpoint().to_owned();
         let tasks = Tasks {
@@ -114,7 +118,7 @@ impl Server {
             zenoh_endpoint,
             server,
             snapshots,
-            live: engine.live,
+            live: observers.live,
             slots: engine.slots,
             ros2,
             sessions,
@@ -282,25 +286,19 @@ fn told(store: &Catalogue) -> (Arc<Panics>, Arc<EventLog>, Arc<DiskGuard>) {
 /// Everything between frames and answers, for one set of settings; and the answers that are to be stored.
 fn engine(
     config: &Config,
-    snapshots: Arc<Snapshots>,
-    vitals: Arc<Vitals>,
-    (findings, frame_tap): (FindingSender, GatheringTap),
+    (snapshots, vitals): (Arc<Snapshots>, Arc<Vitals>),
+    Observers { live, times, kept_frames }: &Observers,
+    (findings, tap): (FindingSender, GatheringTap),
 ) -> (Engine, Receiver<AnswerRecord>) {
-    let (records, recorded) = answer_records();
-    let live = Arc::new(LiveHub::default());
+    let (records, recorded) = answer_records(kept_frames.clone());
     let engine = Engine {
         slots: Arc::new(Slots::new(config.limits.cameras, config.limits.waiting_frame_bytes)),
         motion: Arc::new(MotionTracker::new(snapshots.clone(), live.clone()).with_quotas(quotas(config))),
         snapshots,
-        live,
         limits: ImageLimits { bytes: config.limits.frame_bytes, pixels: config.limits.frame_pixels },
         vitals,
-        findings,
-        records,
-        kept_frames: Arc::new(KeptFrames::new(config.limits.replay_bytes)),
         relocalisers: Arc::default(),
-        frame_tap: Arc::new(frame_tap),
-        times: Arc::default(),
+        observers: vec![Arc::new(records), live.clone(), times.clone(), Arc::new(findings), Arc::new(tap)],
         search: config.search_frames.policy(config.workers),
     };
     (engine, recorded)
@@ -335,7 +333,7 @@ async fn store_findings(store: Catalogue, mut found: Receiver<LandmarkFinding>, 
 
 fn receivers(
     config: &Config,
-    engine: &Engine,
+    (engine, live): (&Engine, &Arc<LiveHub>),
     certificates: Option<Arc<CertificateRegistry>>,
 ) -> Result<Receivers, StartError> {
     let server = server_name(config.server_name.as_ref(), &config.data).map_err(StartError::Name)?;
@@ -355,7 +353,7 @@ fn receivers(
     Ok(Receivers {
         intake: Arc::new(intake),
         motion: engine.motion.clone(),
-        live: engine.live.clone(),
+        live: live.clone(),
         gazes: Arc::default(),
         vitals: engine.vitals.clone(),
         certificates,

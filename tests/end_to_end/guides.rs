@@ -300,7 +300,7 @@ fn words(file: &str, with_arms: bool) -> Vec<String> {
 #[test]
 fn troubleshooting_has_every_word_of_refusal() {
     let mut all = Vec::new();
-    for file in ["engine/src/fixes.rs", "protos/src/rejection.rs", "protos/src/convert/result.rs"] {
+    for file in ["engine/src/frame/fixes.rs", "protos/src/rejection.rs", "protos/src/convert/result.rs"] {
         let found = words(file, true);
         assert!(found.len() >= 8, "{file}: only {found:?}: it is no longer read");
         all.extend(found);

@@ -147,3 +147,16 @@ fn names_that_nobody_registered_are_bounded() {
     let latest = format!("made-up-{}", 3 * MAX_UNREGISTERED - 1);
     assert!(world.epochs.status(&name(&latest), world.at(9)).alive);
 }
+
+#[test]
+fn epochs_are_remembered_up_to_the_bound() {
+    let mut order = SequenceTracker::default();
+    for epoch in 0..=PAST_EPOCHS as u64 {
+        order.advance(epoch, 5).unwrap();
+    }
+    assert!(order.advance(0, 5).is_err());
+    order.advance(99, 1).unwrap();
+    assert_eq!(order.past.len(), PAST_EPOCHS);
+    assert!(order.advance(1, 5).is_err());
+    assert!(order.advance(0, 5).is_ok(), "the oldest of {PAST_EPOCHS} is forgotten");
+}

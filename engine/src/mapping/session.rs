@@ -5,9 +5,11 @@ use super::{
     journal::{Journal, JournalHeader, JournalReader},
 };
 use crate::{
-    panics::{Edge, Panics},
     scan_job::ScanJob,
-    threads::{self, Class},
+    supervision::{
+        panics::{Edge, Panics},
+        threads::{self, Class},
+    },
 };
 use map::{
     pose2::{Pose2, Pose2Covariance},

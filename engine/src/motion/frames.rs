@@ -6,7 +6,7 @@
 //! which role a fix goes to the fusion: landmarks that the prior pose named correct it and do nothing else.
 
 use super::{MAX_POSE_AGE, MotionTracker, lock_robot, robot::RobotState, timebase::Stream};
-use crate::robot_activity::Input;
+use crate::inputs::Input;
 use map::{
     fuse::{FixRole, FusedPose},
     guided::{Decision, FramePlan, FrameReport},
@@ -103,7 +103,7 @@ impl MotionTracker {
         let instead_ns = state.clock_ns(received).unwrap_or(frame.captured_ns);
         drop(state);
         if let Err(rejection) = &checked {
-            self.live.refused(robot, Input::Frame, rejection.into(), received);
+            self.observer.message(robot, Input::Frame, Some(rejection), received);
         }
         self.lock().stamps.count(checked).ok_or(instead_ns)
     }

@@ -10,7 +10,7 @@ use super::{
     run_recording::RunRecording,
     timebase::{AHEAD_TOLERANCE, Stamp, Stream, TimeBase},
 };
-use crate::{slots::SequenceTracker, snapshot::Snapshots};
+use crate::{epochs::SequenceTracker, snapshot::Snapshots};
 use map::{
     fuse::{FixOutcome, FixRole, FuseParams, FusedPose, Fuser, OdometryOutcome},
     guided::{Schedule, ScheduleParams},

@@ -1,7 +1,7 @@
 //! Odometry, scans and fixes of one robot, without any transport.
 
 use super::*;
-use crate::snapshot::MapSnapshot;
+use crate::{observers::live::LiveHub, snapshot::MapSnapshot};
 use map::{
     guided::FramePlan,
     laser_fix::WallIndex,
@@ -45,9 +45,15 @@ impl MotionTracker {
 }
 
 fn motion() -> (MotionTracker, Name) {
-    let snapshots = Arc::new(Snapshots::default());
+    let (motion, r1, _) = watched();
+    (motion, r1)
+}
+
+/// The same with what pages are told.
+fn watched() -> (MotionTracker, Name, Arc<LiveHub>) {
+    let (snapshots, live) = (Arc::new(Snapshots::default()), Arc::new(LiveHub::default()));
     snapshots.set_robot("r1", Some("hall"));
-    (MotionTracker::new(snapshots, Arc::default()), Name::new("r1").unwrap())
+    (MotionTracker::new(snapshots, live.clone()), Name::new("r1").unwrap(), live)
 }
 
 fn odometry(seq: u64, x_m: f64) -> Bytes {
@@ -93,7 +99,7 @@ fn odometry_is_checked_and_counted() {
 
 #[test]
 fn scans_are_checked_and_counted() {
-    let (motion, r1) = motion();
+    let (motion, r1, live) = watched();
     let scan = v1::Scan {
         epoch: 1,
         seq: 1,
@@ -109,7 +115,7 @@ fn scans_are_checked_and_counted() {
     let (_, scans) = motion.counts();
     assert_eq!((scans.accepted, scans.rejected), (1, BTreeMap::from([(Code::OutOfRange, 1)])));
     // What is not answered is told by the robot's page.
-    let told = motion.live.activity(&r1, time(2.0)).unwrap().inputs;
+    let told = live.activity(&r1, time(2.0)).unwrap().inputs;
     let scans = told.iter().find(|told| told.input == Input::Scan).unwrap();
     assert_eq!((scans.used, scans.refused, scans.reasons[0].code.as_str()), (1, 1, "out_of_range"));
 }
@@ -136,15 +142,15 @@ fn at(captured_ns: i64, x_m: f64) -> FrameStamp<'static> {
 
 #[test]
 fn a_fix_puts_odometry_on_the_map() {
-    let (motion, r1) = motion();
+    let (motion, r1, live) = watched();
     assert!(motion.odometry_of(&r1, odometry(1, 3.0)).is_none(), "no pose before the first fix");
-    assert!(motion.live.trajectories(&r1).is_none());
+    assert!(live.trajectories(&r1).is_none());
     let pose = motion.apply_fix(&r1, at(1_000_000_000, 3.0), &fix(10.0)).unwrap();
     assert_eq!((pose.corrections, pose.map.as_str(), pose.epoch), (1, "hall", 1));
     let pose = motion.odometry_of(&r1, odometry(2, 4.0)).unwrap().map_from_robot.unwrap();
     assert!((pose.pose.unwrap().x_m - 11.0).abs() < 1e-9, "{pose:?}");
     assert!(pose.covariance[0] > 1e-4, "driving increases the covariance");
-    let trajectories = motion.live.trajectories(&r1).unwrap();
+    let trajectories = live.trajectories(&r1).unwrap();
     assert!((trajectories.odometry[0].x_m - 11.0).abs() < 1e-9);
     assert_eq!((trajectories.odometry.len(), trajectories.pose.len()), (1, 2));
 }

@@ -1,17 +1,16 @@
 //! The frames of the scene's robot against its map and against maps that differ from it.
 
 use super::*;
-use crate::{scene::Scene, slots::SlotKey};
+use crate::{frame::slots::SlotKey, scene::Scene};
 use map::{
     extrinsics::CameraExtrinsics,
     place::{LandmarkPlace, PlaceSigmas},
 };
 use nalgebra::Vector3;
 use protos::{
-    Name,
+    CheckedFrame, Name,
     convert::{EncodedImage, Encoding, Pixels},
 };
-use std::sync::Arc;
 use vision::model::ModelSet;
 
 fn frame(scene: &mut Scene) -> (String, KeptFrame) {
@@ -66,7 +65,8 @@ fn what_a_draft_loses_gains_and_moves_is_reported() {
     let map: Arc<MapSnapshot> = scene.taught();
     let (poster, kept) = frame(&mut scene);
     let of = |before: &MapSnapshot, after: &MapSnapshot| {
-        replay(&kept, [before, after], ImageLimits::FRAME).unwrap()
+        let [before, after] = [before, after].map(|map| Arc::new(map.clone()));
+        replay(&kept, [&before, &after], ImageLimits::FRAME).unwrap()
     };
     assert!(of(&map, &map).is_none());
     let bare = without(&map, &poster);

@@ -2,10 +2,13 @@
 
 use super::{look_alike_classes::LookAlikeClasses, stored_model::StoredModel};
 use map::{
-    landmark_health::LandmarkHealth,
-    laser_fix::WallIndex,
+    guided::{AssociateParams, ExpectParams},
+    landmark_health::{HealthParams, LandmarkHealth},
+    laser_fix::{LaserFixParams, WallIndex},
+    localise::LocaliseParams,
     modality_stats::ModalityMap,
     place::LandmarkPlace,
+    relocalise::GridBeliefParams,
     segments::LaserSegment,
     visibility::{VisibilityMap, VisibilitySettings},
 };
@@ -58,6 +61,25 @@ pub struct MapSnapshot {
     pub distance: DistanceKind,
     /// The parameters the models were learnt under, with the map's own distance.
     pub params: Arc<Params>,
+    /// The parameters of what computes poses.
+    pub poses: Arc<PoseParams>,
+}
+
+/// Parameters of what computes poses in a map.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct PoseParams {
+    /// Fixes by landmarks.
+    pub localise: LocaliseParams,
+    /// Landmarks against their places.
+    pub health: HealthParams,
+    /// Landmarks that a pose expects.
+    pub expect: ExpectParams,
+    /// Which of them a quad is.
+    pub associate: AssociateParams,
+    /// Relocalisation.
+    pub grid_belief: GridBeliefParams,
+    /// Scans in walls.
+    pub laser_fix: LaserFixParams,
 }
 
 impl MapSnapshot {
@@ -83,6 +105,7 @@ impl MapSnapshot {
             pending: Pending::default(),
             distance: DistanceKind::Both,
             params: Arc::default(),
+            poses: Arc::default(),
         }
     }
 

@@ -6,6 +6,6 @@ pub mod published;
 pub mod stored_model;
 
 pub use look_alike_classes::{LookAlikeClasses, look_alike_classes};
-pub use map_snapshot::{LandmarkInfo, MapSnapshot, Pending};
+pub use map_snapshot::{LandmarkInfo, MapSnapshot, Pending, PoseParams};
 pub use published::{MapChange, Snapshots};
 pub use stored_model::StoredModel;

@@ -171,7 +171,8 @@ impl Snapshots {
 
 #[cfg(test)]
 mod tests {
-    use super::{super::map_snapshot::Pending, *};
+    use super::*;
+    use crate::snapshot::map_snapshot::Pending;
 
     fn map(name: &str, version: u64) -> Arc<MapSnapshot> {
         Arc::new(MapSnapshot::empty(name, version))

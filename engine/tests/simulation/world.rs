@@ -7,6 +7,7 @@ use super::{
 use engine::{
     epochs::MESSAGE_LIVE,
     intake::{FrameJob, FrameKind, Intake},
+    live::LiveHub,
     motion::MotionTracker,
     slots::{FrameOutcome, SlotKey, Slots},
     snapshot::{MapSnapshot, Snapshots},
@@ -129,7 +130,7 @@ impl World {
         for robot in &robots {
             snapshots.set_robot(robot.name.as_str(), Some("hall"));
         }
-        let motion = Arc::new(MotionTracker::new(snapshots.clone(), Arc::default()));
+        let motion = Arc::new(MotionTracker::new(snapshots.clone(), Arc::new(LiveHub::default())));
         let intake = Intake {
             slots: Arc::new(Slots::new(16, 64 << 20)),
             snapshots,
@@ -229,7 +230,7 @@ impl World {
         let now = self.now;
         let key = id.key.clone();
         let last = self.accepted.get(&(key.clone(), id.epoch)).copied();
-        let result = self.intake.take_at(FrameKind::Image, key.clone(), bytes, now);
+        let result = self.intake.take(FrameKind::Image, key.clone(), bytes, now);
         self.received += 1;
         self.tell(|| format!("{id:?}: {:?}", result.as_ref().err().map(|a| a.rejection.clone())));
         let lives = self.lives.get_mut(&key.robot).expect("a robot of this world");

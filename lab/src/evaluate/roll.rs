@@ -7,9 +7,8 @@ use super::{
     statistics::{median, quantile},
 };
 use engine::{
+    analysis::{FrameContext, StageTimes, analyse_frame, frame_camera},
     fixes::{landmark_observations, photograph_pose, robot_fix, unique_landmarks},
-    frame_analysis::{StageTimes, analyse_frame, frame_camera},
-    frame_context::FrameContext,
     guided::recognise_guided,
     snapshot::{LandmarkInfo, MapSnapshot},
 };
@@ -226,7 +225,8 @@ fn frame(seen: &SensorReadings, camera: Intrinsics, map: &MapSnapshot) -> Option
     let (mounted, unmounted) = (analysed(Some(&extrinsics)), analysed(None));
     let wanted: Vec<LandmarkId> =
         map.landmarks.iter().filter(|(_, l)| is_shown(truth, &l.name)).map(|(id, _)| *id).collect();
-    let fix = landmark_observations(&mounted, map).and_then(|o| robot_fix(&o, Some(&extrinsics), None));
+    let fix = landmark_observations(&mounted, map)
+        .and_then(|o| robot_fix(&o, Some(&extrinsics), None, &map.poses.localise));
     let pose = fix.ok().map(|fix| {
         let error = seen.step.map_from_robot.inverse().compose(&fix.pose.pose);
         [error.x_m.hypot(error.y_m), error.theta_rad.abs()]

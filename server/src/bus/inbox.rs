@@ -4,13 +4,13 @@
 use super::{BusError, Outbox, Receivers, caught};
 use crate::fleet::Duty;
 use engine::{
-    intake::FrameKind,
+    intake::{FrameKind, refusal_unread},
     panics::Edge,
     slots::SlotKey,
     workers::{Publish, failed},
 };
 use protos::{Key, Keys, Name, named_map, prost::bytes::Bytes, v1};
-use std::{sync::Arc, time::Instant};
+use std::{cell::LazyCell, sync::Arc, time::Instant};
 use zenoh::{
     Session,
     pubsub::Subscriber,
@@ -116,17 +116,13 @@ fn frame(keys: &Keys, to: &Receivers, outbox: &Outbox, sample: &Sample) {
 /// Passes a message of a camera image to the intake. A refusal is answered.
 pub(crate) fn take_frame(to: &Receivers, outbox: &Outbox, kind: FrameKind, slot: &SlotKey, message: Bytes) {
     let _span = tracing::debug_span!("camera", robot = %slot.robot, camera = %slot.camera).entered();
-    let map = || match kind {
-        FrameKind::Image => named_map::of_frame(&message),
-        FrameKind::Quads => named_map::of_quads(&message),
-    };
-    match to.duty(&slot.robot, map) {
+    let head = LazyCell::new(|| kind.head(&message));
+    match to.duty(&slot.robot, || head.map.clone()) {
         Duty::Take => {}
         Duty::Silent => return,
         Duty::Refuse(rejection) => {
             to.intake.slots.refuse(rejection.code);
-            let answer = v1::Answer { rejection: Some((&rejection).into()), ..kind.echo(message) };
-            return refuse(to, outbox, slot, answer);
+            return refuse(to, outbox, slot, refusal_unread(&head, &rejection));
         }
     }
     if !to.admits(&slot.robot) {
@@ -135,9 +131,12 @@ pub(crate) fn take_frame(to: &Receivers, outbox: &Outbox, kind: FrameKind, slot:
     }
     let panics = to.vitals.panics();
     let follows = "it is refused as internal";
-    let received =
-        panics.catch(Edge::Message, "frame", follows, || to.intake.take(kind, slot.clone(), message.clone()));
-    if let Err(answer) = received.unwrap_or_else(|| Err(internal(kind, message))) {
+    let received = panics.catch(Edge::Message, "frame", follows, || {
+        to.intake.take(kind, slot.clone(), message.clone(), Instant::now())
+    });
+    // The answer to a frame on which the intake panicked.
+    let internal = || Err(Box::new(refusal_unread(&head, &failed())));
+    if let Err(answer) = received.unwrap_or_else(internal) {
         refuse(to, outbox, slot, *answer);
     }
 }
@@ -149,11 +148,6 @@ fn refuse(to: &Receivers, outbox: &Outbox, slot: &SlotKey, answer: v1::Answer) {
     to.live.publish_refusal(slot, answer.clone(), Instant::now());
     // Last, so that who has the answer finds it counted.
     outbox.answer(slot, &answer);
-}
-
-/// The answer to a frame on which the intake panicked.
-fn internal(kind: FrameKind, message: Bytes) -> Box<v1::Answer> {
-    Box::new(v1::Answer { rejection: Some((&failed()).into()), ..kind.echo(message) })
 }
 
 fn bytes(sample: &Sample) -> Bytes {

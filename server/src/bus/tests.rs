@@ -7,6 +7,7 @@ use super::*;
 use crate::config::RawConfig;
 use client::{Capture, Delivery, RobotClient, RobotOptions};
 use engine::{
+    Observers,
     intake::Intake,
     scene::{self, Scene},
     snapshot::MapSnapshot,
@@ -21,15 +22,16 @@ const WAIT: Duration = Duration::from_secs(20);
 struct Running {
     bus: Bus,
     engine: Engine,
+    observers: Observers,
     workers: Workers,
 }
 
-async fn running(engine: Engine, workers: usize) -> Running {
+async fn running(engine: (Engine, Observers), workers: usize) -> Running {
     running_with(engine, workers, None).await
 }
 
 async fn running_with(
-    engine: Engine,
+    (engine, observers): (Engine, Observers),
     workers: usize,
     certificates: Option<Arc<CertificateRegistry>>,
 ) -> Running {
@@ -46,7 +48,7 @@ async fn running_with(
     let to = Receivers {
         intake,
         motion: engine.motion.clone(),
-        live: engine.live.clone(),
+        live: observers.live.clone(),
         gazes: Arc::default(),
         vitals: engine.vitals.clone(),
         certificates,
@@ -55,7 +57,7 @@ async fn running_with(
     };
     let bus = Bus::open(&config, to, Sockets::take(&config).await.unwrap(), None).await.unwrap();
     let workers = Workers::start(&engine, workers, &Arc::new(bus.outbox().clone())).unwrap();
-    Running { bus, engine, workers }
+    Running { bus, engine, observers, workers }
 }
 
 impl Running {
@@ -94,7 +96,7 @@ async fn a_frame_over_the_limit_is_refused_at_once_and_counted() {
         assert!(begun.elapsed() < Duration::from_secs(5), "{:?}", begun.elapsed());
     }
     let name = Name::new("r1").unwrap();
-    let activity = running.engine.live.activity(&name, std::time::Instant::now());
+    let activity = running.observers.live.activity(&name, std::time::Instant::now());
     assert!(format!("{activity:?}").contains("too_large"), "{activity:?}");
     let within = Capture::raw(v1::ImageEncoding::Bgr8, (1280, 1024), vec![7; 3_932_160]).unwrap();
     assert_eq!(robot.recognise("front", within, WAIT).await.unwrap().status(), v1::Status::NoMatch);
@@ -204,7 +206,7 @@ async fn every_bad_frame_is_answered_and_the_server_goes_on() {
 #[tokio::test(flavor = "multi_thread")]
 async fn presence_odometry_and_map_changes_pass() {
     let running = running(scene::engine(&[Arc::new(MapSnapshot::empty("hall", 3))]), 1).await;
-    let mut events = running.engine.live.events();
+    let mut events = running.observers.live.events();
     let mut next = async |kind: &str| loop {
         let event = tokio::time::timeout(WAIT, events.recv()).await.unwrap().unwrap();
         if event.kind() == kind {

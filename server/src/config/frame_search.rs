@@ -1,6 +1,6 @@
 //! `search_frames`: when frames are searched for all landmarks of their map. In: a word. Out: the policy of the workers.
 
-use engine::search_policy::SearchPolicy;
+use engine::workers::SearchPolicy;
 use serde::{Deserialize, Serialize};
 
 /// The server is busy from so many waiting frames on, for each vision thread: a frame then waits for two others.

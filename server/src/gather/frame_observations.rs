@@ -52,7 +52,7 @@ struct PosedCamera<'a> {
 }
 
 fn posed_camera(offered: &OfferedFrame) -> Option<PosedCamera<'_>> {
-    let pose = offered.analysed.map_from_robot.as_ref()?;
+    let pose = offered.gathered.map_from_robot.as_ref()?;
     let c = &pose.covariance;
     let is_precise = (c[(0, 0)] + c[(1, 1)]).sqrt() <= POSE_SIGMA_M && c[(2, 2)].sqrt() <= POSE_SIGMA_RAD;
     Some(PosedCamera {
@@ -70,7 +70,7 @@ pub(super) fn frame_observations(offered: &OfferedFrame, params: &Params) -> Fra
         .map(|s| StoredCapture::of_robot(s.camera, s.map_from_robot, &s.extrinsics.robot_from_camera));
     let mut observed =
         FrameObservations { quads: vec![], corners_px2: vec![], capture, unusable: 0, not_on_wall: 0 };
-    for analysis in &offered.analysed.quads {
+    for analysis in &offered.gathered.quads {
         if analysis.quad.kind != QuadKind::Full || analysis.quad.side_clipped.contains(&true) {
             observed.unusable += 1;
             continue;
@@ -80,16 +80,16 @@ pub(super) fn frame_observations(offered: &OfferedFrame, params: &Params) -> Fra
             .map_or((analysis.quad.corners_px, analysis.quad.believed_covariance_px2()), |(_, s)| {
                 (s.corners_px, s.covariance_px2)
             });
-        let Ok(place) = place(&corners_px, &covariance_px2, posed.as_ref(), &offered.analysed.map) else {
+        let Ok(place) = place(&corners_px, &covariance_px2, posed.as_ref(), &offered.gathered.map) else {
             observed.not_on_wall += 1;
             continue;
         };
-        let Ok(icon) = icon(&offered.analysed.image, &corners_px, &params.icon) else {
+        let Ok(icon) = icon(&offered.gathered.image, &corners_px, &params.icon) else {
             observed.unusable += 1;
             continue;
         };
         let identity =
-            identity(analysis, recognised.map(|(id, _)| id), place.as_ref(), &offered.analysed.map);
+            identity(analysis, recognised.map(|(id, _)| id), place.as_ref(), &offered.gathered.map);
         let icon = features(icon, &params.recognise);
         observed.corners_px2.push(stated_covariance_px2(analysis, recognised.map(|(_, border)| border)));
         observed.quads.push(QuadObservation { corners_px, icon, place, identity });

@@ -4,8 +4,9 @@
 use crate::store::gatherings::GatheringRow;
 use arc_swap::ArcSwap;
 use engine::{
-    frame_tap::{AnalysedFrame, FrameTap},
+    frame_tap::GatheredFrame,
     slots::SlotKey,
+    workers::{AnsweredFrame, FrameObserver},
 };
 use map::tracks::{TrackOutcome, ViewTracker};
 use protos::CheckedFrame;
@@ -116,7 +117,7 @@ pub struct OfferedFrame {
     pub(super) gathering: Arc<ActiveGathering>,
     pub(super) camera: String,
     pub(super) frame: CheckedFrame,
-    pub(super) analysed: AnalysedFrame,
+    pub(super) gathered: GatheredFrame,
 }
 
 /// The tap that workers hold.
@@ -132,21 +133,32 @@ pub fn gathering_tap() -> (GatheringTap, Receiver<OfferedFrame>) {
     (GatheringTap { active: Arc::default(), frames }, received)
 }
 
-impl FrameTap for GatheringTap {
-    fn is_wanted(&self, key: &SlotKey) -> bool {
+impl FrameObserver for GatheringTap {
+    fn gathers(&self, key: &SlotKey) -> bool {
         self.active.load().contains_key(key.robot.as_str())
     }
 
-    fn offer(&self, key: &SlotKey, frame: &CheckedFrame, analysed: AnalysedFrame) {
+    fn answered(&self, answered: &AnsweredFrame<'_>) {
+        if self.gathers(answered.key)
+            && let Some((frame, gathered)) = GatheredFrame::of(answered)
+        {
+            self.offer(answered.key, frame, gathered);
+        }
+    }
+}
+
+impl GatheringTap {
+    /// Takes a frame of a robot that gathers, or drops it.
+    pub(super) fn offer(&self, key: &SlotKey, frame: CheckedFrame, gathered: GatheredFrame) {
         let active = self.active.load();
         let Some(gathering) = active.get(key.robot.as_str()) else { return };
         lock(&gathering.counts).frames += 1;
-        if analysed.map.name != gathering.map {
+        if gathered.map.name != gathering.map {
             lock(&gathering.counts).other_map += 1;
             return;
         }
         let camera = key.camera.to_string();
-        let offered = OfferedFrame { gathering: gathering.clone(), camera, frame: frame.clone(), analysed };
+        let offered = OfferedFrame { gathering: gathering.clone(), camera, frame, gathered };
         if let Err(TrySendError::Full(offered)) = self.frames.try_send(offered) {
             lock(&offered.gathering.counts).dropped += 1;
         }

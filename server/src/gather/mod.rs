@@ -308,7 +308,7 @@ fn new_views(offered: &OfferedFrame, params: &Params) -> Vec<(StoredTrack, NewVi
             covariance_px2: *corners_px2,
             found_by: FoundBy::Edges,
         };
-        let Some((crop, border)) = view_of(track, &offered.analysed.image, detected, params) else {
+        let Some((crop, border)) = view_of(track, &offered.gathered.image, detected, params) else {
             lock(&gathering.counts).appearance_mismatch += 1;
             continue;
         };
@@ -338,7 +338,7 @@ fn view_of(
 }
 
 fn new_view(offered: &OfferedFrame, crop: QuadCrop, capture: Option<&StoredCapture>) -> Option<NewView> {
-    let (frame, grey) = (&offered.frame, &offered.analysed.image);
+    let (frame, grey) = (&offered.frame, &offered.gathered.image);
     // Only whole images are offered.
     let Pixels::Image(sent) = &frame.pixels else { return None };
     let (image, image_kind) = match sent.encoding {

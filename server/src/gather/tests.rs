@@ -4,10 +4,11 @@ use crate::{
     store::{maps, robots},
 };
 use engine::{
-    frame_tap::{AnalysedFrame, FrameTap as _},
+    frame_tap::GatheredFrame,
     scene::{MAP, Scene},
     slots::SlotKey,
     snapshot::MapSnapshot,
+    workers::FrameObserver as _,
 };
 use map::pose2::{Pose2, Pose2Covariance};
 use nalgebra::Matrix3;
@@ -34,7 +35,7 @@ fn key(robot: &str) -> SlotKey {
 }
 
 /// Raw grey frames of a robot at rest in front of a poster.
-fn offered(count: u64) -> Vec<(CheckedFrame, AnalysedFrame)> {
+fn offered(count: u64) -> Vec<(CheckedFrame, GatheredFrame)> {
     let mut scene = Scene::new();
     let (_, readings) = scene.stops(1, 1).remove(0);
     let image = &readings.frame.image;
@@ -65,7 +66,7 @@ fn offered(count: u64) -> Vec<(CheckedFrame, AnalysedFrame)> {
                 map: None,
             };
             let (quads, map) = (analysis.quads.clone(), map.clone());
-            (frame, AnalysedFrame { image: image.clone(), quads, map, map_from_robot })
+            (frame, GatheredFrame { image: image.clone(), quads, map, map_from_robot })
         })
         .collect()
 }
@@ -77,13 +78,13 @@ async fn a_full_queue_drops_and_counts_and_nobody_waits() {
     let (tap, frames) = gathering_tap();
     let gatherer = Arc::new(Gatherer { store, params: Arc::default(), active: tap.active.clone() });
     let id = gatherer.begin(MAP, new()).await.unwrap().id;
-    for (frame, analysed) in offered(QUEUE as u64 + 3) {
-        tap.offer(&key("r1"), &frame, analysed);
+    for (frame, gathered) in offered(QUEUE as u64 + 3) {
+        tap.offer(&key("r1"), frame, gathered);
     }
-    let (frame, analysed) = offered(1).remove(0);
-    let other = AnalysedFrame { map: Arc::new(MapSnapshot::empty("cellar", 1)), ..analysed };
-    tap.offer(&key("r1"), &frame, other);
-    assert!(!tap.is_wanted(&key("r2")), "it does not gather");
+    let (frame, gathered) = offered(1).remove(0);
+    let other = GatheredFrame { map: Arc::new(MapSnapshot::empty("cellar", 1)), ..gathered };
+    tap.offer(&key("r1"), frame, other);
+    assert!(!tap.gathers(&key("r2")), "it does not gather");
     let counts = gatherer.counts(id).unwrap();
     assert_eq!((counts.frames, counts.dropped, counts.other_map), (QUEUE as u64 + 4, 3, 1));
     // Frames in the queue are handled; the same picture repeated is one view.
@@ -110,8 +111,8 @@ async fn a_restart_goes_on_where_it_stopped() {
     let (first_tap, frames) = gathering_tap();
     let (gatherer, task) = Gatherer::start(first, &config(dir.path()), &first_tap, frames).await.unwrap();
     let id = gatherer.begin(MAP, new()).await.unwrap().id;
-    for (frame, analysed) in offered(QUEUE as u64) {
-        first_tap.offer(&key("r1"), &frame, analysed);
+    for (frame, gathered) in offered(QUEUE as u64) {
+        first_tap.offer(&key("r1"), frame, gathered);
     }
     drop(first_tap);
     task.await.unwrap();

@@ -93,6 +93,7 @@ use crate::{
 use authorise::Asker;
 use axum::http::StatusCode;
 use engine::{
+    Observers,
     frame_times::FrameTimes,
     intake::FrameJob,
     kept_frames::KeptFrames,
@@ -197,7 +198,7 @@ impl App {
         config: Arc<Config>,
         store: Catalogue,
         services: Services,
-        engine: &Engine,
+        (engine, observers): (&Engine, &Observers),
         stopping: watch::Receiver<bool>,
     ) -> Self {
         let Services { jobs, gatherer, ros2, publisher, sessions, .. } = services;
@@ -207,9 +208,9 @@ impl App {
         let upload_wait = Duration::from_secs(config.limits.upload_wait_s);
         let uploads = upload_places::UploadPlaces::new(config.limits.uploads, upload_wait);
         let rates = request_rates::RequestRates::new(&config.limits);
-        let (live, motion) = (engine.live.clone(), engine.motion.clone());
-        let (slots, frame_times) = (engine.slots.clone(), engine.times.clone());
-        let (searches, kept_frames) = (engine.relocalisers.clone(), engine.kept_frames.clone());
+        let Observers { live, times: frame_times, kept_frames } = observers.clone();
+        let (motion, slots) = (engine.motion.clone(), engine.slots.clone());
+        let searches = engine.relocalisers.clone();
         Self {
             config,
             store,

@@ -13,7 +13,7 @@ use axum::{
     Json,
     extract::{DefaultBodyLimit, Request, State},
 };
-use engine::{frame_answer::answer_to_photograph, picture};
+use engine::{answer::answer_to_photograph, picture};
 use protos::{
     api::{PhotographForm, Problem},
     v1,

@@ -53,7 +53,7 @@ async fn tried(
     let mut answered = Vec::with_capacity(frames.len());
     for kept in frames {
         let (frame, versions) = (kept.clone(), versions.clone());
-        let work = move |_: &_| replay(&frame, [&*versions[0], &*versions[1]], limits);
+        let work = move |_: &_| replay(&frame, [&versions[0], &versions[1]], limits);
         // It was decoded once: it is again.
         answered.push((kept, app.clone().on_vision_thread(work).await??));
     }

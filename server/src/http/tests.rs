@@ -67,8 +67,9 @@ impl Service {
         let told = (store.vitals().panics().clone(), store.events().clone(), store.disk().clone());
         let (backups, _) = crate::backup::Backups::start(&config, told, stopping.clone());
         let hall = Arc::new(MapSnapshot::empty("hall", 1));
-        let engine =
-            Engine { vitals: store.vitals().clone(), frame_tap: Arc::new(tap), ..scene::engine(&[hall]) };
+        let (mut engine, observers) = scene::engine(&[hall]);
+        engine.vitals = store.vitals().clone();
+        engine.observers.push(Arc::new(tap));
         let enrolment = {
             let tls = RawTls { enabled: true, ..RawTls::default() };
             let settings = Config::try_from(RawConfig { tls, ..RawConfig::default() }).unwrap();
@@ -99,7 +100,7 @@ impl Service {
                 backups,
                 enrolment: Some(enrolment),
             },
-            &engine,
+            (&engine, &observers),
             stopping,
         );
         let secret = Secret::random().unwrap();

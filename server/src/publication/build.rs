@@ -74,6 +74,7 @@ pub(super) async fn snapshot(
         pending: Pending { visibility: visibility_pending, look_alikes: look_alikes_pending },
         distance: head.distance,
         params: params.clone(),
+        poses: Arc::default(),
     }))
 }
 

@@ -31,7 +31,7 @@ test("every gate of the wire has words", () => {
 });
 
 test("every reason for no position has words", () => {
-  const fixes = readFileSync("../engine/src/fixes.rs", "utf8");
+  const fixes = readFileSync("../engine/src/frame/fixes.rs", "utf8");
   const codes = [...fixes.matchAll(/=> "([a-z_]+)"/g)].map((found) => found[1] ?? "");
   expect(codes.length).toBeGreaterThan(8);
   for (const code of codes) expect(poseGateText(code), code).not.toBe(code.replaceAll("_", " "));

@@ -3,7 +3,7 @@
 
 use super::scenes::{Scenes, number};
 use engine::{
-    frame_context::FrameContext,
+    analysis::FrameContext,
     guided::{GuidedResult, recognise_guided},
     snapshot::{LandmarkInfo, MapSnapshot},
 };

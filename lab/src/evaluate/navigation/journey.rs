@@ -9,8 +9,7 @@ use super::{
 };
 use cli::simulated_errors::SimulatedRobotErrors;
 use engine::{
-    frame_analysis::{StageTimes, analyse_frame, frame_camera},
-    frame_context::FrameContext,
+    analysis::{FrameContext, StageTimes, analyse_frame, frame_camera},
     guided::{GuidedResult, recognise_guided},
     landmark_checks::{LandmarkChecks, evaluate_frame},
     live::LiveHub,

@@ -3,7 +3,7 @@
 use super::world::CameraTruth;
 use anyhow::Context as _;
 use cli::clock::Clock;
-use engine::{decode::ImageLimits, frame_answer::analyse_photograph, picture, snapshot::MapSnapshot};
+use engine::{answer::analyse_photograph, decode::ImageLimits, picture, snapshot::MapSnapshot};
 use protos::v1;
 use std::path::Path;
 use vision::{

@@ -21,7 +21,7 @@ fn said(answer: &v1::Answer) -> (Vec<String>, Option<v1::Pose2>) {
 async fn quads_found_on_board_are_answered_as_the_frame_they_are_of() {
     let mut scene = Scene::new();
     let engine = scene::engine(&[scene.taught()]);
-    engine.snapshots.set_robot("r2", Some(scene::MAP));
+    engine.0.snapshots.set_robot("r2", Some(scene::MAP));
     let running = running(engine, 1).await;
     let [sees, detects] = [running.robot("r1").await, running.robot("r2").await];
     let mut poses = detects.poses();
@@ -51,7 +51,7 @@ async fn quads_found_on_board_are_answered_as_the_frame_they_are_of() {
     }
     assert!(named >= 4 && posed >= 2, "{named} of 6 named, {posed} poses");
     let r2 = protos::Name::new("r2").unwrap();
-    let shown = running.engine.live.frame(&r2, &protos::Name::new("front").unwrap()).unwrap();
+    let shown = running.observers.live.frame(&r2, &protos::Name::new("front").unwrap()).unwrap();
     assert_eq!(shown.for_browsers().unwrap().0, "image/png");
     running.stop().await;
 }
