@@ -30,7 +30,7 @@ use engine::{
     Observers,
     answer_records::{AnswerRecord, answer_records},
     decode::ImageLimits,
-    findings::{FindingSender, LandmarkFinding, findings},
+    findings::{LandmarkFinding, findings},
     intake::Intake,
     live::LiveHub,
     motion::MotionTracker,
@@ -67,12 +67,9 @@ impl Server {
         let (snapshots, vitals) = (store.snapshots().clone(), store.vitals().clone());
         let (tap, offered) = gather::gathering_tap();
         let teaching = Teaching::start(&config, &store, (&tap, offered), &stopping).await?;
-        let (findings, found) = findings();
         let observers = Observers::new(config.limits.replay_bytes);
-        let (engine, recorded) =
-            engine(&config, (snapshots.clone(), vitals.clone()), &observers, (findings, tap));
-        resume_mappings(&engine, &config, &snapshots);
-        let recorders = recorders(&config, &store, (found, recorded, &observers.live), &stopping);
+        let (engine, records) = engine(&config, (snapshots.clone(), vitals.clone()), &observers, tap);
+        let recorders = recorders(&config, &store, (records, &observers.live), &stopping);
         let disk = watch_disk(&store, &local_token, &engine, &stopping);
         let checks = checks(&store, &stopping);
         // Whoever owns the router decides who is a robot.
@@ -99,23 +96,10 @@ impl Server {
         let app =
             Arc::new(App::new(config.clone(), store, services, (&engine, &observers), stopping.clone()));
         let serving = Serving::start(listeners, &app, probed, &stopping);
-        let zenoh_endpoint = bus.endpoint().to_owned();
-        let tasks = Tasks {
-            workers,
-            bus,
-            serving,
-            jobs: teaching.jobs_task,
-            recorders,
-            gather: teaching.gather_task,
-            checks,
-            disk,
-            backups: backups_task,
-            writer,
-        };
         Ok(RunningServer {
             http_addr,
             metrics_addr,
-            zenoh_endpoint,
+            zenoh_endpoint: bus.endpoint().to_owned(),
             server,
             snapshots,
             live: observers.live,
@@ -126,7 +110,18 @@ impl Server {
             tls_name: tls_name(&config, http_addr),
             stop,
             vitals,
-            tasks,
+            tasks: Tasks {
+                workers,
+                bus,
+                serving,
+                jobs: teaching.jobs_task,
+                recorders,
+                gather: teaching.gather_task,
+                checks,
+                disk,
+                backups: backups_task,
+                writer,
+            },
         })
     }
 }
@@ -168,9 +163,10 @@ fn tls_name(config: &Config, http_addr: SocketAddr) -> Option<String> {
 }
 
 /// Drives that an earlier server was mapping go on.
-fn resume_mappings(engine: &Engine, config: &Config, snapshots: &Snapshots) {
+fn resume_mappings(engine: &Engine, config: &Config) {
+    let snapshots = engine.snapshots.clone();
     let is_on =
-        |map: &Name, robot: &Name| snapshots.robot_map(robot.as_str()).as_deref() == Some(map.as_str());
+        move |map: &Name, robot: &Name| snapshots.robot_map(robot.as_str()).as_deref() == Some(map.as_str());
     engine.motion.mappings().count_in(engine.vitals.panics().clone());
     engine.motion.mappings().resume_in(config.data.join("mapping"), is_on);
 }
@@ -265,7 +261,7 @@ impl Teaching {
 fn recorders(
     config: &Config,
     store: &Catalogue,
-    (found, recorded, live): (Receiver<LandmarkFinding>, Receiver<AnswerRecord>, &Arc<LiveHub>),
+    ((found, recorded), live): (Records, &Arc<LiveHub>),
     stopping: &watch::Receiver<bool>,
 ) -> [JoinHandle<()>; 3] {
     let pulse = store.vitals().begin("the task that stores findings");
@@ -283,13 +279,17 @@ fn told(store: &Catalogue) -> (Arc<Panics>, Arc<EventLog>, Arc<DiskGuard>) {
     (store.vitals().panics().clone(), store.events().clone(), store.disk().clone())
 }
 
-/// Everything between frames and answers, for one set of settings; and the answers that are to be stored.
+/// What is to be stored: findings of robots, and answers.
+type Records = (Receiver<LandmarkFinding>, Receiver<AnswerRecord>);
+
+/// Everything between frames and answers, for one set of settings, and what is to be stored of it.
 fn engine(
     config: &Config,
     (snapshots, vitals): (Arc<Snapshots>, Arc<Vitals>),
     Observers { live, times, kept_frames }: &Observers,
-    (findings, tap): (FindingSender, GatheringTap),
-) -> (Engine, Receiver<AnswerRecord>) {
+    tap: GatheringTap,
+) -> (Engine, Records) {
+    let (findings, found) = findings();
     let (records, recorded) = answer_records(kept_frames.clone());
     let engine = Engine {
         slots: Arc::new(Slots::new(config.limits.cameras, config.limits.waiting_frame_bytes)),
@@ -301,7 +301,8 @@ fn engine(
         observers: vec![Arc::new(records), live.clone(), times.clone(), Arc::new(findings), Arc::new(tap)],
         search: config.search_frames.policy(config.workers),
     };
-    (engine, recorded)
+    resume_mappings(&engine, config);
+    (engine, (found, recorded))
 }
 
 /// What each robot may send.

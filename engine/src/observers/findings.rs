@@ -59,7 +59,9 @@ pub fn findings() -> (FindingSender, Receiver<LandmarkFinding>) {
 
 impl FrameObserver for FindingSender {
     fn health_changed(&self, map: &MapSnapshot, changes: &[HealthChange]) {
-        changes.iter().for_each(|change| self.send(LandmarkFinding::new(map, change)));
+        for change in changes {
+            self.send(LandmarkFinding::new(map, change));
+        }
     }
 }
 

@@ -110,13 +110,13 @@ fn frame(keys: &Keys, to: &Receivers, outbox: &Outbox, sample: &Sample) {
             return to.intake.slots.refuse(protos::Code::BadName);
         }
     };
-    take_frame(to, outbox, kind, &SlotKey { robot, camera }, bytes(sample));
+    take_frame(to, outbox, kind, &SlotKey { robot, camera }, &bytes(sample));
 }
 
 /// Passes a message of a camera image to the intake. A refusal is answered.
-pub(crate) fn take_frame(to: &Receivers, outbox: &Outbox, kind: FrameKind, slot: &SlotKey, message: Bytes) {
+pub(crate) fn take_frame(to: &Receivers, outbox: &Outbox, kind: FrameKind, slot: &SlotKey, message: &Bytes) {
     let _span = tracing::debug_span!("camera", robot = %slot.robot, camera = %slot.camera).entered();
-    let head = LazyCell::new(|| kind.head(&message));
+    let head = LazyCell::new(|| kind.head(message));
     match to.duty(&slot.robot, || head.map.clone()) {
         Duty::Take => {}
         Duty::Silent => return,

@@ -118,7 +118,7 @@ impl RobotThread {
                     }
                     let slot = SlotKey { robot: self.robot.clone(), camera };
                     let kind = FrameKind::Image;
-                    take_frame(&self.to, &self.outbox, kind, &slot, frame.encode_to_vec().into());
+                    take_frame(&self.to, &self.outbox, kind, &slot, &frame.encode_to_vec().into());
                 }
                 RobotMessage::Odometry(odometry) => {
                     let message = odometry.encode_to_vec().into();

@@ -260,7 +260,7 @@ export interface components {
             /** Name of the token, `local` for that of the server's machine, `server` for what the server does by itself. Of a job: who asked for it. */
             author: string;
             /** The job, if one did it. */ job?: number | null;
-            /** Method and path of the request, as `PATCH /maps/{map}/landmarks/{landmark}`; of a job its kind; `upgrade` for the state in which an older server left the map, `outside` for what another program wrote into the database. */
+            /** Method and path of the request, as `PATCH /maps/{map}/landmarks/{landmark}`; of a job its kind; `outside` for what another program wrote into the database. */
             operation: string;
             /** The reason that the client gave (header `Waymark-Why`). */ why?: string | null;
             /** What changed. */ summary: components["schemas"]["ChangeSummary"];
@@ -451,7 +451,7 @@ export interface components {
             /** What to do: one sentence for a person. */ advice: string;
             look_alike?: components["schemas"]["LookAlikeBody"] | null;
         };
-        /** What robots found of a landmark that is not where the map says. Stored as JSON: the other words are of earlier builds. */
+        /** What robots found of a landmark that is not where the map says. Stored as JSON. */
         FindingBody: {
             /** Where it is observed. */ observed_place: components["schemas"]["ObservedPlaceBody"];
             /** Distance from its place. */ offset_m: number;
@@ -587,8 +587,7 @@ export interface components {
             /** What came of it. */ result?: unknown;
             /** Name of the token that asked for it; `server` for what the server does by itself. */ by?: string;
             /** When it was asked for, ms since the Unix epoch. */ created_ms?: number;
-            /** When it was begun last; absent while it waits, and for jobs of earlier builds. */
-            started_ms?: number | null;
+            /** When it was begun last; absent while it waits. */ started_ms?: number | null;
             /** When it ended. */ ended_ms?: number | null;
         };
         /** Where a job stands. */ JobState: "queued" | "running" | "done" | "failed" | "cancelled";

@@ -48,8 +48,6 @@ const OPERATIONS: Record<string, string> = {
   "POST /robots/{robot}/certificates": "Certificate issued",
   "DELETE /robots/{robot}/certificates/{serial}": "Certificate revoked",
   learn: "Learnt",
-  points: "Points learnt anew",
-  upgrade: "As an older server left it",
   outside: "Changed by another program",
   "POST /tokens": "Token created",
   "DELETE /tokens/{token}": "Token revoked",
