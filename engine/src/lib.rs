@@ -11,8 +11,8 @@ mod observers;
 mod supervision;
 
 pub use frame::{
-    ambiguous_observations, analysis, answer, decode, fixes, guided, intake, landmark_checks, relocalise,
-    slots, workers,
+    ambiguous_observations, analysis, answer, context, decode, fixes, guided, intake, landmark_checks,
+    relocalise, slots, workers,
 };
 pub use observers::{
     Observers, answer_records, cameras, findings, frame_tap, frame_times, kept_frames, live, prior_check,

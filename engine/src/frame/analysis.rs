@@ -2,12 +2,13 @@
 //! quads with verdicts by the pipeline of `vision`, landmarks that the pose names, fixes and landmark checks.
 
 use super::{
+    context::FrameContext,
     guided::{GuidedObservation, GuidedResult, recognise_guided},
     landmark_checks::{FrameEvaluation, evaluate_expected_only, evaluate_frame},
     relocalise::RelocalisationUpdate,
 };
 use crate::{motion::PriorPose, snapshot::MapSnapshot};
-use map::{extrinsics::CameraExtrinsics, pose2::Pose2Covariance};
+use map::extrinsics::CameraExtrinsics;
 use protos::{
     CheckedFrame,
     convert::{CheckedQuad, Pixels},
@@ -160,40 +161,6 @@ impl OpenedFrame<'_> {
         let (picture, map, effect) = (self.picture.clone(), self.map.clone(), self.effect);
         let (relocalisation, stages) = (None, Vec::new());
         AnalysedFrame { picture, map, effect, analysis, guided, evaluation, relocalisation, stages }
-    }
-}
-
-/// What the evaluation of a frame needs: its quads, its map, its camera and its robot's own prior pose.
-#[derive(Debug, Clone, Copy)]
-pub struct FrameContext<'a> {
-    /// Its quads with verdicts.
-    pub analysis: &'a FrameAnalysis,
-    /// The map it was compared with.
-    pub map: &'a MapSnapshot,
-    /// `robot_from_camera`, where it is known.
-    pub extrinsics: Option<&'a CameraExtrinsics>,
-    /// Intrinsics of the camera, where they are known.
-    pub camera: Option<&'a Intrinsics>,
-    /// Width and height of the image, px.
-    pub image_px: [f64; 2],
-    /// Whether the whole image is there. If not, a landmark that was not found is not missing.
-    pub is_whole: bool,
-    /// `map_from_robot` as the robot states it.
-    pub prior: Option<&'a Pose2Covariance>,
-}
-
-impl<'a> FrameContext<'a> {
-    /// A checked frame with what was found in it.
-    pub fn new(frame: &'a CheckedFrame, analysis: &'a FrameAnalysis, map: &'a MapSnapshot) -> Self {
-        Self {
-            analysis,
-            map,
-            extrinsics: frame.mounting.as_ref(),
-            camera: frame.intrinsics.as_ref(),
-            image_px: [f64::from(frame.width_px), f64::from(frame.height_px)],
-            is_whole: frame.is_whole(),
-            prior: frame.prior.as_ref(),
-        }
     }
 }
 

@@ -6,7 +6,7 @@
 
 use super::{
     ambiguous_observations::{LookAlikeMatch, are_placed_and_trusted, match_look_alikes},
-    analysis::FrameContext,
+    context::FrameContext,
 };
 use crate::snapshot::MapSnapshot;
 use map::{

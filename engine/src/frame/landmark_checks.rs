@@ -6,7 +6,7 @@
 //! landmarks that the prior pose names.
 
 use super::{
-    analysis::FrameContext,
+    context::FrameContext,
     fixes::{self, NoFix, PoseRefusal, pose_refusal},
     guided::GuidedResult,
 };

@@ -4,6 +4,7 @@
 pub mod ambiguous_observations;
 pub mod analysis;
 pub mod answer;
+pub mod context;
 pub mod decode;
 pub mod fixes;
 pub mod guided;

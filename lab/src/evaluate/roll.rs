@@ -7,7 +7,8 @@ use super::{
     statistics::{median, quantile},
 };
 use engine::{
-    analysis::{FrameContext, StageTimes, analyse_frame, frame_camera},
+    analysis::{StageTimes, analyse_frame, frame_camera},
+    context::FrameContext,
     fixes::{landmark_observations, photograph_pose, robot_fix, unique_landmarks},
     guided::recognise_guided,
     snapshot::{LandmarkInfo, MapSnapshot},

@@ -3,7 +3,6 @@
 
 use super::{
     encryption::{self, Spoken},
-    head_timer::HeadTimer,
     peer::Peer,
 };
 use crate::{
@@ -13,7 +12,7 @@ use crate::{
 use axum::{Router, body::Body, extract::Request, response::Response};
 use hyper::{body::Incoming, server::conn::http1, service::service_fn};
 use hyper_util::{
-    rt::TokioIo,
+    rt::{TokioIo, TokioTimer},
     server::graceful::{GracefulShutdown, Watcher},
 };
 use std::{convert::Infallible, io, net::SocketAddr, pin::Pin, time::Duration};
@@ -127,7 +126,7 @@ where
             answer(request)
         });
         let mut http = self.http.clone();
-        http.timer(HeadTimer::default());
+        http.timer(TokioTimer::new());
         let connection = http.serve_connection(TokioIo::new(stream), answer);
         watcher.watch(connection).await.map_err(|error| error.to_string())
     }

@@ -21,7 +21,6 @@ mod examples;
 mod extract;
 mod gathering;
 mod guard;
-mod head_timer;
 mod health;
 mod drafts;
 mod history;

@@ -3,7 +3,7 @@
 
 use super::scenes::{Scenes, number};
 use engine::{
-    analysis::FrameContext,
+    context::FrameContext,
     guided::{GuidedResult, recognise_guided},
     snapshot::{LandmarkInfo, MapSnapshot},
 };

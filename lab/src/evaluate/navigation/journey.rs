@@ -9,7 +9,8 @@ use super::{
 };
 use cli::simulated_errors::SimulatedRobotErrors;
 use engine::{
-    analysis::{FrameContext, StageTimes, analyse_frame, frame_camera},
+    analysis::{StageTimes, analyse_frame, frame_camera},
+    context::FrameContext,
     guided::{GuidedResult, recognise_guided},
     landmark_checks::{LandmarkChecks, evaluate_frame},
     live::LiveHub,

@@ -2,7 +2,7 @@
 
 use super::super::*;
 use crate::{
-    frame::{analysis::FrameContext, landmark_checks::evaluate_frame},
+    frame::{context::FrameContext, landmark_checks::evaluate_frame},
     scene::Scene,
 };
 use map::{
