@@ -137,6 +137,12 @@ pub(crate) fn program() -> &'static Path {
         let mut cargo = Command::new(env!("CARGO"));
         cargo.args(["build", "--quiet", "--workspace", "--bin", "waymark", "--test", "wedged_router"]);
         cargo.current_dir(env!("CARGO_MANIFEST_DIR"));
+        // `cargo test` sets these for its tests. Build scripts that read them would run again, and half of the crates with them.
+        for (name, _) in std::env::vars()
+            .filter(|(name, _)| name.starts_with("CARGO_PKG_") || name.starts_with("CARGO_MANIFEST_"))
+        {
+            cargo.env_remove(name);
+        }
         if profile.ends_with("release") {
             cargo.arg("--release");
         }
