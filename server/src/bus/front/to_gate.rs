@@ -33,10 +33,10 @@ const LONGEST: Duration = Duration::from_secs(10);
 const WINDOW: u32 = 256 << 10;
 /// What is on the way to the gate at most, in bytes of one robot: less than a socket of Linux takes by default.
 const ON_THE_WAY: u64 = 64 << 10;
-/// Room for what is on the way from the gate, in bytes of all robots. The system may give less.
+/// Room for what is on the way from the gate, in bytes of all robots, if the system gives it.
 const RECEIVED: usize = 4 << 20;
 
-/// Sends again what is lost, and no slower.
+/// A window that losses do not shrink: on loopback a loss means a full socket, not a slow network.
 #[derive(Debug, Clone)]
 struct FixedWindow;
 
@@ -97,7 +97,8 @@ impl ToGate {
         gate: watch::Receiver<Option<SocketAddr>>,
     ) -> io::Result<Self> {
         let socket = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0))?;
-        set_socket_recv_buffer_size(&socket, RECEIVED)?;
+        // With less room than asked for, more is sent twice.
+        drop(set_socket_recv_buffer_size(&socket, RECEIVED));
         Ok(Self {
             endpoint: Endpoint::new(EndpointConfig::default(), None, socket, Arc::new(TokioRuntime))?,
             link,
