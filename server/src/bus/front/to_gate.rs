@@ -97,8 +97,10 @@ impl ToGate {
         gate: watch::Receiver<Option<SocketAddr>>,
     ) -> io::Result<Self> {
         let socket = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0))?;
-        // With less room than asked for, more is sent twice.
-        drop(set_socket_recv_buffer_size(&socket, RECEIVED));
+        if let Err(error) = set_socket_recv_buffer_size(&socket, RECEIVED) {
+            // More is sent twice.
+            tracing::debug!(%error, "socket_room_refused");
+        }
         Ok(Self {
             endpoint: Endpoint::new(EndpointConfig::default(), None, socket, Arc::new(TokioRuntime))?,
             link,
