@@ -83,7 +83,7 @@ test("what is refused of a robot is said, with what to do", async () => {
   await page.route(/\/api\/v1\/robots(\?.*)?$/, (route) => route.fulfill({ json: { items: [refused] } }));
   await page.goto(`${world.origin}/robots/${robot.name}`);
   await page.getByRole("alert").getByText("Laser scans: the last 1,200 were refused. Correct the field.").waitFor();
-  await page.getByRole("row", { name: /Laser scans 0 1,200 out_of_range 1,200 times.*bearing_step_rad: the fan is more than a turn Correct the field\./ }).waitFor();
+  await page.getByRole("row", { name: /Laser scans out_of_range 1,200 times.*bearing_step_rad: the fan is more than a turn Correct the field\. 0 1,200/ }).waitFor();
   await page.getByRole("row", { name: "Frames 1,500 0" }).waitFor();
   await check(page, "robot-refused");
   await page.goto(`${world.origin}/robots`);
