@@ -98,7 +98,8 @@ async function comesOf(page, { key, is_tab }) {
   await page.locator(`[data-click="${key.replaceAll('"', '\\"')}"]`).click();
   const until = Date.now() + LATEST_MS;
   while (!happened && Date.now() < until) {
-    happened ||= await state(page, is_tab).then((now) => now !== before, () => true);
+    // `||=` would write over what an event has noted meanwhile.
+    if (await state(page, is_tab).then((now) => now !== before, () => true)) happened = true;
     if (!happened) await page.waitForTimeout(100);
   }
   page.off("request", sent);
