@@ -61,3 +61,4 @@ mod traces;
 mod two_programs;
 mod underlay;
 mod visibility_settings;
+mod wall_files;

@@ -17,8 +17,13 @@ use super::{
 use crate::scan_log::ReadError;
 use encoding::decoded;
 use map::check::OutOfRange;
-use std::{io::Read as _, path::Path};
+use std::{
+    io::{Read as _, Write as _},
+    path::Path,
+};
 
+/// Extensions of occupancy grids, which are a picture and a text beside it.
+const GRIDS: [&str; 9] = ["yaml", "yml", "pgm", "png", "bmp", "jpg", "jpeg", "webp", "ppm"];
 /// Sides of a cell of a written grid, metres.
 const RESOLUTION_M: std::ops::RangeInclusive<f64> = 0.005..=1.0;
 
@@ -34,6 +39,9 @@ pub enum WallFileError {
     /// The picture of an occupancy grid, without what says where it lies.
     #[error("this is the picture; give its .yaml (none of the same name lies beside it)")]
     OnlyPicture,
+    /// A file of an occupancy grid, where one file is read.
+    #[error("a grid is two files: lay it beneath the map as its floor plan, and have its walls found there")]
+    TwoFiles,
     /// A map file.
     #[error(transparent)]
     MapFile(#[from] MapFileError),
@@ -203,6 +211,22 @@ pub fn import(path: &Path, options: &ImportOptions) -> Result<Imported, WallFile
         wall.segment().map_err(|source| WallFileError::Segment { index, source })?;
     }
     Ok(imported)
+}
+
+/// Reads the walls of one file by its bytes, as [`import`] does. `kind` is the extension of its name. A grid is two files:
+/// [`WallFileError::TwoFiles`].
+pub fn import_bytes(kind: &str, bytes: &[u8], options: &ImportOptions) -> Result<Imported, WallFileError> {
+    let kind = kind.to_lowercase();
+    if GRIDS.contains(&kind.as_str()) {
+        return Err(WallFileError::TwoFiles);
+    }
+    if let Some(advice) = other_kinds::advice(&kind) {
+        return Err(WallFileError::OtherKind(advice));
+    }
+    let known = ["json", "geojson", "svg", "svgz"].into_iter().find(|known| *known == kind);
+    let mut file = tempfile::Builder::new().suffix(&format!(".{}", known.unwrap_or("txt"))).tempfile()?;
+    file.write_all(bytes)?;
+    import(file.path(), options)
 }
 
 /// Reads the walls of a file that says everything itself, as [`import`] does.

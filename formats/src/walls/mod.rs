@@ -15,7 +15,7 @@ mod ros_grid;
 mod ros_yaml;
 mod vector_map;
 
-pub use any::{ImportOptions, Imported, WallFileError, import, read, write};
+pub use any::{ImportOptions, Imported, WallFileError, import, import_bytes, read, write};
 pub use floor_plan::PlanError;
 pub use geojson::GeoJsonError;
 pub use grid::{CellState, GridError, OccupancyGrid};

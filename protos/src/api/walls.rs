@@ -42,3 +42,30 @@ impl FromIterator<[[f64; 2]; 2]> for WallsBody {
         Self { segments: ends_m.into_iter().map(|[a, b]| WallBody::between(a, b)).collect() }
     }
 }
+
+/// A file whose walls are read, in its body.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::IntoParams))]
+#[cfg_attr(feature = "openapi", into_params(parameter_in = Query))]
+#[serde(deny_unknown_fields)]
+pub struct WallFileQuery {
+    /// Extension of its name: `geojson`, `svg`, `svgz`, `json` (a map of `waymark map build`, or GeoJSON) or `txt` (a vector
+    /// map).
+    pub kind: String,
+    /// Metres of a unit of an SVG floor plan, above 0; left out, the plan's width and height in mm, cm, in or pt count.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub metres_per_unit: Option<f64>,
+}
+
+/// What was taken of a file. Nothing is stored.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct FileWalls {
+    /// The walls, in the order of the file.
+    pub segments: Vec<WallBody>,
+    /// Their length, m.
+    pub length_m: f64,
+    /// What a person should know of how it was read.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub note: Option<String>,
+}

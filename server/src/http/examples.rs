@@ -8,6 +8,10 @@ use utoipa::openapi::{Content, OpenApi, RefOr, path::Operation};
 /// By operation, `METHOD path` below the API's root.
 const EXAMPLES: &str = include_str!("examples.json");
 
+/// Kinds of bodies.
+const KINDS: [&str; 4] =
+    ["application/json", "multipart/form-data", "application/zip", "application/octet-stream"];
+
 /// Gives every body of a request its example.
 pub(super) fn with_examples(mut document: OpenApi, root: &str) -> OpenApi {
     let mut examples: BTreeMap<String, Value> = serde_json::from_str(EXAMPLES).unwrap_or_default();
@@ -27,9 +31,7 @@ pub(super) fn with_examples(mut document: OpenApi, root: &str) -> OpenApi {
 fn request_body(operation: &mut Operation) -> Option<&mut Content> {
     let RefOr::T(body) = operation.request_body.as_mut()? else { return None };
     let mut contents = body.content.iter_mut();
-    let content = contents.find(|(kind, _)| {
-        ["application/json", "multipart/form-data", "application/zip"].contains(&kind.as_str())
-    });
+    let content = contents.find(|(kind, _)| KINDS.contains(&kind.as_str()));
     let RefOr::T(content) = content?.1 else { return None };
     Some(content)
 }

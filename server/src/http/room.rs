@@ -53,6 +53,7 @@ mod tests {
         "POST /maps/{map}/commits/{commit}/undo",
         "POST /maps/{map}/rollback",
         "POST /maps/{map}/drafts/{draft}/replay",
+        "POST /maps/{map}/walls/read",
         "POST /maps/{map}/mapping/finish",
         "PUT /maps/{map}/visibility-settings",
         "POST /maps/{map}/bulk/delete-landmarks",

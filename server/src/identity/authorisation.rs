@@ -100,6 +100,7 @@ pub(crate) const TABLE: &[Rule] = &[
     map("GET", "/maps/{map}/transform", Viewer),
     map("GET", "/maps/{map}/walls", Viewer),
     map("PUT", "/maps/{map}/walls", Teacher),
+    map("POST", "/maps/{map}/walls/read", Teacher),
     map("GET", "/maps/{map}/underlay", Viewer),
     map("PUT", "/maps/{map}/underlay", Teacher),
     map("DELETE", "/maps/{map}/underlay", Teacher),

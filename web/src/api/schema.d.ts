@@ -451,6 +451,12 @@ export interface components {
             /** What to do: one sentence for a person. */ advice: string;
             look_alike?: components["schemas"]["LookAlikeBody"] | null;
         };
+        /** What was taken of a file. Nothing is stored. */
+        FileWalls: {
+            /** The walls, in the order of the file. */ segments: components["schemas"]["WallBody"][];
+            /** Their length, m. */ length_m: number;
+            /** What a person should know of how it was read. */ note?: string | null;
+        };
         /** What robots found of a landmark that is not where the map says. Stored as JSON. */
         FindingBody: {
             /** Where it is observed. */ observed_place: components["schemas"]["ObservedPlaceBody"];
@@ -1902,6 +1908,7 @@ export interface Operations {
   "POST /maps/{map}/visible": { body: Schemas["VisibleRequest"]; answer: Schemas["VisibleResponse"] };
   "GET /maps/{map}/walls": { answer: Schemas["WallsBody"] };
   "PUT /maps/{map}/walls": { body: Schemas["WallsBody"]; answer: Schemas["WallsBody"] };
+  "POST /maps/{map}/walls/read": { query: { kind: string; metres_per_unit?: number }; answer: Schemas["FileWalls"] };
   "GET /metrics": { answer: undefined };
   "GET /readyz": { answer: Schemas["Readiness"] };
   "GET /robots": { query: { limit?: number; cursor?: string; name?: string; sort?: Schemas["ListOrder"] }; answer: Schemas["Page_Robot"] };

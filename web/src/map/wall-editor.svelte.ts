@@ -73,6 +73,12 @@ export class WallEditor {
     if (walls.length) this.#set([...this.segments, ...walls]);
   }
 
+  /** Other walls instead of all that are there. */
+  replace(walls: readonly Wall[]): void {
+    this.#set([...walls]);
+    this.from = this.hover = this.chosen = undefined;
+  }
+
   use(mode: "draw" | "choose"): void {
     this.mode = mode;
     this.from = this.hover = this.chosen = undefined;

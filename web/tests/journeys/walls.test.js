@@ -129,6 +129,51 @@ test("walls that are found in a plan are shown, and stored only when they are ta
 });
 
 for (const [size, where] of [[undefined, "desk"], [PHONE, "phone"]]) {
+  test(`walls of a file are shown over those of the map, and taken beside or instead of them, at the ${where}`, async () => {
+    const map = `imported-${where}`;
+    await api("POST", "/maps", { name: map });
+    const old = [{ a: [0, 0], b: [8, 0] }];
+    await api("PUT", `/maps/${map}/walls`, { segments: old }, { "if-match": "*" });
+    const page = await go(`/maps/${map}?view=4,0,0.03,0`, size);
+    const open = async (name, text, unit_m) => {
+      await page.getByRole("button", { name: "Walls of a file" }).click();
+      const dialog = page.getByRole("dialog");
+      await dialog.locator("input[type=file]").setInputFiles({ name, mimeType: "application/octet-stream", buffer: Buffer.from(text) });
+      if (unit_m) await dialog.getByLabel(/^Metres of one unit/).fill(unit_m);
+      await dialog.getByRole("button", { name: "Show the walls" }).click();
+      return dialog;
+    };
+    await page.getByRole("button", { name: "Trace walls" }).click();
+    const refused = await open("plan.svg", '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 8 2"><path stroke="red" d="M0 1H8"/></svg>');
+    await refused.getByText(/the plan has no scale/i).waitFor();
+    // The browser itself writes down that it was refused.
+    assert.match(page.faults.splice(0).join(), /^[^,]*422 \(Unprocessable Entity\)$/);
+    await refused.getByLabel(/^Metres of one unit/).fill("0.5");
+    await refused.getByRole("button", { name: "Show the walls" }).click();
+    await page.getByText("plan.svg has 2 walls, 8.00 m in all: they are dashed on the map.").waitFor();
+    await page.getByRole("button", { name: "Leave them out" }).click();
+    // 60 m away: all of it comes in sight.
+    const line = { type: "LineString", coordinates: [[60, 3], [60, 9], [66, 9]] };
+    await open("hall.geojson", JSON.stringify({ type: "FeatureCollection", features: [{ type: "Feature", properties: {}, geometry: line }] }));
+    await page.getByText("hall.geojson has 2 walls, 12.00 m in all: they are dashed on the map. Nothing is stored before you save.").waitFor();
+    await page.getByRole("application").scrollIntoViewIfNeeded();
+    await page.waitForTimeout(500);
+    assert.ok((await pixels(page.locator(".canvas"), [0xc2, 0x41, 0x0c])) > 20, "what the file has is drawn, and in sight");
+    await check(page, `walls-of-a-file-${where}`);
+    assert.deepEqual(await wallsOf(map), old, "nothing is stored before it is saved");
+    await page.getByRole("button", { name: "Take 2 walls" }).click();
+    await page.getByRole("button", { name: "Save the walls" }).click();
+    await page.getByText("The walls are saved: 2 drawn or moved, 0 taken away or moved.").waitFor();
+    assert.equal((await wallsOf(map)).length, 3);
+    await page.getByRole("button", { name: "Trace walls" }).click();
+    await open("list.txt", "0, 0, 2, 0\n");
+    await page.getByRole("button", { name: "Take them instead of the 3 walls of the map" }).click();
+    await page.getByRole("button", { name: "Save the walls" }).click();
+    await page.getByText("The walls are saved: 1 drawn or moved, 3 taken away or moved.").waitFor();
+    assert.deepEqual(await wallsOf(map), [{ a: [0, 0], b: [2, 0] }]);
+    assert.deepEqual(page.faults, []);
+  });
+
   test(`walls of scans are shown before they replace any, and are taken or given up, at the ${where}`, async () => {
     const map = `scanned-${where}`;
     await api("POST", "/maps", { name: map });

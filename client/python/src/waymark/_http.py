@@ -156,6 +156,7 @@ OPERATIONS: dict[str, tuple[str, str]] = {
     "gaze_ranking": ("POST", "/maps/{map}/gaze"),
     "visibility_settings": ("GET", "/maps/{map}/visibility-settings"),
     "set_visibility_settings": ("PUT", "/maps/{map}/visibility-settings"),
+    "read_wall_file": ("POST", "/maps/{map}/walls/read"),
     "set_walls": ("PUT", "/maps/{map}/walls"),
     "walls": ("GET", "/maps/{map}/walls"),
 }

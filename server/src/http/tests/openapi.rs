@@ -142,6 +142,8 @@ async fn every_body_has_an_example_and_the_server_takes_it() {
                 let (status, _, answer) =
                     service.keyed(&format!("{at}?name=new"), "z", (kind, bundle(&service).await)).await;
                 (status, serde_json::from_slice(&answer).unwrap())
+            } else if kind == "application/octet-stream" {
+                read(service.ask(request(&method, &format!("{at}?kind=txt"), "0, 0, 4, 0")).await).await
             } else {
                 assert_eq!(kind, "application/json", "{name}");
                 read(service.ask(request(&method, &at, body["example"].to_string())).await).await
@@ -274,7 +276,7 @@ fn every_operation_names_what_guard_extractors_and_store_may_answer() {
 }
 
 /// Verbs that an operation's id begins with.
-const VERBS: [&str; 28] = [
+const VERBS: [&str; 29] = [
     "accept",
     "calibrate",
     "cancel",
@@ -293,6 +295,7 @@ const VERBS: [&str; 28] = [
     "merge",
     "publish",
     "rank",
+    "read",
     "recognise",
     "replay",
     "revoke",

@@ -17,6 +17,7 @@ from waymark.api import (
     Distance,
     Draft,
     DraftDifference,
+    FileWalls,
     GazeRankingBody,
     Health,
     LiveEvent,
@@ -214,6 +215,14 @@ class AsyncMaps(AsyncBase):
     async def set_walls(self, map: str, segments: Iterable[WallBody]) -> WallsBody:
         """Replaces the walls; returns those stored."""
         return await self._send(WallsBody, "set_walls", map, json={"segments": to_json(list(segments))})
+
+    async def read_wall_file(
+        self, map: str, file: bytes, kind: str, metres_per_unit: float | None = None
+    ) -> FileWalls:
+        """The walls of a file, which are stored nowhere. `kind` is the extension of its name: `geojson`, `svg`, `svgz`,
+        `json` or `txt`. An SVG floor plan without a size needs the metres of one of its units."""
+        query = query_of({"kind": kind, "metres_per_unit": metres_per_unit})
+        return await self._send(FileWalls, "read_wall_file", map, content=file, params=query)
 
     async def walls(self, map: str) -> WallsBody:
         """The walls, as stored."""

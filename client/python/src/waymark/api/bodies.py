@@ -65,6 +65,7 @@ __all__ = [
     "EventKind",
     "ExtendedLandmark",
     "FailedGate",
+    "FileWalls",
     "FindingBody",
     "FusionMode",
     "Gate",
@@ -982,6 +983,18 @@ class FailedGate:
 
     def __str__(self) -> str:
         return f"{self.sentence} {self.advice}"
+
+
+@dataclass(frozen=True, slots=True)
+class FileWalls:
+    """What was taken of a file. Nothing is stored."""
+
+    segments: tuple[WallBody, ...]
+    """The walls, in the order of the file."""
+    length_m: float
+    """Their length, m."""
+    note: str | None = None
+    """What a person should know of how it was read."""
 
 
 @dataclass(frozen=True, slots=True)
