@@ -30,7 +30,6 @@ pub(super) struct TargetArgs {
 }
 
 impl TargetArgs {
-    /// Writes the file.
     pub(super) fn write(&self, map: &MapFile) -> anyhow::Result<()> {
         walls::write(map, &self.out, self.resolution_m).context("--out")
     }

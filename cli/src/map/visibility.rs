@@ -79,7 +79,6 @@ impl VisibilityArgs {
     }
 }
 
-/// The settings as sentences.
 pub(super) fn sentences(map: &str, settings: &VisibilitySettingsBody) -> String {
     let number = Option::unwrap_or_default;
     let degrees = |angle: Option<f64>| number(angle).to_degrees();

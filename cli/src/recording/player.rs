@@ -36,11 +36,9 @@ const DEADLINE_MS: u32 = 60_000;
 pub(crate) struct PlayerOptions {
     /// Endpoint of zenoh.
     pub(crate) zenoh: String,
-    /// The fleet.
     pub(crate) fleet: Name,
     /// Name at the server.
     pub(crate) robot: Name,
-    /// Name in the recording.
     pub(crate) recorded: Name,
     /// Most times as fast as recorded; as fast as the server answers if absent.
     pub(crate) speed: Option<f64>,

@@ -34,7 +34,6 @@ pub(crate) struct RecorderOptions {
     pub(crate) server: MapClient,
     /// Endpoint of zenoh.
     pub(crate) zenoh: String,
-    /// The fleet.
     pub(crate) fleet: Name,
     /// The robots; all if empty.
     pub(crate) robots: Vec<Name>,

@@ -3,7 +3,6 @@
 use super::creation::fresh_key;
 use reqwest::{RequestBuilder, header::CONTENT_TYPE};
 
-/// A form.
 #[derive(Debug)]
 pub(super) struct Form {
     boundary: String,

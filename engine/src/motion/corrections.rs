@@ -59,7 +59,6 @@ pub struct Corrections {
 }
 
 impl CorrectionLog {
-    /// Counts an outcome.
     pub(super) fn count(&mut self, modality: &'static str, outcome: &'static str) {
         *self.totals.entry(modality).or_default().entry(outcome).or_default() += 1;
     }

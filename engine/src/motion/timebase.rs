@@ -58,7 +58,6 @@ pub(crate) enum Stream {
     MovingCamera(Name),
     /// Laser scans.
     Scan,
-    /// Odometry.
     Odometry,
 }
 

@@ -16,7 +16,6 @@ use std::collections::BTreeMap;
 /// A message for viewers.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Shown {
-    /// Its topic.
     pub(crate) topic: String,
     /// Full name of the message.
     pub(crate) schema: &'static str,

@@ -20,7 +20,6 @@ pub(super) struct OdometryHistory {
 /// The odometry of one time.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum OdometryAt {
-    /// It is known.
     Known(Isometry3<f64>),
     /// It is likely to come soon.
     Soon,

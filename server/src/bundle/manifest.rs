@@ -6,7 +6,6 @@ use std::collections::BTreeMap;
 
 const FORMAT: &str = "waymark-map-bundle";
 
-/// The manifest.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Manifest {

@@ -48,7 +48,6 @@ pub(super) struct RouterSettings<'a> {
     pub(super) frame_bytes: usize,
 }
 
-/// Opens a router.
 pub(super) async fn open(settings: &RouterSettings<'_>) -> Result<zenoh::Session, BusError> {
     let endpoint = settings.listen.first().cloned().unwrap_or_default();
     let fault = |detail: String| BusError::Listen { endpoint: endpoint.clone(), detail };

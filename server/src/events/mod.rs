@@ -59,7 +59,6 @@ impl EventLog {
         self.ring.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Tells an event.
     pub(crate) fn tell(&self, what: ServerEventBody) {
         let number = {
             let mut ring = self.ring();

@@ -12,7 +12,6 @@ const HANDSHAKE: u8 = 0x16;
 /// What is spoken on a connection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Spoken {
-    /// TLS.
     Tls,
     /// Plain text that no other machine can read.
     LocalPlain,

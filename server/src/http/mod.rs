@@ -150,7 +150,6 @@ pub(crate) struct App {
     pub(crate) sessions: Arc<Sessions>,
     /// Where the local token is, absolute.
     pub(crate) local_token_file: Option<PathBuf>,
-    /// Backups.
     pub(crate) backups: Arc<Backups>,
     /// What robots are enrolled with, where their connections are encrypted.
     pub(crate) enrolment: Option<Enrolment>,

@@ -56,7 +56,6 @@ fn robot_shown(row: RobotRow, motion: &MotionTracker, live: &LiveHub) -> Robot {
     Robot { name: row.name, map: row.map, alive: status.alive, epoch: status.epoch, conflict, pose, activity }
 }
 
-/// A fused pose.
 pub(super) fn pose_shown(KnownPose { fused, age, .. }: &KnownPose, trust: PoseTrust) -> RobotPose {
     let Pose2 { x_m, y_m, theta_rad } = fused.pose.pose;
     let covariance = row_major(&fused.pose.covariance);

@@ -111,7 +111,6 @@ impl Service {
         Self { routes: routes(&app), app }
     }
 
-    /// Answers a request.
     pub(crate) async fn answer(self, request: Request) -> Response {
         let Self { app, routes } = self;
         let panics = app.store.vitals().panics();

@@ -36,7 +36,6 @@ impl Uploader {
     }
 }
 
-/// The places.
 #[derive(Debug)]
 pub(super) struct UploadPlaces {
     all: Semaphore,

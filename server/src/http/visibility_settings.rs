@@ -139,7 +139,6 @@ async fn put(
     Ok(stored)
 }
 
-/// Areas by landmark.
 pub(super) type Areas = BTreeMap<LandmarkId, Arc<VisibilityMap>>;
 
 /// The areas that a question asks for: the map's own, or those for another camera of the landmarks that `near` (the place,

@@ -89,7 +89,6 @@ impl LocalToken {
         &self.path
     }
 
-    /// Its secret.
     pub(crate) fn secret(&self) -> &Secret<32> {
         &self.secret
     }

@@ -25,7 +25,6 @@ impl<const N: usize> Secret<N> {
         Ok(Self(bytes))
     }
 
-    /// Of its text.
     pub(crate) fn of(text: &str) -> Option<Self> {
         // Longer texts are no secrets, and are not decoded.
         let bytes = (text.len() <= 2 * N).then(|| BASE64_URL_SAFE_NO_PAD.decode(text).ok()).flatten()?;

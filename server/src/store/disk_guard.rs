@@ -21,7 +21,6 @@ pub(crate) const PERIOD: Duration = Duration::from_secs(2);
 /// Its name among the parts of the server.
 pub(crate) const PART: &str = "the task that looks at the disk";
 
-/// The bounds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 struct Bounds {
     percent: u64,

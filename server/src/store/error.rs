@@ -19,7 +19,6 @@ pub(crate) enum StoreError {
     Exists {
         /// Kind of the object.
         what: Kind,
-        /// The name.
         name: String,
     },
     /// A bound is reached.
@@ -138,7 +137,6 @@ pub(crate) enum StoreError {
     /// Any other error of the database, with the operation that met it.
     #[error("{operation} failed")]
     Database {
-        /// The operation.
         operation: &'static str,
         /// What the database says.
         source: sqlx::Error,

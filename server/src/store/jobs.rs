@@ -25,7 +25,6 @@ statements! {
               (SELECT id FROM jobs WHERE ended_ms IS NOT NULL ORDER BY id DESC LIMIT ?1)";
 }
 
-/// A job.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct JobRow {
     pub(crate) id: i64,

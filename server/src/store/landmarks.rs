@@ -126,7 +126,6 @@ impl LandmarkGeometry {
     }
 }
 
-/// Summary of a model.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct ModelSummary {
     /// The model passed all quality gates.
@@ -142,7 +141,6 @@ pub(crate) struct ModelSummary {
     pub(crate) learnt_ms: i64,
 }
 
-/// A landmark.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct LandmarkRow {
     pub(crate) id: i64,

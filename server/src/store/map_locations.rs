@@ -15,7 +15,6 @@ statements! {
     SET = "UPDATE maps SET site = ?2, building = ?3, floor = ?4, parent_id = ?5, parent_from_map = ?6 WHERE id = ?1";
 }
 
-/// Location of a map.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct MapLocation {
     pub(crate) site: Option<String>,

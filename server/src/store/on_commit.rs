@@ -21,7 +21,6 @@ pub(crate) enum CommittedChange {
     Jobs,
     /// The robot is on this map, or is gone.
     Robot {
-        /// Its name.
         name: String,
         /// The map's name.
         map: Option<String>,

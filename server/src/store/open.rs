@@ -49,7 +49,6 @@ pub(crate) enum OpenError {
     /// The directory or the lock file.
     #[error("data directory {path}: {source}")]
     Directory {
-        /// The path.
         path: PathBuf,
         /// What the system says.
         source: std::io::Error,
@@ -82,7 +81,6 @@ pub(crate) enum OpenError {
     /// A read-only file system on which the database cannot be read as it is.
     #[error("data directory {path} is on a read-only file system, and {reason}")]
     ReadOnly {
-        /// The path.
         path: PathBuf,
         /// What is missing.
         reason: &'static str,

@@ -14,7 +14,6 @@ statements! {
     DELETE = "DELETE FROM robots WHERE name = ?1";
 }
 
-/// A robot.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct RobotRow {
     pub(crate) name: String,

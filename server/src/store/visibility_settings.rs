@@ -23,7 +23,6 @@ pub(crate) async fn set(tx: &mut Tx, map: &str, settings: &VisibilitySettings) -
     maps::bump(tx, map.id).await
 }
 
-/// The revision of settings.
 pub(crate) fn revision(settings: &VisibilitySettings) -> String {
     text_revision(&serde_json::to_string(settings).unwrap_or_default())
 }

@@ -93,7 +93,6 @@ pub(super) type Run =
 
 /// What is on its way to the writer.
 pub(super) enum Command {
-    /// A write.
     Write {
         /// What it does.
         run: Run,

@@ -25,7 +25,6 @@ const BORDER_SIGMA_PX: f64 = 0.25;
 
 /// What all readings share: the problem linearised about a pose.
 pub(super) struct Linear<'a> {
-    /// The corners by texture.
     pub(super) texture_px: &'a Corners,
     pub(super) texture_covariance_px2: &'a CornerCovariance,
     /// The border's corners at the pose.

@@ -9,7 +9,6 @@ use vision::random::Random;
 pub(super) struct Noise {
     /// Standard deviation along the motion, share of the way.
     along: f64,
-    /// Across it.
     across: f64,
     /// Of the heading after one metre.
     rad_per_root_m: f64,

@@ -21,7 +21,6 @@ const LOOPBACK: [&str; 3] = ["localhost", "127.0.0.1", "::1"];
 pub(crate) struct ServerCertificate {
     /// PEM, the server's own first.
     pub(crate) chain_pem: String,
-    /// PEM.
     pub(crate) key_pem: PemKey,
     /// The same for rustls.
     pub(crate) certified: Arc<CertifiedKey>,

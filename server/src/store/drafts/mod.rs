@@ -46,7 +46,6 @@ pub(super) const EVERY: [&[(&str, &str)]; 2] = [ALL, publish::ALL];
 /// Drafts of one map.
 pub(crate) const MAX_DRAFTS: usize = 4;
 
-/// A draft.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct DraftRow {
     pub(crate) id: i64,

@@ -112,7 +112,6 @@ fn landmark_digest(landmark: &LandmarkContents) -> RowDigest {
     digest_of(&(&landmark.name, &landmark.geometry))
 }
 
-/// The rows of contents.
 pub(super) fn rows(contents: &MapContents, owner: impl Fn(LandmarkId) -> Owner) -> Rows {
     let settings = &contents.settings;
     let location = &settings.location;

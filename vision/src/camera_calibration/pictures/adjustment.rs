@@ -213,7 +213,6 @@ impl Adjustment {
     }
 }
 
-/// The damped step.
 fn step((all, pull): &(DMatrix<f64>, DVector<f64>), damping: f64) -> Option<DVector<f64>> {
     let scale = all.diagonal().map(|v| 1.0 / v.max(f64::MIN_POSITIVE).sqrt());
     let scaled = DMatrix::from_fn(all.nrows(), all.nrows(), |i, j| {

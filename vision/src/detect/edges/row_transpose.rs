@@ -30,7 +30,6 @@ pub(crate) fn columns<S: Simd>(s: S, rows: &[&[u8]; LANES], u: usize) -> [u8x16<
     tile
 }
 
-/// The bytes as numbers.
 #[inline(always)]
 pub(crate) fn numbers<S: Simd>(bytes: u8x16<S>) -> f32x16<S> {
     let (low, high) = bytes.widen();

@@ -29,7 +29,6 @@ pub(crate) struct Polyline {
     sums: Vec<LineSums>,
     /// Point i here is point `(i + turn) % n` of the chain: a closed one is turned to start at a corner.
     pub(crate) turn: usize,
-    /// Points of the chain.
     chain_points: usize,
     closed: bool,
     /// Ranges of points, in order.
