@@ -3,13 +3,15 @@
 //! ```text
 //! parts (a walk over the records, chunks unread) -> ordered (messages by log time) -> drive (messages of the wire)
 //! ```
+//!
+//! `mcap` parses the records. Its readers are not used: `LinearReader` panics on a record that ends after its chunk,
+//! `IndexedReader` checks no checksum and keeps the memory of every chunk slot.
 
 mod chunk;
 mod drive;
 mod error;
 mod ordered;
 mod parts;
-mod records;
 
 pub use drive::DriveReader;
 pub use error::{ReadError, ReadFault};

@@ -7,14 +7,12 @@
 use super::{
     MAX_CHUNK_MESSAGES, MAX_OPEN_BYTES, chunk,
     error::{ReadError, ReadFault},
-    parts::{Part, Parts, parts},
-    records::{HEAD_BYTES, MESSAGE_HEAD_BYTES, announcement, message_head, walk},
+    parts::{HEAD_BYTES, Part, parts, records},
 };
 use mcap::records::{Record, op};
 use protos::prost::bytes::Bytes;
 use std::{
-    cmp::Reverse,
-    collections::{BTreeMap, BinaryHeap},
+    collections::BTreeMap,
     io::{Read, Seek, SeekFrom},
     sync::Arc,
 };
@@ -45,38 +43,18 @@ pub struct RawMessage {
     pub offset: u64,
 }
 
-/// A message that waits for its turn: by log time, then by the order of the file.
-#[derive(Debug, PartialEq, Eq)]
-struct Waiting {
-    order: (u64, u64),
-    part: usize,
-    message: RawMessage,
-}
-
-impl Ord for Waiting {
-    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
-        self.order.cmp(&other.order)
-    }
-}
-
-impl PartialOrd for Waiting {
-    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
 /// Reads the messages of a file in the order of time.
 #[derive(Debug)]
 pub struct MessageReader<R> {
     file: R,
     parts: Vec<Part>,
-    /// For each part, the earliest time of it and all that follow, ns.
-    earliest_ns: Vec<u64>,
     cut_off_at: Option<u64>,
     next_part: usize,
-    /// Messages that wait, of each open part, with its bytes.
-    open: BTreeMap<usize, (usize, u64)>,
-    waiting: BinaryHeap<Reverse<Waiting>>,
+    /// Bytes of each part that may have messages that wait, by its latest log time and its place.
+    open: BTreeMap<(u64, u64), u64>,
+    open_bytes: u64,
+    /// Messages that wait for their turn: by log time, then by the order of the file.
+    waiting: BTreeMap<(u64, u64), RawMessage>,
     count: u64,
     schemas: BTreeMap<u16, String>,
     channels: BTreeMap<u16, Arc<ChannelInfo>>,
@@ -85,19 +63,15 @@ pub struct MessageReader<R> {
 impl<R: Read + Seek> MessageReader<R> {
     /// Walks over the file once, without reading its messages.
     pub fn open(mut file: R) -> Result<Self, ReadError> {
-        let Parts { parts, cut_off_at } = parts(&mut file)?;
-        let mut earliest_ns: Vec<u64> = parts.iter().map(|part| part.start_ns).collect();
-        for i in (1..earliest_ns.len()).rev() {
-            earliest_ns[i - 1] = earliest_ns[i - 1].min(earliest_ns[i]);
-        }
+        let (parts, cut_off_at) = parts(&mut file)?;
         Ok(Self {
             file,
             parts,
-            earliest_ns,
             cut_off_at,
             next_part: 0,
             open: BTreeMap::new(),
-            waiting: BinaryHeap::new(),
+            open_bytes: 0,
+            waiting: BTreeMap::new(),
             count: 0,
             schemas: BTreeMap::new(),
             channels: BTreeMap::new(),
@@ -114,13 +88,10 @@ impl<R: Read + Seek> MessageReader<R> {
     pub fn channels(&mut self) -> Result<Vec<Arc<ChannelInfo>>, ReadError> {
         for part in self.parts.clone() {
             let announced = self.content(part).and_then(|content| {
-                walk(&content).try_for_each(|record| {
-                    let (kind, range) = record?;
-                    announcement(kind, &content[range])?.into_iter().for_each(|found| self.announce(found));
-                    Ok(())
-                })
+                records(content)
+                    .try_for_each(|record| record.and_then(|(kind, body)| self.announce(kind, &body)))
             });
-            announced.map_err(|fault: ReadFault| fault.at(part.offset))?;
+            announced.map_err(|fault| fault.at(part.offset))?;
         }
         let mut all: Vec<_> = self.channels.values().cloned().collect();
         all.sort_by(|a, b| (&a.topic, &a.schema).cmp(&(&b.topic, &b.schema)));
@@ -129,27 +100,24 @@ impl<R: Read + Seek> MessageReader<R> {
 
     /// The next message; `None` at the end. After an error the reader is at its end.
     pub fn next_message(&mut self) -> Result<Option<RawMessage>, ReadError> {
-        while let Some(&earliest_ns) = self.earliest_ns.get(self.next_part) {
-            if self.waiting.peek().is_some_and(|Reverse(first)| first.order.0 < earliest_ns) {
+        while let Some(&part) = self.parts.get(self.next_part) {
+            let next_ns = self.waiting.first_key_value().map(|(order, _)| order.0);
+            if next_ns.is_some_and(|next_ns| next_ns < part.earliest_ns) {
                 break;
             }
-            let number = self.next_part;
+            while let Some(first) = self.open.first_entry()
+                && next_ns.is_none_or(|next_ns| first.key().0 < next_ns)
+            {
+                self.open_bytes -= first.remove();
+            }
             self.next_part += 1;
-            let part = self.parts[number];
-            if let Err(fault) = self.open_part(number, part) {
+            if let Err(fault) = self.open_part(part) {
                 self.next_part = self.parts.len();
                 self.waiting.clear();
                 return Err(fault.at(part.offset));
             }
         }
-        let Some(Reverse(first)) = self.waiting.pop() else { return Ok(None) };
-        if let Some((waiting, _)) = self.open.get_mut(&first.part) {
-            *waiting -= 1;
-            if *waiting == 0 {
-                self.open.remove(&first.part);
-            }
-        }
-        Ok(Some(first.message))
+        Ok(self.waiting.pop_first().map(|(_, message)| message))
     }
 
     /// The records of a part.
@@ -160,52 +128,55 @@ impl<R: Read + Seek> MessageReader<R> {
         if !part.is_chunk {
             return Ok(Bytes::from(bytes));
         }
-        Ok(Bytes::from(chunk::unpack(bytes.get(HEAD_BYTES..).ok_or(ReadFault::Short)?)?))
+        match mcap::parse_record(op::CHUNK, bytes.get(HEAD_BYTES as usize..).ok_or(ReadFault::Short)?)? {
+            Record::Chunk { header, data } => Ok(Bytes::from(chunk::unpack(&header, &data)?)),
+            _ => Err(ReadFault::Short),
+        }
     }
 
-    fn open_part(&mut self, number: usize, part: Part) -> Result<(), ReadFault> {
+    fn open_part(&mut self, part: Part) -> Result<(), ReadFault> {
         let content = self.content(part)?;
-        let open: u64 = self.open.values().map(|(_, bytes)| bytes).sum();
-        if open + content.len() as u64 > MAX_OPEN_BYTES {
+        let bytes = content.len() as u64;
+        if self.open_bytes + bytes > MAX_OPEN_BYTES {
             return Err(ReadFault::Overlap(MAX_OPEN_BYTES));
         }
-        let mut messages = 0;
-        for record in walk(&content) {
-            let (kind, range) = record?;
-            if kind == op::MESSAGE {
-                messages += 1;
-                if messages > MAX_CHUNK_MESSAGES {
-                    return Err(ReadFault::TooManyMessages(MAX_CHUNK_MESSAGES));
-                }
-                self.wait(number, part.offset, &content.slice(range))?;
-            } else if let Some(record) = announcement(kind, &content[range])? {
-                self.announce(record);
+        let (mut messages, mut latest_ns) = (0, 0);
+        for record in records(content) {
+            let (kind, body) = record?;
+            if kind != op::MESSAGE {
+                self.announce(kind, &body)?;
+                continue;
             }
+            messages += 1;
+            if messages > MAX_CHUNK_MESSAGES {
+                return Err(ReadFault::TooManyMessages(MAX_CHUNK_MESSAGES));
+            }
+            let Record::Message { header, data } = mcap::parse_record(kind, &body)? else { continue };
+            let channel = self.channels.get(&header.channel_id);
+            let message = RawMessage {
+                channel: channel.ok_or(ReadFault::Channel(header.channel_id))?.clone(),
+                log_time_ns: header.log_time,
+                sequence: header.sequence,
+                data: body.slice_ref(&data),
+                offset: part.offset,
+            };
+            latest_ns = latest_ns.max(header.log_time);
+            self.waiting.insert((header.log_time, self.count), message);
+            self.count += 1;
         }
         if messages > 0 {
-            self.open.insert(number, (messages, content.len() as u64));
+            self.open.insert((latest_ns, part.offset), bytes);
+            self.open_bytes += bytes;
         }
         Ok(())
     }
 
-    fn wait(&mut self, part: usize, offset: u64, body: &Bytes) -> Result<(), ReadFault> {
-        let header = message_head(body)?;
-        let channel = self.channels.get(&header.channel_id);
-        let channel = channel.ok_or(ReadFault::Channel(header.channel_id))?.clone();
-        let message = RawMessage {
-            channel,
-            log_time_ns: header.log_time,
-            sequence: header.sequence,
-            data: body.slice(MESSAGE_HEAD_BYTES..),
-            offset,
-        };
-        self.waiting.push(Reverse(Waiting { order: (header.log_time, self.count), part, message }));
-        self.count += 1;
-        Ok(())
-    }
-
-    fn announce(&mut self, record: Record<'_>) {
-        match record {
+    /// Takes a schema or a channel. Others are not even parsed: `parse_record` panics on a short attachment.
+    fn announce(&mut self, kind: u8, body: &[u8]) -> Result<(), ReadFault> {
+        if !matches!(kind, op::SCHEMA | op::CHANNEL) {
+            return Ok(());
+        }
+        match mcap::parse_record(kind, body)? {
             Record::Schema { header, .. } => {
                 self.schemas.insert(header.id, header.name);
             }
@@ -216,5 +187,42 @@ impl<R: Read + Seek> MessageReader<R> {
             }
             _ => {}
         }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mcap::records::MessageHeader;
+    use std::io::Cursor;
+
+    /// Of messages of 1000 bytes, each in a chunk of its own.
+    fn reader(times: impl Iterator<Item = u64>) -> MessageReader<Cursor<Vec<u8>>> {
+        let mut file = Cursor::new(Vec::new());
+        let options = mcap::WriteOptions::new().compression(None).chunk_size(Some(1));
+        let mut writer = options.create(&mut file).unwrap();
+        let channel_id = writer.add_channel(0, "/a", "cdr", &BTreeMap::new()).unwrap();
+        for log_time in times {
+            let header = MessageHeader { channel_id, sequence: 0, log_time, publish_time: 0 };
+            writer.write_to_known_channel(&header, &[0; 1000]).unwrap();
+        }
+        writer.finish().unwrap();
+        drop(writer);
+        MessageReader::open(file).unwrap()
+    }
+
+    #[test]
+    fn parts_are_open_only_while_their_messages_wait_and_not_too_many() {
+        let mut in_order = reader(0..100);
+        for time in 0..100 {
+            assert_eq!(in_order.next_message().unwrap().unwrap().log_time_ns, time);
+            assert!(in_order.open_bytes < 3000, "{}", in_order.open_bytes);
+        }
+        let mut overlapping = reader((0..100).rev());
+        overlapping.open_bytes = MAX_OPEN_BYTES - 50_000;
+        let error = overlapping.next_message().unwrap_err();
+        assert!(matches!(error.fault, ReadFault::Overlap(_)), "{error}");
+        assert_eq!(overlapping.next_message().unwrap(), None);
     }
 }

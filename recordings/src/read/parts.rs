@@ -2,17 +2,17 @@
 //! time they span, without reading their content. A file that ends inside a record is read up to there.
 
 use super::{
-    MAX_CHUNK_BYTES, MAX_PARTS, MAX_RECORD_BYTES, chunk,
+    MAX_CHUNK_BYTES, MAX_PARTS, MAX_RECORD_BYTES,
     error::{ReadError, ReadFault},
-    records::{HEAD_BYTES, MESSAGE_HEAD_BYTES, head, message_head},
 };
 use mcap::{MAGIC, records::op};
+use protos::prost::bytes::{Buf as _, Bytes};
 use std::io::{Read, Seek, SeekFrom};
 
 /// A run of messages outside of chunks ends after so many bytes.
 const RUN_BYTES: u64 = 4 << 20;
-/// Bytes of a chunk's record before its content, with the longest name of a packing.
-const MAX_CHUNK_HEAD_BYTES: u64 = 256;
+/// Bytes before the fields of a record: its kind and length.
+pub(super) const HEAD_BYTES: u64 = 9;
 
 /// A chunk, or a run of records outside of chunks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -23,96 +23,104 @@ pub(super) struct Part {
     pub(super) offset: u64,
     /// Length, heads of records included, bytes.
     pub(super) bytes: u64,
-    /// Earliest log time, ns; `u64::MAX` without a message.
-    pub(super) start_ns: u64,
+    /// Earliest log time of it and of all parts that follow, ns; `u64::MAX` without a message.
+    pub(super) earliest_ns: u64,
 }
 
-/// The parts in the order of the file.
-#[derive(Debug, Default)]
-pub(super) struct Parts {
-    pub(super) parts: Vec<Part>,
-    /// Where the file ends inside a record; `None` for a whole file.
-    pub(super) cut_off_at: Option<u64>,
-}
-
-/// Walks over the records of a file.
-pub(super) fn parts(file: &mut (impl Read + Seek)) -> Result<Parts, ReadError> {
+/// Walks over the records of a file. Out: the parts in the order of the file, and where it ends inside a record.
+pub(super) fn parts(file: &mut (impl Read + Seek)) -> Result<(Vec<Part>, Option<u64>), ReadError> {
     let end = file.seek(SeekFrom::End(0)).map_err(|e| ReadFault::from(e).at(0))?;
     let mut magic = [0; MAGIC.len()];
-    file.rewind().and_then(|()| file.read_exact(&mut magic)).map_err(|_short| ReadFault::NotMcap.at(0))?;
-    if magic != MAGIC {
+    if file.rewind().and_then(|()| file.read_exact(&mut magic)).is_err() || magic != MAGIC {
         return Err(ReadFault::NotMcap.at(0));
     }
-    let (mut found, mut offset) = (Parts::default(), MAGIC.len() as u64);
-    loop {
-        let mut bytes = [0; HEAD_BYTES];
-        if end - offset < HEAD_BYTES as u64 {
-            found.cut_off_at = Some(offset);
-            return Ok(found);
-        }
-        file.read_exact(&mut bytes).map_err(|e| ReadFault::from(e).at(offset))?;
-        let (kind, length) = head(&bytes);
+    let (mut parts, mut offset) = (Vec::<Part>::new(), MAGIC.len() as u64);
+    let cut_off_at = loop {
+        let Some(left) = (end - offset).checked_sub(HEAD_BYTES) else { break Some(offset) };
+        let mut head = [0; HEAD_BYTES as usize];
+        file.read_exact(&mut head).map_err(|e| ReadFault::from(e).at(offset))?;
+        let (kind, length) = (head[0], (&head[1..]).get_u64_le());
         if matches!(kind, op::DATA_END | op::FOOTER) {
-            return Ok(found);
+            break None;
         }
-        if length > end - offset - HEAD_BYTES as u64 {
-            found.cut_off_at = Some(offset);
-            return Ok(found);
+        if length > left {
+            break Some(offset);
         }
-        let whole = HEAD_BYTES as u64 + length;
-        found.add(file, kind, offset, whole).map_err(|fault| fault.at(offset))?;
-        if found.parts.len() > MAX_PARTS {
+        let part = part(file, kind, offset, HEAD_BYTES + length).map_err(|fault| fault.at(offset))?;
+        if let Some(part) = part {
+            add(&mut parts, part);
+        }
+        if parts.len() > MAX_PARTS {
             return Err(ReadFault::TooManyParts(MAX_PARTS).at(offset));
         }
-        offset += whole;
+        offset += HEAD_BYTES + length;
         file.seek(SeekFrom::Start(offset)).map_err(|e| ReadFault::from(e).at(offset))?;
+    };
+    for i in (1..parts.len()).rev() {
+        parts[i - 1].earliest_ns = parts[i - 1].earliest_ns.min(parts[i].earliest_ns);
+    }
+    Ok((parts, cut_off_at))
+}
+
+/// A record as a part; `None` for one that is passed over. The file stands after the record's head.
+fn part(file: &mut impl Read, kind: u8, offset: u64, bytes: u64) -> Result<Option<Part>, ReadFault> {
+    // How long the fixed fields are, and where a log time stands in them: the earliest of a chunk, or a message's own.
+    let (most, fixed, time_at) = match kind {
+        op::CHUNK => (MAX_CHUNK_BYTES, 40, 0),
+        op::MESSAGE => (MAX_RECORD_BYTES, 22, 6),
+        op::SCHEMA | op::CHANNEL => (MAX_RECORD_BYTES, 0, 0),
+        _ => return Ok(None),
+    };
+    if bytes > most {
+        return Err(ReadFault::TooLong { bytes, most });
+    }
+    if bytes - HEAD_BYTES < fixed as u64 {
+        return Err(ReadFault::Short);
+    }
+    let mut fields = [0; 40];
+    file.read_exact(&mut fields[..fixed])?;
+    let earliest_ns = (&fields[time_at..fixed]).try_get_u64_le().unwrap_or(u64::MAX);
+    Ok(Some(Part { is_chunk: kind == op::CHUNK, offset, bytes, earliest_ns }))
+}
+
+/// Adds a part, or lengthens the last run by it.
+fn add(parts: &mut Vec<Part>, part: Part) {
+    match parts.last_mut() {
+        Some(last)
+            if !(last.is_chunk || part.is_chunk)
+                && last.offset + last.bytes == part.offset
+                && last.bytes < RUN_BYTES =>
+        {
+            last.bytes += part.bytes;
+            last.earliest_ns = last.earliest_ns.min(part.earliest_ns);
+        }
+        _ => parts.push(part),
     }
 }
 
-impl Parts {
-    /// Adds a record of `bytes`; the file stands after its head.
-    fn add(&mut self, file: &mut impl Read, kind: u8, offset: u64, bytes: u64) -> Result<(), ReadFault> {
-        let most = if kind == op::CHUNK { MAX_CHUNK_BYTES } else { MAX_RECORD_BYTES };
-        match kind {
-            op::CHUNK | op::SCHEMA | op::CHANNEL | op::MESSAGE if bytes > most => {
-                Err(ReadFault::TooLong { bytes, most })
-            }
-            op::CHUNK => {
-                let mut body = Vec::new();
-                let length = (bytes - HEAD_BYTES as u64).min(MAX_CHUNK_HEAD_BYTES);
-                file.take(length).read_to_end(&mut body)?;
-                let start_ns = chunk::header(&body)?.0.message_start_time;
-                self.parts.push(Part { is_chunk: true, offset, bytes, start_ns });
-                Ok(())
-            }
-            op::SCHEMA | op::CHANNEL => {
-                self.extend(offset, bytes, u64::MAX);
-                Ok(())
-            }
-            op::MESSAGE => {
-                let mut body = [0; MESSAGE_HEAD_BYTES];
-                if bytes < (HEAD_BYTES + MESSAGE_HEAD_BYTES) as u64 {
-                    return Err(ReadFault::Short);
-                }
-                file.read_exact(&mut body)?;
-                self.extend(offset, bytes, message_head(&body)?.log_time);
-                Ok(())
-            }
-            _ => Ok(()),
-        }
-    }
+/// The records of a part: kind and fields.
+pub(super) fn records(mut rest: Bytes) -> impl Iterator<Item = Result<(u8, Bytes), ReadFault>> {
+    std::iter::from_fn(move || {
+        let (kind, length) = (rest.try_get_u8().ok()?, rest.try_get_u64_le().ok());
+        let length = length.and_then(|n| usize::try_from(n).ok()).filter(|n| *n <= rest.len());
+        Some(length.map(|length| (kind, rest.split_to(length))).ok_or(ReadFault::Short))
+    })
+}
 
-    /// Lengthens the last run, or begins one.
-    fn extend(&mut self, offset: u64, bytes: u64, log_time_ns: u64) {
-        if let Some(last) = self.parts.last_mut()
-            && !last.is_chunk
-            && last.offset + last.bytes == offset
-            && last.bytes < RUN_BYTES
-        {
-            last.bytes += bytes;
-            last.start_ns = last.start_ns.min(log_time_ns);
-            return;
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn records_are_walked_and_a_cut_one_is_an_error() {
+        let bytes = [&[5, 2, 0, 0, 0, 0, 0, 0, 0, 7, 7][..], &[4, 0, 0, 0, 0, 0, 0, 0, 0]].concat();
+        let bytes = Bytes::from(bytes);
+        let found: Vec<_> = records(bytes.clone()).map(Result::unwrap).collect();
+        assert_eq!(found, [(5, bytes.slice(9..11)), (4, Bytes::new())]);
+        for cut in [1, 8, 10, 12] {
+            assert!(records(bytes.slice(..cut)).any(|record| record.is_err()), "{cut}");
         }
-        self.parts.push(Part { is_chunk: false, offset, bytes, start_ns: log_time_ns });
+        let huge = [&[5_u8][..], &[0xff; 8], &[0; 4]].concat();
+        assert!(records(huge.into()).next().unwrap().is_err());
     }
 }
