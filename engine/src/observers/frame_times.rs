@@ -3,7 +3,7 @@
 
 use crate::{
     frame::workers::{AnsweredFrame, FrameObserver},
-    histogram::{Histogram, HistogramCopy},
+    histogram::Times,
 };
 use protos::v1;
 use std::{
@@ -26,8 +26,8 @@ const STATUSES: [(v1::Status, &str); 5] = [
 /// Times of all frames that reached a worker.
 #[derive(Debug, Default)]
 pub struct FrameTimes {
-    latency: [Histogram; STATUSES.len()],
-    stages: Mutex<BTreeMap<String, Histogram>>,
+    latency: [Times; STATUSES.len()],
+    stages: Mutex<BTreeMap<String, Times>>,
 }
 
 impl FrameObserver for FrameTimes {
@@ -45,8 +45,8 @@ impl FrameTimes {
         }
         let mut stages = self.stages();
         for v1::StageTime { stage, ms } in &answer.timings {
-            if let Some(histogram) = stages.get(stage) {
-                histogram.add(duration(*ms));
+            if let Some(times) = stages.get(stage) {
+                times.add(duration(*ms));
             } else if stages.len() < MAX_STAGES {
                 stages.entry(stage.clone()).or_default().add(duration(*ms));
             }
@@ -54,16 +54,16 @@ impl FrameTimes {
     }
 
     /// From receipt to answer, by the word of the status.
-    pub fn latencies(&self) -> Vec<(&'static str, HistogramCopy)> {
-        STATUSES.iter().zip(&self.latency).map(|((_, word), times)| (*word, times.copy())).collect()
+    pub fn latencies(&self) -> Vec<(&'static str, Times)> {
+        STATUSES.iter().zip(&self.latency).map(|((_, word), times)| (*word, times.clone())).collect()
     }
 
     /// Of each stage.
-    pub fn stage_times(&self) -> Vec<(String, HistogramCopy)> {
-        self.stages().iter().map(|(stage, times)| (stage.clone(), times.copy())).collect()
+    pub fn stage_times(&self) -> Vec<(String, Times)> {
+        self.stages().iter().map(|(stage, times)| (stage.clone(), times.clone())).collect()
     }
 
-    fn stages(&self) -> MutexGuard<'_, BTreeMap<String, Histogram>> {
+    fn stages(&self) -> MutexGuard<'_, BTreeMap<String, Times>> {
         self.stages.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -75,6 +75,7 @@ fn duration(ms: f64) -> Duration {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use prometheus_client::{encoding::prometheus_text, registry::Registry};
 
     #[test]
     fn stages_are_bounded_and_statuses_are_kept_apart() {
@@ -83,7 +84,12 @@ mod tests {
         let timings: Vec<_> = (0..2 * MAX_STAGES).map(stage).collect();
         times.add(&v1::Answer { status: v1::Status::Expired.into(), timings, ..v1::Answer::default() });
         assert_eq!(times.stage_times().len(), MAX_STAGES);
-        let counted: Vec<_> = times.latencies().into_iter().filter(|(_, h)| h.count > 0).collect();
-        assert_eq!(counted.iter().map(|(word, h)| (*word, h.count)).collect::<Vec<_>>(), [("expired", 1)]);
+        for (word, times) in times.latencies() {
+            let (mut registry, mut text) = (Registry::default(), String::new());
+            registry.register("t", "T", times.0);
+            prometheus_text::encode(&mut text, &registry).unwrap();
+            let counted = u8::from(word == "expired");
+            assert!(text.contains(&format!("\nt_count {counted}\n")), "{word}: {text}");
+        }
     }
 }

@@ -1,14 +1,14 @@
-//! `GET /metrics`: for Prometheus, in its text format or that of `OpenMetrics`. Also below `/api/v1`, and on a listener of its
+//! `GET /metrics`: for Prometheus, in its text format. Also below `/api/v1`, and on a listener of its
 //! own if the settings name one.
 
 use super::{App, AppState, error::ApiError, guard};
-use crate::metrics::{self, exposition::Format};
+use crate::metrics;
 use axum::{
     Router,
     extract::{Request, State},
-    http::{HeaderMap, header},
+    http::header,
     middleware::{Next, from_fn_with_state},
-    response::{IntoResponse, Response},
+    response::IntoResponse,
     routing::get,
 };
 use std::sync::Arc;
@@ -31,11 +31,9 @@ pub(crate) fn alone(app: &Arc<App>) -> Router {
     at_root().layer(from_fn_with_state(app.clone(), guarded)).with_state(app.clone())
 }
 
-/// Metrics in the text format of Prometheus 0.0.4, or of `OpenMetrics` 1.0 where `Accept` names it. Also at `/metrics`.
+/// Metrics in the text format of Prometheus 0.0.4. Also at `/metrics`.
 #[utoipa::path(get, path = "/metrics", operation_id = "getMetrics", tag = "health",
-    responses((status = 200, content((String = "text/plain"), (String = "application/openmetrics-text")))))]
-async fn metrics(State(app): State<AppState>, headers: HeaderMap) -> Result<Response, ApiError> {
-    let format = Format::of(headers.get(header::ACCEPT).and_then(|accept| accept.to_str().ok()));
-    let text = metrics::text(&app, format).await?;
-    Ok(([(header::CONTENT_TYPE, format.content_type())], text).into_response())
+    responses((status = 200, body = String, content_type = "text/plain")))]
+async fn metrics(State(app): State<AppState>) -> Result<impl IntoResponse, ApiError> {
+    Ok(([(header::CONTENT_TYPE, metrics::CONTENT_TYPE)], metrics::text(&app).await?))
 }

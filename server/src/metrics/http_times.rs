@@ -1,7 +1,7 @@
 //! Requests over HTTP by method, route and status, and how long they took. In: each request, when it is answered. Out: counts
 //! and histograms. Routes are those of the router, not what clients write, so the number of series is bounded.
 
-use engine::histogram::{Histogram, HistogramCopy};
+use engine::histogram::Times;
 use std::{
     collections::BTreeMap,
     sync::{Mutex, MutexGuard, PoisonError},
@@ -19,7 +19,7 @@ const METHODS: [&str; 6] = ["GET", "HEAD", "POST", "PUT", "PATCH", "DELETE"];
 struct OfRoute {
     /// By method and status.
     counts: BTreeMap<(&'static str, u16), u64>,
-    times: Histogram,
+    times: Times,
 }
 
 #[derive(Debug, Default)]
@@ -67,8 +67,8 @@ impl HttpTimes {
     }
 
     /// Times by route.
-    pub(crate) fn times(&self) -> Vec<(String, HistogramCopy)> {
-        self.lock().routes.iter().map(|(route, of)| (route.clone(), of.times.copy())).collect()
+    pub(crate) fn times(&self) -> Vec<(String, Times)> {
+        self.lock().routes.iter().map(|(route, of)| (route.clone(), of.times.clone())).collect()
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {

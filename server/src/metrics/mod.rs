@@ -2,7 +2,7 @@
 //! `GET /metrics`. Nothing is counted here but requests; names begin with `waymark_`, those of the process as exporters of
 //! Prometheus name them.
 
-pub(crate) mod exposition;
+mod exposition;
 pub(crate) mod http_times;
 pub(crate) mod process;
 mod robots;
@@ -12,56 +12,71 @@ use crate::{
     store::{StoreError, jobs, now_ms},
 };
 use engine::panics::Edge;
-use exposition::{Exposition, Format};
-use std::time::Instant;
+use exposition::Exposition;
+pub(crate) use prometheus_client::encoding::prometheus_text::CONTENT_TYPE;
+use prometheus_client::{
+    collector::Collector,
+    encoding::{DescriptorEncoder, prometheus_text},
+    registry::Registry,
+};
+use std::{fmt, sync::Arc, time::Instant};
 
 /// States of jobs that are not over.
 const JOB_STATES: [&str; 2] = ["queued", "running"];
 
 /// The metrics of a server. Errors: the database does not answer.
-pub(crate) async fn text(app: &App, format: Format) -> Result<String, StoreError> {
+pub(crate) async fn text(app: &Arc<App>) -> Result<String, StoreError> {
     let mut open_jobs = Vec::with_capacity(JOB_STATES.len());
     for state in JOB_STATES {
         let filter = jobs::JobFilter { state: Some(state), ..jobs::JobFilter::default() };
         open_jobs.push((state, jobs::count(app.store.reads(), &filter).await?));
     }
-    let (mut all, now) = (Exposition::new(format), Instant::now());
-    all.gauge("waymark_build_info", "What runs here.").value(
-        &[("version", env!("CARGO_PKG_VERSION")), ("protocol", protos::keys::PROTOCOL), ("api", "v1")],
-        1,
-    );
-    robots::write_frames(&mut all, app, now);
-    robots::write_messages(&mut all, app);
-    robots::write_robots(&mut all, app, now);
-    robots::write_maps(&mut all, app);
-    write_parts(&mut all, app);
-    let mut jobs = all.gauge("waymark_jobs", "Jobs that wait and run.");
-    for (state, count) in open_jobs {
-        jobs.value(&[("state", state)], count);
-    }
-    write_backups(&mut all, app);
-    write_requests(&mut all, app);
-    Ok(all.finish_with_process(&app.config.data).await)
+    let scrape = Scrape { app: app.clone(), open_jobs };
+    // What the system says of the process is read from files: off the runtime.
+    let written = tokio::task::spawn_blocking(move || {
+        let (mut registry, mut text) = (Registry::default(), String::new());
+        registry.register_collector(Box::new(scrape));
+        prometheus_text::encode(&mut text, &registry).ok();
+        text
+    });
+    // An error means that the server stops.
+    Ok(written.await.unwrap_or_default())
 }
 
-impl Exposition {
-    /// Adds what the system says of the process, off the runtime.
-    async fn finish_with_process(mut self, data: &std::path::Path) -> String {
-        let data = data.to_owned();
-        let written = tokio::task::spawn_blocking(move || {
-            process::write(&mut self, &data);
-            self.finish()
-        });
-        // An error means that the server stops.
-        written.await.unwrap_or_default()
+/// What is written when it is asked for.
+#[derive(Debug)]
+struct Scrape {
+    app: Arc<App>,
+    open_jobs: Vec<(&'static str, u64)>,
+}
+
+impl Collector for Scrape {
+    fn encode(&self, encoder: DescriptorEncoder<'_>) -> fmt::Result {
+        let (all, app, now) = (&mut Exposition(encoder), &*self.app, Instant::now());
+        let build =
+            [("version", env!("CARGO_PKG_VERSION")), ("protocol", protos::keys::PROTOCOL), ("api", "v1")];
+        all.gauge("waymark_build_info", "What runs here.").value(&build, 1_u32);
+        robots::write_frames(all, app, now);
+        robots::write_messages(all, app);
+        robots::write_robots(all, app, now);
+        robots::write_maps(all, app);
+        write_parts(all, app);
+        let mut jobs = all.gauge("waymark_jobs", "Jobs that wait and run.");
+        for (state, count) in &self.open_jobs {
+            jobs.value(&[("state", state)], *count);
+        }
+        write_backups(all, app);
+        write_requests(all, app);
+        process::write(all, &app.config.data);
+        Ok(())
     }
 }
 
-fn write_parts(all: &mut Exposition, app: &App) {
+fn write_parts(all: &mut Exposition<'_>, app: &App) {
     let vitals = app.store.vitals();
     let is_ready = vitals.failure().is_none() && vitals.stalled().is_none();
     all.gauge("waymark_ready", "1 while every part of the server runs and goes on.")
-        .value(&[], u8::from(is_ready));
+        .value(&[], u32::from(is_ready));
     let mut still = all.gauge(
         "waymark_part_still_seconds",
         "Time for which a part that has work, or is probed, has not gone on.",
@@ -95,7 +110,7 @@ fn write_parts(all: &mut Exposition, app: &App) {
         .known(&[], outbox.map(crate::bus::Outbox::waiting));
 }
 
-fn write_backups(all: &mut Exposition, app: &App) {
+fn write_backups(all: &mut Exposition<'_>, app: &App) {
     let health = app.backups.health();
     let age = health.newest_ms.map(|made| (now_ms() - made).max(0) as f64 / 1e3);
     all.gauge("waymark_backup_age_seconds", "Age of the newest complete backup; absent without one.")
@@ -103,10 +118,10 @@ fn write_backups(all: &mut Exposition, app: &App) {
     all.gauge("waymark_backup_interval_seconds", "Time between scheduled backups; 0: none is scheduled.")
         .value(&[], u64::from(health.every_hours) * 3600);
     all.gauge("waymark_backup_failed", "1 if the last backup failed.")
-        .value(&[], u8::from(health.failed.is_some()));
+        .value(&[], u32::from(health.failed.is_some()));
 }
 
-fn write_requests(all: &mut Exposition, app: &App) {
+fn write_requests(all: &mut Exposition<'_>, app: &App) {
     let mut counts = all.counter("waymark_http_requests_total", "Requests by method, route and status.");
     for ((method, route, status), count) in app.http_times.counts() {
         let status = status.to_string();

@@ -19,7 +19,7 @@ pub(crate) fn started() {
 }
 
 /// Writes the families of process and disk; `data` is the data directory.
-pub(super) fn write(all: &mut Exposition, data: &Path) {
+pub(super) fn write(all: &mut Exposition<'_>, data: &Path) {
     all.gauge("process_start_time_seconds", "Start of the server, seconds since 1970.").value(&[], *STARTED);
     #[cfg(unix)]
     all.counter("process_cpu_seconds_total", "Processor time of the process.").value(&[], cpu_s());

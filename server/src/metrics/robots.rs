@@ -6,7 +6,7 @@ use protos::Name;
 use std::time::{Duration, Instant};
 
 /// Writes the families of frames.
-pub(super) fn write_frames(all: &mut Exposition, app: &App, now: Instant) {
+pub(super) fn write_frames(all: &mut Exposition<'_>, app: &App, now: Instant) {
     let counts = app.slots.counts();
     all.counter("waymark_frames_received_total", "Frames that arrived.").value(&[], counts.received);
     all.counter(
@@ -19,7 +19,7 @@ pub(super) fn write_frames(all: &mut Exposition, app: &App, now: Instant) {
     .value(&[("outcome", "rejected")], counts.rejected_total());
     let mut rejected = all.counter("waymark_frames_rejected_total", "Refused frames by code.");
     for (code, count) in &counts.rejected {
-        rejected.value(&[("code", code.as_str())], count);
+        rejected.value(&[("code", code.as_str())], *count);
     }
     all.gauge("waymark_frames_waiting", "Frames that wait for a worker.").value(&[], counts.waiting);
     all.gauge("waymark_frames_in_work", "Frames in work.").value(&[], counts.in_work);
@@ -51,7 +51,7 @@ pub(super) fn write_frames(all: &mut Exposition, app: &App, now: Instant) {
 }
 
 /// Writes the families of other messages.
-pub(super) fn write_messages(all: &mut Exposition, app: &App) {
+pub(super) fn write_messages(all: &mut Exposition<'_>, app: &App) {
     let (odometry, scans) = app.motion.counts();
     let kinds = [("odometry", odometry), ("scan", scans), ("capture_time", app.motion.frame_stamps())];
     let mut accepted = all.counter(
@@ -64,7 +64,7 @@ pub(super) fn write_messages(all: &mut Exposition, app: &App) {
     let mut rejected = all.counter("waymark_messages_rejected_total", "The same, refused, by code.");
     for (kind, counts) in &kinds {
         for (code, count) in &counts.rejected {
-            rejected.value(&[("kind", kind), ("code", code.as_str())], count);
+            rejected.value(&[("kind", kind), ("code", code.as_str())], *count);
         }
     }
     all.gauge("waymark_scans_waiting", "Scans that wait for the laser thread.")
@@ -72,7 +72,7 @@ pub(super) fn write_messages(all: &mut Exposition, app: &App) {
 }
 
 /// Writes the families of robots.
-pub(super) fn write_robots(all: &mut Exposition, app: &App, now: Instant) {
+pub(super) fn write_robots(all: &mut Exposition<'_>, app: &App, now: Instant) {
     let names = app.store.snapshots().robots().into_keys().filter_map(|name| Name::new(name).ok());
     let robots: Vec<_> = names
         .map(|name| {
@@ -84,7 +84,7 @@ pub(super) fn write_robots(all: &mut Exposition, app: &App, now: Instant) {
     all.gauge("waymark_robots", "Registered robots.").value(&[], robots.len());
     let mut connected = all.gauge("waymark_robot_connected", "1 while the robot's software is connected.");
     for (robot, is_connected, _) in &robots {
-        connected.value(&[("robot", robot.as_str())], u8::from(*is_connected));
+        connected.value(&[("robot", robot.as_str())], u32::from(*is_connected));
     }
     let mut answered = all.counter("waymark_robot_frames_answered_total", "Answered frames by robot.");
     for (robot, _, activity) in &robots {
@@ -108,7 +108,7 @@ pub(super) fn write_robots(all: &mut Exposition, app: &App, now: Instant) {
 }
 
 /// Writes the families of maps.
-pub(super) fn write_maps(all: &mut Exposition, app: &App) {
+pub(super) fn write_maps(all: &mut Exposition<'_>, app: &App) {
     let maps = app.store.snapshots().all();
     let mut versions = all.gauge("waymark_map_version", "Version of the map that is in use.");
     for map in &maps {
