@@ -216,9 +216,7 @@ class AsyncMaps(AsyncBase):
         """Replaces the walls; returns those stored."""
         return await self._send(WallsBody, "set_walls", map, json={"segments": to_json(list(segments))})
 
-    async def read_wall_file(
-        self, map: str, file: bytes, kind: str, metres_per_unit: float | None = None
-    ) -> FileWalls:
+    async def read_wall_file(self, map: str, file: bytes, kind: str, metres_per_unit: float | None = None) -> FileWalls:
         """The walls of a file, which are stored nowhere. `kind` is the extension of its name: `geojson`, `svg`, `svgz`,
         `json` or `txt`. An SVG floor plan without a size needs the metres of one of its units."""
         query = query_of({"kind": kind, "metres_per_unit": metres_per_unit})
