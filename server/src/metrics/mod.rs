@@ -39,8 +39,12 @@ pub(crate) async fn text(app: &Arc<App>) -> Result<String, StoreError> {
         prometheus_text::encode(&mut text, &registry).ok();
         text
     });
-    // An error means that the server stops.
-    Ok(written.await.unwrap_or_default())
+    match written.await.map_err(tokio::task::JoinError::try_into_panic) {
+        Ok(text) => Ok(text),
+        Err(Ok(panic)) => std::panic::resume_unwind(panic),
+        // The server stops.
+        Err(Err(_cancelled)) => Ok(String::new()),
+    }
 }
 
 /// What is written when it is asked for.
