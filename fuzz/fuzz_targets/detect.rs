@@ -10,7 +10,7 @@ use vision::{
     detect::{
         DetectParams, Grouping, MAX_QUADS, MAX_SCALES, Nested, Quad, detect,
         edges::edge_map::EdgeMap,
-        segments::{edge_segments::EdgeSegment, joining::MAX_SEGMENTS},
+        segments::{edge_segments::EdgeSegment, collinear_merge::MAX_SEGMENTS},
     },
     frame::{Distortion, GrayImage, Intrinsics},
     geometry::polygon,

@@ -72,9 +72,9 @@ impl NoFix {
 impl From<&FixRefusal> for NoFix {
     fn from(refusal: &FixRefusal) -> Self {
         match refusal {
-            FixRefusal::Room { .. } => Self::GateReprojection,
+            FixRefusal::ReprojectionError { .. } => Self::GateReprojection,
             FixRefusal::Prior { .. } => Self::GatePrior,
-            FixRefusal::Side => Self::GateBehindWall,
+            FixRefusal::BehindWall => Self::GateBehindWall,
             FixRefusal::Disagree { .. } => Self::GateInconsistent,
             FixRefusal::Degenerate => Self::Degenerate,
         }
@@ -186,8 +186,9 @@ pub fn pose_refusal(
     fix: Option<&FixResult>,
     p: &LocaliseParams,
 ) -> Option<PoseRefusal> {
-    let Some(FixResult::Refused(FixRefusal::Room { chi2, limit } | FixRefusal::Disagree { chi2, limit })) =
-        fix
+    let Some(FixResult::Refused(
+        FixRefusal::ReprojectionError { chi2, limit } | FixRefusal::Disagree { chi2, limit },
+    )) = fix
     else {
         return None;
     };

@@ -167,7 +167,7 @@ fn guided_fix(
 const POSSIBLE_RATIO: f64 = 1.5;
 
 /// Whether a quad may show a landmark: by its verdict, or nearly.
-fn may_be(result: &RecognitionResult, id: LandmarkId) -> bool {
+fn is_plausible(result: &RecognitionResult, id: LandmarkId) -> bool {
     let (Verdict::Unique(named) | Verdict::Ambiguous(named)) = result.verdict else {
         return result.candidates.first().is_some_and(|c| c.landmark == id && c.ratio < POSSIBLE_RATIO);
     };
@@ -188,7 +188,7 @@ fn landmark_checks(
     };
     let observed = observations.unwrap_or_default().iter().filter_map(check).collect();
     let results = || analysis.quads.iter().filter_map(|q| q.recognition.as_ref());
-    let may_be_there = |id: LandmarkId| results().any(|result| may_be(result, id));
+    let may_be_there = |id: LandmarkId| results().any(|result| is_plausible(result, id));
     let candidates = map.models.iter().filter_map(|model| {
         let (info, visible) = (map.landmarks.get(&model.id)?, map.visibility.get(&model.id)?);
         let place = info.place.as_ref().filter(|_| info.is_trusted() && !may_be_there(model.id))?;

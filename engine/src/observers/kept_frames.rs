@@ -35,7 +35,7 @@ impl KeptFrame {
 }
 
 #[derive(Debug, Default)]
-struct Kept {
+struct Ring {
     frames: VecDeque<Arc<KeptFrame>>,
     bytes: usize,
 }
@@ -43,7 +43,7 @@ struct Kept {
 /// The frames.
 #[derive(Debug)]
 pub struct KeptFrames {
-    kept: Mutex<Kept>,
+    kept: Mutex<Ring>,
     max_bytes: usize,
 }
 

@@ -124,7 +124,7 @@ mod tests {
         assert!(check.is_refused && check.distance2.unwrap() > check.limit, "{check:?}");
         assert_eq!(check.seen, Some(pose(7.0)));
         // Another gate is no matter of the prior.
-        let other = FixResult::Refused(FixRefusal::Side);
+        let other = FixResult::Refused(FixRefusal::BehindWall);
         let check = prior_check(&evaluated(Some(1.0), Some(other)), None, LIMIT).unwrap();
         assert_eq!((check.seen, check.distance2, check.is_refused), (None, None, false));
     }

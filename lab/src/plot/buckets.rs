@@ -13,7 +13,7 @@ use vision::{
     recognise::{
         features,
         features::correlation::{bucket_correlations, correlation},
-        verification::gradient_similarity::{alike, bucket_similarities},
+        verification::gradient_similarity::{bucket_similarities, compare_gradients},
     },
 };
 
@@ -57,7 +57,7 @@ fn compared(
     let grey = bucket_correlations(&own.buckets, &learnt.buckets).unwrap_or_default();
     let gradient = bucket_similarities(&own.icon, &learnt.icon, c).unwrap_or_default();
     let distance = correlation(&own.buckets, &learnt.buckets, c);
-    let likeness = alike(&own.icon, &learnt.icon, c).likeness;
+    let likeness = compare_gradients(&own.icon, &learnt.icon, c).likeness;
     let rank = ranked(&grey, c.rank());
     Ok(row(&[
         titled(&drawn(&own.icon, FACTOR), title, WHITE),

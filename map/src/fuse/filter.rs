@@ -20,7 +20,7 @@ pub const MAX_SOURCES: usize = 32;
 
 /// Fixes that contradict the belief and agree with one another.
 #[derive(Debug, Clone)]
-struct Doubt {
+struct ContradictionCounter {
     /// The latest of them, moved along by odometry.
     pose: Pose2Covariance,
     count: u32,
@@ -45,7 +45,7 @@ fn sources(fix: &Fix) -> Vec<Source> {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Filter {
     belief: Option<Belief>,
-    doubt: Option<Doubt>,
+    doubt: Option<ContradictionCounter>,
     odometry: Option<Pose2>,
     /// Systematic odometry errors known before the present belief.
     learnt: Option<SystematicOdometryError>,
@@ -219,10 +219,11 @@ impl Filter {
             self.laser_doubts = self.laser_doubts.saturating_add(1);
             return FixOutcome::GatedOut { distance2, in_a_row: self.laser_doubts };
         }
-        let agrees = |d: &Doubt| d.pose.distance2(&fix.pose).is_some_and(|d2| d2 <= p.gate_chi2);
+        let agrees =
+            |d: &ContradictionCounter| d.pose.distance2(&fix.pose).is_some_and(|d2| d2 <= p.gate_chi2);
         let mut doubt = match self.doubt.take() {
             Some(doubt) if agrees(&doubt) => doubt,
-            _ => Doubt { pose: fix.pose, count: 0, landmarks: Vec::new() },
+            _ => ContradictionCounter { pose: fix.pose, count: 0, landmarks: Vec::new() },
         };
         doubt.pose = fix.pose;
         doubt.count = doubt.count.saturating_add(1);

@@ -64,7 +64,7 @@ pub fn check_place(
         FixResult::Fixed(fix) => std::slice::from_ref(&**fix),
         FixResult::Ambiguous(fixes) => fixes.as_slice(),
         // Another height or size: no floor pose fits the corners.
-        FixResult::Refused(FixRefusal::Room { .. } | FixRefusal::Side) => &[],
+        FixResult::Refused(FixRefusal::ReprojectionError { .. } | FixRefusal::BehindWall) => &[],
         FixResult::Refused(_) => return Ok(PlaceCheck { landmark, verdict: PlaceVerdict::Undecided }),
     };
     let distances = fixes.iter().map(|f| (distance2(&f.pose, pose), &f.pose));

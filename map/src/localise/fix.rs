@@ -94,7 +94,7 @@ pub enum FixRefusal {
     // residuals, weighted by the information of the corners, which is small from afar and large from near.
     /// Re-projection error above the gate for every floor pose: camera height, tilt or the landmark's place is
     /// wrong.
-    Room {
+    ReprojectionError {
         /// Weighted squared residual of the best solution.
         chi2: f64,
         /// Largest accepted value.
@@ -110,7 +110,7 @@ pub enum FixRefusal {
         limit: f64,
     },
     /// The camera would be behind the landmark's wall.
-    Side,
+    BehindWall,
     /// The landmarks contradict one another.
     Disagree {
         /// Weighted squared residual of the best solution.

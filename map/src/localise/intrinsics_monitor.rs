@@ -141,7 +141,7 @@ pub struct IntrinsicsMonitorState {
 }
 
 #[derive(Debug, Clone, Copy, Default)]
-struct OfLandmark {
+struct LandmarkResidual {
     observations: f64,
     gradient: f64,
     information: f64,
@@ -156,7 +156,7 @@ pub struct IntrinsicsMonitor {
     refused: u32,
     chi2: f64,
     dof: f64,
-    landmarks: BTreeMap<LandmarkId, OfLandmark>,
+    landmarks: BTreeMap<LandmarkId, LandmarkResidual>,
 }
 
 impl IntrinsicsMonitor {
@@ -306,7 +306,7 @@ mod tests {
                 FixResult::Fixed(fix) => {
                     monitor.add_fix(&fix, focal_evidence(&observations, &believed, &fix.pose.pose));
                 }
-                FixResult::Refused(FixRefusal::Room { .. }) => monitor.add_refusal(),
+                FixResult::Refused(FixRefusal::ReprojectionError { .. }) => monitor.add_refusal(),
                 FixResult::Ambiguous(_) | FixResult::Refused(_) => {}
             }
         }

@@ -40,7 +40,7 @@ pub(super) fn solve(
     if best.chi2 > limit {
         let chi2 = best.chi2;
         return FixResult::Refused(match observations.len() {
-            1 => FixRefusal::Room { chi2, limit },
+            1 => FixRefusal::ReprojectionError { chi2, limit },
             _ => FixRefusal::Disagree { chi2, limit },
         });
     }

@@ -231,7 +231,7 @@ fn contradictory_landmarks_and_places_are_refused() {
     // Its place is half a metre too high: no floor pose fits.
     let raised = LandmarkPlace { z_m: 2.0, ..place() };
     let answer = fix_of(&seen, &raised, None);
-    assert!(matches!(answer, FixResult::Refused(FixRefusal::Room { .. })), "{answer:?}");
+    assert!(matches!(answer, FixResult::Refused(FixRefusal::ReprojectionError { .. })), "{answer:?}");
     // Of two landmarks one was moved by a metre.
     let other = LandmarkPlace { x_m: place().x_m + 0.9, y_m: place().y_m - 0.6, ..place() };
     let b = observe(&truth, &other, &mounting().robot_from_camera, 0.5, &mut random).unwrap();

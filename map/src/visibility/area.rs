@@ -8,7 +8,7 @@ use crate::{
         local_frame::{LocalFrame, Moved},
         obstacle::Obstacle,
         outline::{Polygon, distance_to_segment, measure, outline},
-        quarters::{Quarter, contains, quarters},
+        quadrants::{Quadrant, contains, quadrants},
         settings::{PanTiltCamera, VisibilityParams},
     },
 };
@@ -26,7 +26,7 @@ pub struct VisibilityMap {
     /// Pan range of the camera, radians.
     pub(super) pan_rad: [f64; 2],
     /// Bounds of the area over direction.
-    pub(super) quarters: [Quarter; 4],
+    pub(super) quadrants: [Quadrant; 4],
     pub(super) polygons: Vec<Polygon>,
     pub(super) area_m2: f64,
     pub(super) centroid: Option<Point2<f64>>,
@@ -57,7 +57,7 @@ pub fn visibility(
         frame,
         centre: Point2::new(place.x_m, place.y_m),
         pan_rad: viewer.pan_rad,
-        quarters: Default::default(),
+        quadrants: Default::default(),
         polygons: Vec::new(),
         area_m2: 0.0,
         centroid: None,
@@ -70,8 +70,8 @@ pub fn visibility(
     if local.iter().any(|(a, b)| footprint.touches(a, b)) {
         return Ok(made);
     }
-    made.quarters = quarters(&limits, &footprint, &local);
-    made.polygons = outline(&frame, &made.quarters);
+    made.quadrants = quadrants(&limits, &footprint, &local);
+    made.polygons = outline(&frame, &made.quadrants);
     (made.area_m2, made.centroid) = measure(&made.polygons);
     Ok(made)
 }
@@ -132,7 +132,7 @@ impl VisibilityMap {
     /// Whether the landmark is visible for a camera at a point.
     pub fn contains(&self, camera: &Point2<f64>) -> bool {
         let q = self.frame.local(camera);
-        !self.polygons.is_empty() && q.coords.norm() <= self.reach_m && contains(&self.quarters, &q)
+        !self.polygons.is_empty() && q.coords.norm() <= self.reach_m && contains(&self.quadrants, &q)
     }
 
     /// Distance to the boundary of the area, metres, positive inside; minus infinity without an area.

@@ -9,7 +9,7 @@ use crate::{
         local_frame::LocalFrame,
         obstacle::Obstacle,
         outline::{Polygon, measure},
-        quarters::Quarter,
+        quadrants::Quadrant,
         settings::VisibilitySettings,
     },
 };
@@ -52,7 +52,7 @@ impl VisibilityMap {
         let mut bytes = vec![COMPUTATION];
         let mut put = |numbers: &[f64]| bytes.extend(numbers.iter().flat_map(|v| v.to_le_bytes()));
         put(&[self.reach_m]);
-        for quarter in &self.quarters {
+        for quarter in &self.quadrants {
             for envelope in [&quarter.far, &quarter.near] {
                 put(&[envelope.pieces().len() as f64]);
                 envelope.pieces().iter().for_each(|piece| put(&piece.numbers()));
@@ -82,8 +82,8 @@ impl VisibilityMap {
         }
         let mut rest = Numbers(numbers);
         let [reach_m] = rest.take()?;
-        let mut quarters: [Quarter; 4] = Default::default();
-        for quarter in &mut quarters {
+        let mut quadrants: [Quadrant; 4] = Default::default();
+        for quarter in &mut quadrants {
             quarter.far = rest.envelope()?;
             quarter.near = rest.envelope()?;
         }
@@ -98,7 +98,7 @@ impl VisibilityMap {
             frame: LocalFrame::new(place, settings.seen.standoff_m),
             centre: Point2::new(place.x_m, place.y_m),
             pan_rad: settings.viewer.pan_rad,
-            quarters,
+            quadrants,
             polygons,
             area_m2,
             centroid,

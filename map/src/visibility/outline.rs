@@ -3,8 +3,8 @@
 use crate::visibility::{
     envelope::{MAX_SLOPE, Piece},
     local_frame::LocalFrame,
+    quadrants::Quadrant,
     quarter_turn::turned_back,
-    quarters::Quarter,
 };
 use nalgebra::{Point2, Vector2};
 
@@ -89,9 +89,9 @@ pub(super) fn measure(polygons: &[Polygon]) -> (f64, Option<Point2<f64>>) {
 }
 
 /// The area between the near and the far bounds.
-pub(super) fn outline(frame: &LocalFrame, quarters: &[Quarter; 4]) -> Vec<Polygon> {
+pub(super) fn outline(frame: &LocalFrame, quadrants: &[Quadrant; 4]) -> Vec<Polygon> {
     let mut runs: Vec<Run> = Vec::new();
-    for (quarter, Quarter { far, near }) in quarters.iter().enumerate() {
+    for (quarter, Quadrant { far, near }) in quadrants.iter().enumerate() {
         let (nears, mut next) = (near.pieces(), 0);
         for outer in far.pieces() {
             let mut from = outer.from;

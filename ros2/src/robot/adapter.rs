@@ -4,7 +4,7 @@ use super::{
     camera::{CameraState, Pixels, Transforms, frame},
     laser::{planar_wire, scan},
     odometry::{OdometryAt, OdometryHistory},
-    problem::{Lack, Problem},
+    problem::{MissingInput, Problem},
     settings::{ImageForm, RobotSettings, SettingsError},
 };
 use crate::{
@@ -27,7 +27,7 @@ pub enum RobotMessage {
         /// The frame; absent intrinsics, mounting or odometry are among `lacks`.
         frame: v1::Frame,
         /// What it lacks: without intrinsics or mounting it is recognised and gives no pose.
-        lacks: Vec<Lack>,
+        lacks: Vec<MissingInput>,
     },
     /// Odometry.
     Odometry(v1::Odometry),
@@ -37,7 +37,7 @@ pub enum RobotMessage {
 
 /// What became of one message.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Taken {
+pub struct ConvertedMessage {
     /// What it gave, and what had waited for it.
     pub messages: Vec<RobotMessage>,
     /// What was not used.
@@ -100,8 +100,8 @@ impl RobotAdapter {
     }
 
     /// Takes one message of a topic, by its absolute name.
-    pub fn take(&mut self, topic: &str, message: &AnyMessage<'_>) -> Taken {
-        let mut taken = Taken::default();
+    pub fn take(&mut self, topic: &str, message: &AnyMessage<'_>) -> ConvertedMessage {
+        let mut taken = ConvertedMessage::default();
         let done = match message {
             AnyMessage::TFMessage(message) if self.is_transforms(topic) => {
                 self.transforms(topic, message, &mut taken);
@@ -154,7 +154,7 @@ impl RobotAdapter {
         }
     }
 
-    fn transforms(&mut self, topic: &str, message: &TFMessage<'_>, taken: &mut Taken) {
+    fn transforms(&mut self, topic: &str, message: &TFMessage<'_>, taken: &mut ConvertedMessage) {
         for transform in &message.transforms {
             let stamp = transform.header.stamp;
             if let Err(fault) = self.tree.insert(transform) {
@@ -177,7 +177,12 @@ impl RobotAdapter {
     }
 
     /// Odometry of its own topic, of whatever frame of the robot.
-    fn wheels(&mut self, topic: &str, message: &Odometry<'_>, taken: &mut Taken) -> Result<(), Problem> {
+    fn wheels(
+        &mut self,
+        topic: &str,
+        message: &Odometry<'_>,
+        taken: &mut ConvertedMessage,
+    ) -> Result<(), Problem> {
         let topic = || topic.to_owned();
         if message.header.stamp.is_zero() {
             return Err(Problem::NoStamp(topic()));
@@ -205,7 +210,7 @@ impl RobotAdapter {
     }
 
     /// Notes odometry, sends it, and releases what it covers.
-    fn moved(&mut self, at_ns: i64, odom_from_base: Isometry3<f64>, taken: &mut Taken) {
+    fn moved(&mut self, at_ns: i64, odom_from_base: Isometry3<f64>, taken: &mut ConvertedMessage) {
         if !self.odometry.push(at_ns, odom_from_base) {
             return;
         }
@@ -228,7 +233,12 @@ impl RobotAdapter {
         }
     }
 
-    fn laser(&mut self, topic: &str, message: &LaserScan<'_>, taken: &mut Taken) -> Result<(), Problem> {
+    fn laser(
+        &mut self,
+        topic: &str,
+        message: &LaserScan<'_>,
+        taken: &mut ConvertedMessage,
+    ) -> Result<(), Problem> {
         if message.header.stamp.is_zero() {
             return Err(Problem::NoStamp(topic.to_owned()));
         }
@@ -240,7 +250,7 @@ impl RobotAdapter {
     }
 
     /// Sends a scan with odometry of its time, or lets it wait for that.
-    fn release_scan(&mut self, mut scan: v1::Scan, taken: &mut Taken) -> Result<(), Problem> {
+    fn release_scan(&mut self, mut scan: v1::Scan, taken: &mut ConvertedMessage) -> Result<(), Problem> {
         match self.odometry.at(scan.captured_ns) {
             OdometryAt::Known(pose) => {
                 self.scan_seq += 1;
@@ -260,7 +270,7 @@ impl RobotAdapter {
         }
     }
 
-    fn image(&mut self, camera: usize, header: &Header<'_>, pixels: Pixels, taken: &mut Taken) {
+    fn image(&mut self, camera: usize, header: &Header<'_>, pixels: Pixels, taken: &mut ConvertedMessage) {
         let known = (&self.settings.cameras[camera], &self.cameras[camera]);
         let made = frame(known, header, pixels, &self.sources());
         // The picture is worth more than its odometry: it goes without, in its order.
@@ -272,7 +282,12 @@ impl RobotAdapter {
     }
 
     /// Sends a frame with odometry of its time, or lets it wait for that.
-    fn release_frame(&mut self, camera: usize, (frame, lacks): (v1::Frame, Vec<Lack>), taken: &mut Taken) {
+    fn release_frame(
+        &mut self,
+        camera: usize,
+        (frame, lacks): (v1::Frame, Vec<MissingInput>),
+        taken: &mut ConvertedMessage,
+    ) {
         match self.odometry.at(frame.captured_ns) {
             OdometryAt::Soon => self.cameras[camera].waiting = Some((frame, lacks)),
             OdometryAt::Known(pose) => self.send_frame(camera, (frame, lacks), Some(pose), taken),
@@ -283,9 +298,9 @@ impl RobotAdapter {
     fn send_frame(
         &mut self,
         camera: usize,
-        (mut frame, mut lacks): (v1::Frame, Vec<Lack>),
+        (mut frame, mut lacks): (v1::Frame, Vec<MissingInput>),
         odometry: Option<Isometry3<f64>>,
-        taken: &mut Taken,
+        taken: &mut ConvertedMessage,
     ) {
         if odometry.is_none() {
             lacks.push(self.no_odometry(frame.captured_ns));
@@ -299,7 +314,7 @@ impl RobotAdapter {
         taken.messages.push(RobotMessage::Frame { camera, frame_id, frame, lacks });
     }
 
-    fn no_odometry(&self, at_ns: i64) -> Lack {
+    fn no_odometry(&self, at_ns: i64) -> MissingInput {
         self.odometry.lack(self.settings.odometry.as_ref().unwrap_or(&self.settings.tf), at_ns)
     }
 

@@ -1,7 +1,7 @@
 //! Images as frames: pixels, intrinsics and mounting.
 
 use super::{
-    problem::{Input, Lack, LackReason, Problem},
+    problem::{Input, MissingInput, MissingReason, Problem},
     settings::CameraSettings,
 };
 use crate::{
@@ -23,7 +23,7 @@ pub(super) struct CameraState {
     /// The frame of its last picture.
     pub(super) frame_id: String,
     /// A frame that waits for odometry.
-    pub(super) waiting: Option<(v1::Frame, Vec<Lack>)>,
+    pub(super) waiting: Option<(v1::Frame, Vec<MissingInput>)>,
 }
 
 impl CameraState {
@@ -45,20 +45,20 @@ impl CameraState {
         &self,
         settings: &CameraSettings,
         (given, at_ns): ((u32, u32), i64),
-    ) -> Result<v1::Intrinsics, Lack> {
-        let lack = |age_ns, reason| Lack {
+    ) -> Result<v1::Intrinsics, MissingInput> {
+        let lack = |age_ns, reason| MissingInput {
             input: Input::CameraInfo,
             topic: settings.camera_info.clone(),
             age_ns,
             reason,
         };
         let (stamp_ns, model) =
-            self.calibration.as_ref().ok_or_else(|| lack(None, LackReason::NotReceived))?;
+            self.calibration.as_ref().ok_or_else(|| lack(None, MissingReason::NotReceived))?;
         let age_ns = Some(at_ns.saturating_sub(*stamp_ns));
         let model = model.clone().map_err(|error| lack(age_ns, error.into()))?;
         let calibrated = (model.width_px, model.height_px);
         if calibrated != given {
-            return Err(lack(age_ns, LackReason::ImageSize { calibrated, given }));
+            return Err(lack(age_ns, MissingReason::ImageSize { calibrated, given }));
         }
         let wire = model.to_wire();
         // A frame with a calibration that the server refuses would be refused as a whole; without it, it still names.
@@ -112,10 +112,10 @@ pub(super) struct Transforms<'a> {
 
 impl Transforms<'_> {
     /// Why a sensor's frame is not known on the robot.
-    pub(super) fn lack(&self, at_ns: i64, reason: LackReason) -> Lack {
-        let reason = if self.tree.is_empty() { LackReason::NotReceived } else { reason };
+    pub(super) fn lack(&self, at_ns: i64, reason: MissingReason) -> MissingInput {
+        let reason = if self.tree.is_empty() { MissingReason::NotReceived } else { reason };
         let age_ns = self.newest_ns.map(|newest| at_ns.saturating_sub(newest));
-        Lack { input: Input::Transforms, topic: self.topic.to_owned(), age_ns, reason }
+        MissingInput { input: Input::Transforms, topic: self.topic.to_owned(), age_ns, reason }
     }
 }
 
@@ -125,7 +125,7 @@ pub(super) fn frame(
     header: &Header<'_>,
     pixels: Pixels,
     transforms: &Transforms<'_>,
-) -> (v1::Frame, Vec<Lack>) {
+) -> (v1::Frame, Vec<MissingInput>) {
     let captured_ns = header.stamp.to_ns();
     let mut lacks = Vec::new();
     let intrinsics = state.intrinsics(settings, (pixels.size, captured_ns));

@@ -2,7 +2,7 @@
 
 use super::{
     camera::Transforms,
-    problem::{LackReason, Problem},
+    problem::{MissingReason, Problem},
 };
 use crate::{
     convert::{LaserMounting, PlanarPose, PlanarScan},
@@ -19,13 +19,14 @@ pub(super) fn scan(
 ) -> Result<v1::Scan, Problem> {
     let scan = PlanarScan::of(message).map_err(|fault| Problem::Scan { topic: topic.to_owned(), fault })?;
     let captured_ns = scan.first_ray_ns + (scan.last_ray_ns - scan.first_ray_ns) / 2;
-    let lacks = |reason: LackReason| {
+    let lacks = |reason: MissingReason| {
         let lack = Box::new(transforms.lack(captured_ns, reason));
         Problem::Lacks { topic: topic.to_owned(), lack }
     };
     let robot_from_laser = transforms.tree.lookup(transforms.base_frame, message.header.frame_id);
     let robot_from_laser = robot_from_laser.map_err(|error| lacks(error.into()))?;
-    let mounting = LaserMounting::of(&robot_from_laser).map_err(|error| lacks(LackReason::Laser(error)))?;
+    let mounting =
+        LaserMounting::of(&robot_from_laser).map_err(|error| lacks(MissingReason::Laser(error)))?;
     let scan = scan.mounted(&mounting);
     Ok(v1::Scan {
         captured_ns,

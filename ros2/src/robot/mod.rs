@@ -11,9 +11,9 @@ mod camera;
 mod laser;
 mod adapter;
 
-pub use adapter::{RobotAdapter, RobotMessage, Taken};
+pub use adapter::{ConvertedMessage, RobotAdapter, RobotMessage};
 pub use odometry::{MAX_ODOMETRY, MAX_STEP_BACK_NS, MAX_WAIT_NS};
-pub use problem::{Input, Lack, LackReason, Problem, advice};
+pub use problem::{Input, MissingInput, MissingReason, Problem, advice};
 pub use settings::{
     CameraSettings, ImageForm, MAX_CAMERAS, RobotSettings, SettingsError, TopicUse, absolute_topic,
 };

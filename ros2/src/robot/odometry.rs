@@ -1,6 +1,6 @@
 //! The last odometry of a robot, and its pose at any time between.
 
-use super::problem::{Input, Lack, LackReason};
+use super::problem::{Input, MissingInput, MissingReason};
 use nalgebra::Isometry3;
 use std::collections::VecDeque;
 
@@ -65,10 +65,10 @@ impl OdometryHistory {
     }
 
     /// Why there is no odometry for a message.
-    pub(super) fn lack(&self, topic: &str, at_ns: i64) -> Lack {
+    pub(super) fn lack(&self, topic: &str, at_ns: i64) -> MissingInput {
         let age_ns = self.newest_ns().map(|newest| at_ns.saturating_sub(newest));
-        let reason = if age_ns.is_some() { LackReason::NotAtThatTime } else { LackReason::NotReceived };
-        Lack { input: Input::Odometry, topic: topic.to_owned(), age_ns, reason }
+        let reason = if age_ns.is_some() { MissingReason::NotAtThatTime } else { MissingReason::NotReceived };
+        MissingInput { input: Input::Odometry, topic: topic.to_owned(), age_ns, reason }
     }
 }
 

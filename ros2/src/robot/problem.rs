@@ -31,7 +31,7 @@ impl fmt::Display for Input {
 
 /// Something that a message needs and that is not there.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Lack {
+pub struct MissingInput {
     /// What is missing.
     pub input: Input,
     /// The topic that it comes on.
@@ -39,12 +39,12 @@ pub struct Lack {
     /// Stamp of the message less the newest stamp on that topic; `None` where nothing was received on it.
     pub age_ns: Option<i64>,
     /// Why what was received does not do.
-    pub reason: LackReason,
+    pub reason: MissingReason,
 }
 
 /// Why what was received does not do.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum LackReason {
+pub enum MissingReason {
     /// Nothing was received.
     #[error("nothing was received")]
     NotReceived,
@@ -70,7 +70,7 @@ pub enum LackReason {
     Laser(LaserError),
 }
 
-impl fmt::Display for Lack {
+impl fmt::Display for MissingInput {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "no {} from `{}`: {}", self.input, self.topic, self.reason)?;
         match self.age_ns {
@@ -80,7 +80,7 @@ impl fmt::Display for Lack {
     }
 }
 
-impl From<LookupError> for LackReason {
+impl From<LookupError> for MissingReason {
     fn from(error: LookupError) -> Self {
         Self::Transform(Box::new(error))
     }
@@ -151,14 +151,14 @@ pub enum Problem {
         /// The topic.
         topic: String,
         /// What is missing.
-        lack: Box<Lack>,
+        lack: Box<MissingInput>,
     },
     /// A newer message of the same topic came while this one waited for odometry.
     #[error("a message of `{0}` was replaced while it waited for odometry")]
     Superseded(String),
 }
 
-/// What whoever runs the robot can do about a word of [`Problem::word`] or [`Lack::word`], or one of the wire; empty where the
+/// What whoever runs the robot can do about a word of [`Problem::word`] or [`MissingInput::word`], or one of the wire; empty where the
 /// sentence of the problem says it.
 pub fn advice(word: &str) -> &'static str {
     match word {
@@ -200,7 +200,7 @@ impl Problem {
     }
 }
 
-impl Lack {
+impl MissingInput {
     /// A word for counters.
     pub fn word(&self) -> &'static str {
         match self.input {

@@ -9,8 +9,8 @@ use ros2::{
         PoseWithCovariance, Quaternion, TFMessage, Time, Transform, TransformStamped, Vector3,
     },
     robot::{
-        CameraSettings, ImageForm, Input, Lack, LackReason, MAX_WAIT_NS, Problem, RobotAdapter, RobotMessage,
-        RobotSettings, Taken,
+        CameraSettings, ConvertedMessage, ImageForm, Input, MAX_WAIT_NS, MissingInput, MissingReason,
+        Problem, RobotAdapter, RobotMessage, RobotSettings,
     },
 };
 
@@ -116,7 +116,7 @@ fn scan(ms: i64) -> AnyMessage<'static> {
     AnyMessage::LaserScan(turn(ms))
 }
 
-pub(super) fn frames(taken: &Taken) -> Vec<(&v1::Frame, &[Lack])> {
+pub(super) fn frames(taken: &ConvertedMessage) -> Vec<(&v1::Frame, &[MissingInput])> {
     let frames = taken.messages.iter().filter_map(|message| match message {
         RobotMessage::Frame { frame, lacks, .. } => Some((frame, lacks.as_slice())),
         _ => None,
@@ -124,7 +124,7 @@ pub(super) fn frames(taken: &Taken) -> Vec<(&v1::Frame, &[Lack])> {
     frames.collect()
 }
 
-pub(super) fn scans(taken: &Taken) -> Vec<&v1::Scan> {
+pub(super) fn scans(taken: &ConvertedMessage) -> Vec<&v1::Scan> {
     let scans = taken.messages.iter().filter_map(|message| match message {
         RobotMessage::Scan(scan) => Some(scan),
         _ => None,
@@ -135,8 +135,8 @@ pub(super) fn scans(taken: &Taken) -> Vec<&v1::Scan> {
 #[test]
 fn an_image_becomes_a_frame_with_all_that_is_known() {
     let mut robot = robot();
-    assert_eq!(robot.take("/tf_static", &mountings()), Taken::default());
-    assert_eq!(robot.take(CAMERA_INFO, &AnyMessage::CameraInfo(info(900))), Taken::default());
+    assert_eq!(robot.take("/tf_static", &mountings()), ConvertedMessage::default());
+    assert_eq!(robot.take(CAMERA_INFO, &AnyMessage::CameraInfo(info(900))), ConvertedMessage::default());
     robot.take("/odom", &wheels(1000, 1.0));
     robot.take("/odom", &wheels(2000, 3.0));
     let taken = robot.take(IMAGE, &image(1500));
@@ -194,7 +194,7 @@ fn what_a_frame_lacks_is_said_with_topic_and_age() {
     let [(frame, lacks)] = frames(&taken)[..] else { panic!("{taken:?}") };
     assert!(frame.intrinsics.is_none() && frame.robot_from_camera.is_none() && frame.odometry.is_none());
     let said: Vec<_> = lacks.iter().map(|l| (l.input, l.topic.as_str(), l.age_ns, &l.reason)).collect();
-    let nothing = &LackReason::NotReceived;
+    let nothing = &MissingReason::NotReceived;
     let expected = [
         (Input::CameraInfo, CAMERA_INFO, None, nothing),
         (Input::Transforms, "/tf_static", None, nothing),
@@ -204,15 +204,15 @@ fn what_a_frame_lacks_is_said_with_topic_and_age() {
 
     robot.take(CAMERA_INFO, &AnyMessage::CameraInfo(CameraInfo { width: 8, ..info(1000) }));
     let moved = tf(vec![link(1200, "odom", "base_link", [0.0; 3], Quaternion::default())]);
-    assert_eq!(robot.take("/tf", &moved), Taken::default(), "odometry has a topic of its own");
+    assert_eq!(robot.take("/tf", &moved), ConvertedMessage::default(), "odometry has a topic of its own");
     robot.take("/odom", &wheels(100, 0.0));
     let taken = robot.take(IMAGE, &image(1600));
     let lacks = frames(&taken)[0].1;
-    let size = LackReason::ImageSize { calibrated: (8, 2), given: (4, 2) };
+    let size = MissingReason::ImageSize { calibrated: (8, 2), given: (4, 2) };
     assert_eq!((&lacks[0].reason, lacks[0].age_ns), (&size, Some(600_000_000)));
-    let unknown = LackReason::from(LookupError::Unknown(OPTICAL.into()));
+    let unknown = MissingReason::from(LookupError::Unknown(OPTICAL.into()));
     assert_eq!((&lacks[1].reason, lacks[1].age_ns), (&unknown, Some(400_000_000)));
-    assert_eq!((&lacks[2].reason, lacks[2].age_ns), (&LackReason::NotAtThatTime, Some(1_500_000_000)));
+    assert_eq!((&lacks[2].reason, lacks[2].age_ns), (&MissingReason::NotAtThatTime, Some(1_500_000_000)));
     assert_eq!(
         lacks[0].to_string(),
         "no calibration from `/camera/camera_info`: it is of images of (8, 2) px, these have (4, 2) (newest 0.600 s \
@@ -221,7 +221,7 @@ fn what_a_frame_lacks_is_said_with_topic_and_age() {
     let k = [0.0; 9];
     robot.take(CAMERA_INFO, &AnyMessage::CameraInfo(CameraInfo { k, ..info(1600) }));
     let taken = robot.take(IMAGE, &image(1600));
-    assert_eq!(frames(&taken)[0].1[0].reason, LackReason::Camera(CameraError::Uncalibrated));
+    assert_eq!(frames(&taken)[0].1[0].reason, MissingReason::Camera(CameraError::Uncalibrated));
 }
 
 #[test]
@@ -283,7 +283,7 @@ fn a_scan_has_the_lasers_place_and_the_time_of_its_middle() {
     let askew = LaserScan { header: header(1500, OPTICAL), ..turn(0) };
     let taken = robot.take("/scan", &AnyMessage::LaserScan(askew));
     let Problem::Lacks { lack, .. } = &taken.problems[0] else { panic!("{taken:?}") };
-    assert!(matches!(lack.reason, LackReason::Laser(_)));
+    assert!(matches!(lack.reason, MissingReason::Laser(_)));
     let empty = LaserScan { ranges: vec![], ..turn(1500) };
     assert_eq!(robot.take("/scan", &AnyMessage::LaserScan(empty)).problems[0].word(), "bad_scan");
 }
@@ -294,17 +294,17 @@ fn frames_and_scans_wait_for_odometry_of_their_time() {
     robot.take("/tf_static", &mountings());
     assert_eq!(robot.take("/scan", &scan(1000)).problems[0].word(), "no_odometry");
     robot.take("/odom", &wheels(1000, 1.0));
-    assert_eq!(robot.take("/scan", &scan(1100)), Taken::default());
+    assert_eq!(robot.take("/scan", &scan(1100)), ConvertedMessage::default());
     let replaced = robot.take("/scan", &scan(1140));
     assert_eq!(replaced.problems, [Problem::Superseded("/scan".into())]);
-    assert_eq!(robot.take(IMAGE, &image(1150)), Taken::default());
+    assert_eq!(robot.take(IMAGE, &image(1150)), ConvertedMessage::default());
     let taken = robot.take("/odom", &wheels(1200, 2.0));
     assert_eq!(taken.messages.len(), 3, "odometry, scan, frame");
     assert_eq!((scans(&taken)[0].seq, scans(&taken)[0].captured_ns), (1, 1_150_000_000));
     assert!((frames(&taken)[0].0.odometry.unwrap().x_m - 1.75).abs() < 1e-9);
 
     // A second picture finds the first still waiting: that one goes without odometry, before it.
-    assert_eq!(robot.take(IMAGE, &image(1300)), Taken::default());
+    assert_eq!(robot.take(IMAGE, &image(1300)), ConvertedMessage::default());
     let taken = robot.take(IMAGE, &image(1400));
     let [(frame, lacks)] = frames(&taken)[..] else { panic!("{taken:?}") };
     assert_eq!((frame.seq, frame.odometry, lacks.last().unwrap().input), (2, None, Input::Odometry));
@@ -335,7 +335,7 @@ fn odometry_is_that_of_the_base_frame() {
     let AnyMessage::Odometry(other) = wheels(30, 1.0) else { unreachable!() };
     let other = Odometry { header: header(30, "world"), ..other };
     assert_eq!(robot.take("/odom", &AnyMessage::Odometry(other)).problems[0].word(), "odometry_frame");
-    assert_eq!(robot.take("/odom", &wheels(20, 5.0)), Taken::default(), "not newer");
+    assert_eq!(robot.take("/odom", &wheels(20, 5.0)), ConvertedMessage::default(), "not newer");
     assert_eq!(robot.take("/odom", &wheels(0, 5.0)).problems, [Problem::NoStamp("/odom".into())]);
 }
 
@@ -345,7 +345,7 @@ fn odometry_may_come_by_transforms() {
     let mut robot = RobotAdapter::new(settings, EPOCH).unwrap();
     let level = Quaternion::default();
     let moved = |ms| tf(vec![link(ms, "odom", "base_footprint", [2.0, 0.0, 0.0], level)]);
-    assert_eq!(robot.take("/tf", &moved(10)), Taken::default(), "no link to the base yet");
+    assert_eq!(robot.take("/tf", &moved(10)), ConvertedMessage::default(), "no link to the base yet");
     robot.take("/tf_static", &tf(vec![link(0, "base_footprint", "base_link", [0.5, 0.0, 0.0], level)]));
     let taken = robot.take("/tf", &moved(20));
     let RobotMessage::Odometry(odometry) = &taken.messages[0] else { panic!("{taken:?}") };

@@ -61,7 +61,7 @@ pub(super) struct GateSettings {
 }
 
 /// What tells the gate that robots may do something else, and that the server shows another certificate.
-type News = (watch::Receiver<u64>, watch::Receiver<Arc<ServerCertificate>>);
+type ChangeSignals = (watch::Receiver<u64>, watch::Receiver<Arc<ServerCertificate>>);
 
 /// The gate at work.
 pub(super) struct Gate {
@@ -154,7 +154,7 @@ impl Gate {
 
 /// Why a gate looks at what it rests on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Why {
+enum ReopenReason {
     /// Robots may do something else.
     Rights,
     /// The server shows another certificate.
@@ -167,23 +167,23 @@ async fn keep(
     settings: GateSettings,
     mut policy: Policy,
     mut session: zenoh::Session,
-    (mut changes, mut shown): News,
+    (mut changes, mut shown): ChangeSignals,
     mut stopping: watch::Receiver<bool>,
     pulse: Pulse,
 ) {
     loop {
         let why = tokio::select! {
             _ = stopping.wait_for(|stop| *stop) => break,
-            Ok(()) = changes.changed() => Why::Rights,
-            Ok(()) = shown.changed() => Why::Certificate,
-            () = tokio::time::sleep(LOOK_EVERY) => Why::Interval,
+            Ok(()) = changes.changed() => ReopenReason::Rights,
+            Ok(()) = shown.changed() => ReopenReason::Certificate,
+            () = tokio::time::sleep(LOOK_EVERY) => ReopenReason::Interval,
         };
         tokio::time::sleep(GATHER).await;
-        if why == Why::Certificate {
+        if why == ReopenReason::Certificate {
             settings.admission.renew();
         }
         // A robot would be linked, and told that it is not admitted.
-        let is_cut_off = why == Why::Interval
+        let is_cut_off = why == ReopenReason::Interval
             && tokio::select! {
                 _ = stopping.wait_for(|stop| *stop) => break,
                 is_joined = settings.join(&session, LONGEST_JOIN) => !is_joined,

@@ -1,7 +1,7 @@
 //! `robot/{robot}/rpc/gaze`: answers gaze queries of robots on zenoh's thread, in less than a millisecond.
 
 use super::{BusError, Receivers, caught};
-use crate::fleet::Duty;
+use crate::fleet::Responsibility;
 use engine::{gaze::GazeQuery, panics::Edge};
 use map::gaze::GazeParams;
 use protos::{
@@ -30,10 +30,10 @@ pub(super) async fn answer_gaze(
         move |query: Query| {
             let Ok(Key::Gaze(robot)) = keys.parse(query.key_expr().as_str()) else { return };
             let payload = || query.payload().map(|p| p.to_bytes().into_owned()).unwrap_or_default();
-            let refusal = match to.duty(&robot, || named_map::of_gaze(&payload())) {
-                Duty::Take => None,
-                Duty::Silent => return,
-                Duty::Refuse(rejection) => Some(rejection),
+            let refusal = match to.responsibility(&robot, || named_map::of_gaze(&payload())) {
+                Responsibility::Take => None,
+                Responsibility::Silent => return,
+                Responsibility::Refuse(rejection) => Some(rejection),
             };
             let panics = to.vitals.panics();
             let advice = panics.catch(Edge::Message, "a gaze query", "it is refused as internal", || {

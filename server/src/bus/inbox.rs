@@ -2,7 +2,7 @@
 //! on. A refused frame is answered; every refusal is counted. Nothing here waits or panics.
 
 use super::{BusError, Outbox, Receivers, caught};
-use crate::fleet::Duty;
+use crate::fleet::Responsibility;
 use engine::{
     intake::{FrameKind, refusal_unread},
     panics::Edge,
@@ -33,7 +33,7 @@ pub(super) async fn subscribe(
         move |sample: Sample| {
             let Ok(Key::Odometry(robot)) = keys.parse(sample.key_expr().as_str()) else { return };
             let message = bytes(&sample);
-            if is_taken(&to, &robot, || named_map::of_odometry(&message))
+            if accepts(&to, &robot, || named_map::of_odometry(&message))
                 && let Some(pose) = to.motion.odometry(&robot, message.clone(), Instant::now())
             {
                 outbox.pose(&robot, &pose);
@@ -45,7 +45,7 @@ pub(super) async fn subscribe(
         move |sample: Sample| {
             let Ok(Key::Scan(robot)) = keys.parse(sample.key_expr().as_str()) else { return };
             let message = bytes(&sample);
-            if is_taken(&to, &robot, || named_map::of_scan(&message)) {
+            if accepts(&to, &robot, || named_map::of_scan(&message)) {
                 to.motion.scan(&robot, message, Instant::now());
             }
         }
@@ -79,8 +79,8 @@ pub(super) async fn subscribe(
 }
 
 /// Whether this server takes a message that is not answered.
-fn is_taken(to: &Receivers, robot: &Name, map: impl FnOnce() -> String) -> bool {
-    to.admits(robot) && to.duty(robot, map) == Duty::Take
+fn accepts(to: &Receivers, robot: &Name, map: impl FnOnce() -> String) -> bool {
+    to.admits(robot) && to.responsibility(robot, map) == Responsibility::Take
 }
 
 /// A liveliness token of a robot, in this slot, appeared or went.
@@ -117,10 +117,10 @@ fn frame(keys: &Keys, to: &Receivers, outbox: &Outbox, sample: &Sample) {
 pub(crate) fn take_frame(to: &Receivers, outbox: &Outbox, kind: FrameKind, slot: &SlotKey, message: &Bytes) {
     let _span = tracing::debug_span!("camera", robot = %slot.robot, camera = %slot.camera).entered();
     let head = LazyCell::new(|| kind.head(message));
-    match to.duty(&slot.robot, || head.map.clone()) {
-        Duty::Take => {}
-        Duty::Silent => return,
-        Duty::Refuse(rejection) => {
+    match to.responsibility(&slot.robot, || head.map.clone()) {
+        Responsibility::Take => {}
+        Responsibility::Silent => return,
+        Responsibility::Refuse(rejection) => {
             to.intake.slots.refuse(rejection.code);
             return refuse(to, outbox, slot, refusal_unread(&head, &rejection));
         }

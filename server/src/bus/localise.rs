@@ -5,7 +5,7 @@
 //! in it, so that none keeps the others out.
 
 use super::{BusError, Receivers, caught};
-use crate::fleet::Duty;
+use crate::fleet::Responsibility;
 use crate::localise_body::localise_body;
 use engine::{
     decode::{ImageLimits, decode_frame},
@@ -96,10 +96,12 @@ impl Localiser {
             move |query: Query| {
                 let Ok(Key::Localise(robot)) = keys.parse(query.key_expr().as_str()) else { return };
                 let payload = query.payload().map(|payload| payload.to_bytes()).unwrap_or_default();
-                match to.duty(&robot, || named_map::of_localise(&payload)) {
-                    Duty::Take => {}
-                    Duty::Silent => return,
-                    Duty::Refuse(refusal) => return reply((&robot, &to.server), &query, Err(refusal)),
+                match to.responsibility(&robot, || named_map::of_localise(&payload)) {
+                    Responsibility::Take => {}
+                    Responsibility::Silent => return,
+                    Responsibility::Refuse(refusal) => {
+                        return reply((&robot, &to.server), &query, Err(refusal));
+                    }
                 }
                 drop(payload);
                 let panics = to.vitals.panics();

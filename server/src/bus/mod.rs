@@ -29,7 +29,7 @@ pub(crate) use ping::Pinger;
 
 use crate::{
     config::Config,
-    fleet::{Duty, Fleet},
+    fleet::{Fleet, Responsibility},
     identity::certificates::{CertificateRegistry, Certificates},
     store::now_ms,
 };
@@ -139,8 +139,10 @@ impl Receivers {
     }
 
     /// What this server does with a message of a robot; `map` reads the map that it names.
-    pub(crate) fn duty(&self, robot: &Name, map: impl FnOnce() -> String) -> Duty {
-        self.fleet.as_ref().map_or(Duty::Take, |fleet| fleet.duty(robot, &map(), Instant::now()))
+    pub(crate) fn responsibility(&self, robot: &Name, map: impl FnOnce() -> String) -> Responsibility {
+        self.fleet
+            .as_ref()
+            .map_or(Responsibility::Take, |fleet| fleet.responsibility(robot, &map(), Instant::now()))
     }
 
     /// Whether robots are answered on a map here.
@@ -154,14 +156,14 @@ pub struct Bus {
     endpoint: String,
     outbox: Outbox,
     changes: JoinHandle<()>,
-    way: Way,
+    way: Router,
     /// Who asks the server itself, over its own router; with what answers, which is held.
     pinger: Option<Pinger>,
     _pings: Option<Queryable<()>>,
 }
 
 /// How robots reach the server.
-enum Way {
+enum Router {
     /// By its own router, and what is before it.
     Own(Box<Receiving>, Doors),
     /// By a router of the operator.
@@ -192,7 +194,7 @@ impl Bus {
             let changes = begin_changes(&to, &outbox);
             let pulse = to.vitals.begin("the task that joins the router");
             tracing::info!(endpoint, fleet = %config.fleet, server = %to.server, "the router is joined");
-            let way = Way::Joined(Join::start(settings, (to, outbox.clone()), fleet, cell, pulse));
+            let way = Router::Joined(Join::start(settings, (to, outbox.clone()), fleet, cell, pulse));
             return Ok(Self { endpoint, outbox, changes, way, pinger: None, _pings: None });
         }
         let own = OwnRouter::open(config, sockets, certificates).await?;
@@ -203,7 +205,7 @@ impl Bus {
         let receiving = Receiving::start(session, &keys, (&to, &outbox), pixels).await?;
         let doors = own.admit(config, keys, &to).await?;
         tracing::info!(endpoint, fleet = %config.fleet, "robots may connect");
-        let way = Way::Own(Box::new(receiving), doors);
+        let way = Router::Own(Box::new(receiving), doors);
         Ok(Self { endpoint, outbox, changes, way, pinger: Some(pinger), _pings: Some(pings) })
     }
 
@@ -215,8 +217,8 @@ impl Bus {
     /// The session of the server's own router, for robots of other middleware.
     pub(crate) fn session(&self) -> Option<&zenoh::Session> {
         match &self.way {
-            Way::Own(receiving, _) => Some(&receiving.session),
-            Way::Joined(_) => None,
+            Router::Own(receiving, _) => Some(&receiving.session),
+            Router::Joined(_) => None,
         }
     }
 
@@ -234,12 +236,12 @@ impl Bus {
     pub async fn close(self) {
         self.changes.abort();
         match self.way {
-            Way::Own(receiving, doors) => {
+            Router::Own(receiving, doors) => {
                 let session = receiving.end().await;
                 self.outbox.drain().await;
                 doors.close(&session).await;
             }
-            Way::Joined(join) => {
+            Router::Joined(join) => {
                 let announced = join.end().await;
                 self.outbox.drain().await;
                 if let Some(announced) = announced {

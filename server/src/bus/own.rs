@@ -3,7 +3,7 @@
 
 use super::{
     BusError, Receivers, close,
-    front::{self, Admission, Front, Lasting, ToGate, Way},
+    front::{self, Admission, Front, Lasting, ToGate, Destination},
     gate::{Gate, GateSettings},
     router::{self, RouterSettings},
 };
@@ -114,7 +114,7 @@ impl OwnRouter {
     pub(super) async fn admit(self, config: &Config, keys: Keys, to: &Receivers) -> Result<Doors, BusError> {
         let (robots, path) = (config.limits.robots, self.socket.path());
         let lasting = Arc::new(Lasting::default());
-        let way = || Way::Plain(path.clone(), lasting.clone());
+        let way = || Destination::Plain(path.clone(), lasting.clone());
         let plain = |listener| Front::open(listener, way(), robots, to.live.clone());
         let Some(certificates) = self.certificates else {
             return Ok(Doors { fronts: vec![plain(self.listener)], gate: None, _socket: self.socket });
@@ -143,7 +143,7 @@ impl OwnRouter {
         };
         let gate = Gate::open(settings, to.vitals.begin("the task that admits robots")).await?;
         let mut fronts: Vec<Front> = self.local.into_iter().map(plain).collect();
-        fronts.push(Front::open(self.listener, Way::Certified(admission, to_gate), robots, to.live.clone()));
+        fronts.push(Front::open(self.listener, Destination::Certified(admission, to_gate), robots, to.live.clone()));
         Ok(Doors { fronts, gate: Some(gate), _socket: self.socket })
     }
 }

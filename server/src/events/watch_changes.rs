@@ -15,7 +15,7 @@ use tokio::sync::{broadcast::error::RecvError, watch};
 const MAX_NAMED: usize = 100;
 
 /// Maps as they were told last.
-type Told = BTreeMap<String, Arc<MapSnapshot>>;
+type PublishedVersions = BTreeMap<String, Arc<MapSnapshot>>;
 
 /// Tells changes until the server stops.
 pub(crate) async fn watch_changes(
@@ -24,7 +24,8 @@ pub(crate) async fn watch_changes(
     (pulse, mut stopping): (Pulse, watch::Receiver<bool>),
 ) {
     let (mut maps, mut robots, mut token_changes) = (snapshots.changes(), live.events(), tokens.changes());
-    let mut told: Told = snapshots.all().into_iter().map(|map| (map.name.clone(), map)).collect();
+    let mut told: PublishedVersions =
+        snapshots.all().into_iter().map(|map| (map.name.clone(), map)).collect();
     loop {
         tokio::select! {
             _ = stopping.wait_for(|stop| *stop) => break,
@@ -52,7 +53,7 @@ pub(crate) async fn watch_changes(
     pulse.end();
 }
 
-fn tell_all(log: &EventLog, snapshots: &Snapshots, told: &mut Told) {
+fn tell_all(log: &EventLog, snapshots: &Snapshots, told: &mut PublishedVersions) {
     let mut names: Vec<String> = told.keys().cloned().collect();
     names.extend(snapshots.all().iter().map(|map| map.name.clone()));
     names.sort();
@@ -63,7 +64,7 @@ fn tell_all(log: &EventLog, snapshots: &Snapshots, told: &mut Told) {
 }
 
 /// Tells what is new of a map since it was told last.
-fn tell_map(log: &EventLog, snapshots: &Snapshots, told: &mut Told, name: &str) {
+fn tell_map(log: &EventLog, snapshots: &Snapshots, told: &mut PublishedVersions, name: &str) {
     let Some(map) = snapshots.get(name) else {
         if told.remove(name).is_some() {
             log.tell(ServerEventBody::MapChanged { map: name.to_owned(), version: None });
@@ -120,7 +121,8 @@ mod tests {
 
     #[test]
     fn each_landmark_that_changes_is_named_once_and_many_are_counted() {
-        let (log, snapshots, mut told) = (EventLog::default(), Snapshots::default(), Told::new());
+        let (log, snapshots, mut told) =
+            (EventLog::default(), Snapshots::default(), PublishedVersions::new());
         let mut after = 0;
         let mut told_of = |map: Option<Arc<MapSnapshot>>| {
             match map {

@@ -6,7 +6,7 @@
 //! serve and meet both stop. Who has refused serves only once no other holds the map: two that refuse stay so until a person
 //! deletes or renames one of the maps, so that nothing can go back and forth.
 
-use super::others::Others;
+use super::peers::Peers;
 use protos::{Name, ServerToken};
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -20,7 +20,7 @@ pub(crate) const RETURN: Duration = Duration::from_secs(10);
 
 /// Whether a map is served.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Claim {
+pub(crate) enum MapClaim {
     /// Not yet: others may not know of it.
     Waiting {
         /// When it was announced.
@@ -40,34 +40,34 @@ pub(crate) enum Claim {
 /// The claims of a server, by map.
 #[derive(Debug, Default)]
 pub(crate) struct Claims {
-    maps: BTreeMap<Name, Claim>,
+    maps: BTreeMap<Name, MapClaim>,
 }
 
 impl Claims {
     /// What became of a map.
-    pub(crate) fn of(&self, map: &Name) -> Option<Claim> {
+    pub(crate) fn of(&self, map: &Name) -> Option<MapClaim> {
         self.maps.get(map).copied()
     }
 
     /// All, by map.
-    pub(crate) fn all(&self) -> impl Iterator<Item = (&Name, &Claim)> {
+    pub(crate) fn all(&self) -> impl Iterator<Item = (&Name, &MapClaim)> {
         self.maps.iter()
     }
 
     /// The connection broke: nobody is heard, and others may take over.
     pub(crate) fn suspend(&mut self, now: Instant) {
         for claim in self.maps.values_mut() {
-            if *claim == Claim::Served {
-                *claim = Claim::Waiting { since: now, was_served: true };
+            if *claim == MapClaim::Served {
+                *claim = MapClaim::Waiting { since: now, was_served: true };
             }
         }
     }
 
     /// Moves on. `joined`: when the connection was made.
-    pub(crate) fn step(&mut self, own: &BTreeSet<Name>, others: &Others, joined: Instant, now: Instant) {
+    pub(crate) fn step(&mut self, own: &BTreeSet<Name>, others: &Peers, joined: Instant, now: Instant) {
         self.maps.retain(|map, _| own.contains(map));
         for map in own {
-            let new = Claim::Waiting { since: now, was_served: false };
+            let new = MapClaim::Waiting { since: now, was_served: false };
             let claim = self.maps.entry(map.clone()).or_insert(new);
             let holders = others.with(&ServerToken::Holds(map.clone()));
             let serving = others.with(&ServerToken::Serves(map.clone()));
@@ -80,37 +80,39 @@ impl Claims {
     }
 }
 
-fn next(claim: Claim, (holders, serving): (&[Name], &[Name]), joined: Instant, now: Instant) -> Claim {
+fn next(claim: MapClaim, (holders, serving): (&[Name], &[Name]), joined: Instant, now: Instant) -> MapClaim {
     let has_settled = |since: Instant| now.duration_since(since.max(joined)) >= SETTLE;
     match claim {
-        Claim::Waiting { since, was_served } if has_settled(since) => {
+        MapClaim::Waiting { since, was_served } if has_settled(since) => {
             let is_free = serving.is_empty() && (was_served || holders.is_empty());
-            if is_free { Claim::Served } else { Claim::Refused { free: None } }
+            if is_free { MapClaim::Served } else { MapClaim::Refused { free: None } }
         }
-        Claim::Served if !serving.is_empty() => Claim::Refused { free: None },
-        Claim::Refused { .. } if !holders.is_empty() || !serving.is_empty() => Claim::Refused { free: None },
-        Claim::Refused { free: None } => Claim::Refused { free: Some(now) },
-        Claim::Refused { free: Some(since) }
+        MapClaim::Served if !serving.is_empty() => MapClaim::Refused { free: None },
+        MapClaim::Refused { .. } if !holders.is_empty() || !serving.is_empty() => {
+            MapClaim::Refused { free: None }
+        }
+        MapClaim::Refused { free: None } => MapClaim::Refused { free: Some(now) },
+        MapClaim::Refused { free: Some(since) }
             if has_settled(since) && now.duration_since(joined) >= RETURN =>
         {
-            Claim::Served
+            MapClaim::Served
         }
         same => same,
     }
 }
 
-fn tell(map: &Name, claim: Claim, holders: &[Name], serving: &[Name]) {
+fn tell(map: &Name, claim: MapClaim, holders: &[Name], serving: &[Name]) {
     let names = |of: &[Name]| of.iter().map(Name::as_str).collect::<Vec<_>>().join(", ");
     match claim {
-        Claim::Served => tracing::info!(%map, "map_served"),
-        Claim::Refused { free: None } => tracing::error!(
+        MapClaim::Served => tracing::info!(%map, "map_served"),
+        MapClaim::Refused { free: None } => tracing::error!(
             %map,
             held_by = names(holders),
             served_by = names(serving),
             follows = "robots are refused on it here; delete or rename the map on one of the servers",
             "map_contested"
         ),
-        Claim::Refused { .. } | Claim::Waiting { .. } => {}
+        MapClaim::Refused { .. } | MapClaim::Waiting { .. } => {}
     }
 }
 
@@ -138,8 +140,8 @@ mod tests {
             Self { now, joined: [now; 2], claims: Default::default(), has: [false; 2] }
         }
 
-        fn view(&self, of: usize) -> Others {
-            let (mut others, other) = (Others::default(), name(["a", "b"][1 - of]));
+        fn view(&self, of: usize) -> Peers {
+            let (mut others, other) = (Peers::default(), name(["a", "b"][1 - of]));
             if self.has[1 - of] {
                 others.hear(&other, ServerToken::Holds(name("hall")), true);
                 if self.is_served(1 - of) {
@@ -150,7 +152,7 @@ mod tests {
         }
 
         fn is_served(&self, i: usize) -> bool {
-            self.claims[i].of(&name("hall")) == Some(Claim::Served)
+            self.claims[i].of(&name("hall")) == Some(MapClaim::Served)
         }
 
         fn step(&mut self, by: Duration) -> [bool; 2] {
@@ -201,7 +203,7 @@ mod tests {
         let mut pair = Pair::new();
         pair.has = [true; 2];
         for claims in &mut pair.claims {
-            claims.maps.insert(name("hall"), Claim::Served);
+            claims.maps.insert(name("hall"), MapClaim::Served);
         }
         assert_eq!(pair.step(HALF), [false, false]);
         assert_eq!(pair.after(100 * SETTLE), [false, false]);
@@ -226,11 +228,11 @@ mod tests {
             pair.joined[second] = pair.now;
             if second == 1 {
                 // It was not without the map, but without a connection.
-                pair.claims[1].maps.insert(name("hall"), Claim::Refused { free: None });
+                pair.claims[1].maps.insert(name("hall"), MapClaim::Refused { free: None });
             } else {
                 pair.claims[0]
                     .maps
-                    .insert(name("hall"), Claim::Waiting { since: pair.now, was_served: true });
+                    .insert(name("hall"), MapClaim::Waiting { since: pair.now, was_served: true });
             }
             assert_eq!(pair.after(30 * SETTLE), [true, false], "{first} came back first");
         }

@@ -4,21 +4,21 @@
 //! A server that is its own router has no such state, answers everything and announces nothing.
 
 pub(crate) mod claims;
-mod duty;
+mod responsibility;
 mod name;
-pub(crate) mod others;
+pub(crate) mod peers;
 
-pub(crate) use duty::Duty;
 pub(crate) use name::server_name;
+pub(crate) use responsibility::Responsibility;
 
-use claims::{Claim, Claims, SETTLE};
-use duty::{Addressed, World};
+use claims::{Claims, MapClaim, SETTLE};
 use engine::snapshot::Snapshots;
-use others::Others;
+use peers::Peers;
 use protos::{
     Name, ServerToken,
     api::{ServedMap, ServerBody, Servers},
 };
+use responsibility::{Addressed, World};
 use std::{
     collections::{BTreeMap, BTreeSet},
     sync::{Arc, Mutex, MutexGuard, PoisonError},
@@ -38,7 +38,7 @@ pub(crate) struct Fleet {
 
 #[derive(Debug, Default)]
 struct State {
-    others: Others,
+    others: Peers,
     /// Starts of other servers under this one's name.
     namesakes: BTreeSet<u64>,
     claims: Claims,
@@ -120,7 +120,7 @@ impl Fleet {
         tokens.extend(state.robots.keys().cloned().map(ServerToken::Robot));
         for (map, claim) in state.claims.all() {
             tokens.insert(ServerToken::Holds(map.clone()));
-            if *claim == Claim::Served {
+            if *claim == MapClaim::Served {
                 tokens.insert(ServerToken::Serves(map.clone()));
             }
         }
@@ -128,10 +128,10 @@ impl Fleet {
     }
 
     /// What this server does with a message of a robot that names `map`, or none.
-    pub(crate) fn duty(&self, robot: &Name, map: &str, now: Instant) -> Duty {
+    pub(crate) fn responsibility(&self, robot: &Name, map: &str, now: Instant) -> Responsibility {
         let state = self.state();
         if !state.has_settled {
-            return Duty::Silent;
+            return Responsibility::Silent;
         }
         let registered = self.snapshots.robot_map(robot.as_str());
         let announced = state.robots.get(robot);
@@ -141,13 +141,13 @@ impl Fleet {
             registered: registered.as_deref(),
             is_announced: announced.is_some_and(|since| now.duration_since(*since) >= SETTLE),
         };
-        duty::duty(World { own: &self.own, claims: &state.claims, others: &state.others }, message)
+        responsibility::responsibility(World { own: &self.own, claims: &state.claims, others: &state.others }, message)
     }
 
     /// Whether robots are answered on a map here.
     pub(crate) fn serves(&self, map: &Name) -> bool {
         let state = self.state();
-        state.has_settled && state.claims.of(map) == Some(Claim::Served)
+        state.has_settled && state.claims.of(map) == Some(MapClaim::Served)
     }
 
     /// Why the router is not joined, if it is not; and why maps are not served, by map.
@@ -160,7 +160,7 @@ impl Fleet {
             }
             Some(_) => None,
         };
-        let refused = state.claims.all().filter(|(_, claim)| matches!(claim, Claim::Refused { .. }));
+        let refused = state.claims.all().filter(|(_, claim)| matches!(claim, MapClaim::Refused { .. }));
         let maps = refused.map(|(map, _)| {
             let holders = state.others.with(&ServerToken::Holds(map.clone()));
             let names: Vec<&str> = holders.iter().map(Name::as_str).collect();
@@ -177,7 +177,7 @@ impl Fleet {
     /// This server and the others, for people.
     pub(crate) fn overview(&self) -> Servers {
         let state = self.state();
-        let own_maps = state.claims.all().map(|(map, claim)| (map.to_string(), *claim == Claim::Served));
+        let own_maps = state.claims.all().map(|(map, claim)| (map.to_string(), *claim == MapClaim::Served));
         let own = body(&self.own, own_maps.collect(), state.robots.len());
         let mut servers = vec![own];
         for server in state.others.living() {

@@ -65,10 +65,10 @@ impl Site {
     /// Who answers, and how: `take`, or the code.
     fn answers(&self, robot: &str, map: &str) -> Vec<(String, String)> {
         let connected = self.servers.iter().filter(|(.., is_connected)| *is_connected);
-        let answer = |fleet: &Fleet| match fleet.duty(&name(robot), map, self.now) {
-            Duty::Take => Some((fleet.own.to_string(), "take".to_owned())),
-            Duty::Refuse(rejection) => Some((fleet.own.to_string(), rejection.code.to_string())),
-            Duty::Silent => None,
+        let answer = |fleet: &Fleet| match fleet.responsibility(&name(robot), map, self.now) {
+            Responsibility::Take => Some((fleet.own.to_string(), "take".to_owned())),
+            Responsibility::Refuse(rejection) => Some((fleet.own.to_string(), rejection.code.to_string())),
+            Responsibility::Silent => None,
         };
         connected.filter_map(|(fleet, ..)| answer(fleet)).collect()
     }

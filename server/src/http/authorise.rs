@@ -32,7 +32,7 @@ const FORWARDED: [&str; 2] = ["forwarded", "x-forwarded-for"];
 
 /// Who asks, and by which session of the page.
 #[derive(Debug, Clone)]
-pub(super) struct Asker {
+pub(super) struct Caller {
     pub(super) principal: Principal,
     /// Value of the session's cookie; `None` for a token.
     pub(super) session: Option<String>,
@@ -91,7 +91,7 @@ async fn admitted(app: &AppState, parts: &mut Parts) -> Result<(), ApiError> {
     check_scope(app, parts, &principal, scope).await?;
     let is_session = !parts.headers.contains_key(header::AUTHORIZATION);
     let session = session_cookie(&parts.headers).filter(|_| is_session).map(str::to_owned);
-    parts.extensions.insert(Asker { principal: principal.clone(), session });
+    parts.extensions.insert(Caller { principal: principal.clone(), session });
     parts.extensions.insert(principal);
     Ok(())
 }

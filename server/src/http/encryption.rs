@@ -11,7 +11,7 @@ const HANDSHAKE: u8 = 0x16;
 
 /// What is spoken on a connection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Spoken {
+pub(super) enum WireProtocol {
     Tls,
     /// Plain text that no other machine can read.
     LocalPlain,
@@ -20,15 +20,15 @@ pub(super) enum Spoken {
 }
 
 /// Looks at the first byte, which stays to be read. Errors: the connection ends before it.
-pub(super) async fn spoken(stream: &TcpStream, peer: SocketAddr) -> io::Result<Spoken> {
+pub(super) async fn spoken(stream: &TcpStream, peer: SocketAddr) -> io::Result<WireProtocol> {
     let mut first = [0];
     if stream.peek(&mut first).await? == 0 {
         return Err(io::ErrorKind::UnexpectedEof.into());
     }
     Ok(match first[0] {
-        HANDSHAKE => Spoken::Tls,
-        _ if peer.ip().to_canonical().is_loopback() => Spoken::LocalPlain,
-        _ => Spoken::Plain,
+        HANDSHAKE => WireProtocol::Tls,
+        _ if peer.ip().to_canonical().is_loopback() => WireProtocol::LocalPlain,
+        _ => WireProtocol::Plain,
     })
 }
 
@@ -53,11 +53,11 @@ mod tests {
         let [near, mapped, far]: [SocketAddr; 3] =
             ["127.0.0.9:1", "[::ffff:127.0.0.1]:1", "192.0.2.4:1"].map(|text| text.parse().unwrap());
         for (bytes, peer, expected) in [
-            (&[HANDSHAKE, 3, 1][..], far, Spoken::Tls),
-            (&[HANDSHAKE, 3, 1], near, Spoken::Tls),
-            (b"GET / ", near, Spoken::LocalPlain),
-            (b"GET / ", mapped, Spoken::LocalPlain),
-            (b"POST /", far, Spoken::Plain),
+            (&[HANDSHAKE, 3, 1][..], far, WireProtocol::Tls),
+            (&[HANDSHAKE, 3, 1], near, WireProtocol::Tls),
+            (b"GET / ", near, WireProtocol::LocalPlain),
+            (b"GET / ", mapped, WireProtocol::LocalPlain),
+            (b"POST /", far, WireProtocol::Plain),
         ] {
             let mut client = TcpStream::connect(at).await.unwrap();
             let (accepted, _) = listener.accept().await.unwrap();

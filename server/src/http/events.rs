@@ -1,6 +1,6 @@
 //! `/events`: what changes on the server, as a stream that a reader resumes where it was cut.
 
-use super::{AppState, authorise::Asker, error::ApiError, extract::QueryParams};
+use super::{AppState, authorise::Caller, error::ApiError, extract::QueryParams};
 use crate::{
     events::{EventLog, Since},
     identity::Principal,
@@ -119,7 +119,7 @@ async fn events(
     State(app): State<AppState>,
     QueryParams(query): QueryParams<EventQuery>,
     headers: HeaderMap,
-    Extension(asker): Extension<Asker>,
+    Extension(asker): Extension<Caller>,
 ) -> Result<Sse<impl Stream<Item = Result<Event, Infallible>>>, ApiError> {
     let filter = EventFilter::new(asker.principal.clone(), &query)?;
     if let Some(map) = &query.map {

@@ -3,7 +3,7 @@
 use super::{
     AppState,
     answers::{created, page},
-    authorise::Asker,
+    authorise::Caller,
     error::ApiError,
     extract::{Body, PathParams, QueryParams, number_cursor, page_limit},
 };
@@ -177,7 +177,7 @@ async fn cancel(State(app): State<AppState>, PathParams(id): PathParams<i64>) ->
 async fn events(
     State(app): State<AppState>,
     PathParams(id): PathParams<i64>,
-    Extension(asker): Extension<Asker>,
+    Extension(asker): Extension<Caller>,
 ) -> Result<Sse<impl Stream<Item = Result<Event, Infallible>>>, ApiError> {
     let place = app.stream_place()?;
     let progress = app.jobs.watch(id).await?;

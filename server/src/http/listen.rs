@@ -2,7 +2,7 @@
 //! axum's own `serve` installs no timer, so hyper's deadline would not work there.
 
 use super::{
-    encryption::{self, Spoken},
+    encryption::{self, WireProtocol},
     peer::Peer,
 };
 use crate::{
@@ -91,13 +91,15 @@ where
         };
         let spoken = tokio::time::timeout(self.header_timeout, encryption::spoken(&stream, peer));
         match within(spoken.await)? {
-            Spoken::Tls => {
+            WireProtocol::Tls => {
                 let handshake = tls.accept(self.timed(stream));
                 let stream = within(tokio::time::timeout(self.header_timeout, handshake).await)?;
                 self.http(stream, answer, Peer { addr: peer, is_encrypted: true }, watcher).await
             }
-            Spoken::LocalPlain => self.http(self.timed(stream), answer, Peer::plain(peer), watcher).await,
-            Spoken::Plain => {
+            WireProtocol::LocalPlain => {
+                self.http(self.timed(stream), answer, Peer::plain(peer), watcher).await
+            }
+            WireProtocol::Plain => {
                 let refusing = self.refusing.clone();
                 let refuse = move |request| refusing.clone().oneshot(request);
                 self.http(self.timed(stream), refuse, Peer::plain(peer), watcher).await

@@ -2,7 +2,7 @@
 
 use super::{
     AppState,
-    authorise::Asker,
+    authorise::Caller,
     error::ApiError,
     extract::{PathParams, name},
 };
@@ -107,7 +107,7 @@ async fn trajectories(
 async fn events(
     State(app): State<AppState>,
     PathParams(map): PathParams<String>,
-    Extension(asker): Extension<Asker>,
+    Extension(asker): Extension<Caller>,
 ) -> Result<Sse<impl Stream<Item = Result<Event, Infallible>>>, ApiError> {
     let place = app.stream_place()?;
     let events = BroadcastStream::new(app.live.events());

@@ -89,7 +89,7 @@ use crate::{
     ros2::{Ros2, Ros2Publisher},
     store::now_ms,
 };
-use authorise::Asker;
+use authorise::Caller;
 use axum::http::StatusCode;
 use engine::{
     Observers,
@@ -271,7 +271,7 @@ impl App {
     }
 
     /// Ends when the server stops, the session is logged out, or the token is revoked, expires or is for other maps.
-    fn ended_for(&self, Asker { principal, session }: Asker) -> impl Future<Output = ()> + Send + use<> {
+    fn ended_for(&self, Caller { principal, session }: Caller) -> impl Future<Output = ()> + Send + use<> {
         let (tokens, sessions, stopped) =
             (self.store.tokens().clone(), self.sessions.clone(), self.stopped());
         let denied = async move {

@@ -17,7 +17,7 @@ pub(super) const MAX_ASKERS: usize = 10_000;
 
 /// Who asks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Asking {
+pub(super) enum RateKey {
     /// With a token that is valid, by its number.
     Token(i64),
     /// Without.
@@ -31,7 +31,7 @@ pub(super) enum Asking {
 pub(super) struct RequestRates {
     token: f64,
     address: f64,
-    askers: Mutex<BTreeMap<Asking, (Bucket, Instant)>>,
+    askers: Mutex<BTreeMap<RateKey, (Bucket, Instant)>>,
 }
 
 impl RequestRates {
@@ -41,19 +41,19 @@ impl RequestRates {
     }
 
     /// Counts a request, or refuses it.
-    pub(super) fn take(&self, asking: Asking, now: Instant) -> Result<(), ApiError> {
+    pub(super) fn take(&self, asking: RateKey, now: Instant) -> Result<(), ApiError> {
         let mut askers = self.askers.lock().unwrap_or_else(PoisonError::into_inner);
         let mut asking = asking;
         if askers.len() >= MAX_ASKERS && !askers.contains_key(&asking) {
             // A full bucket is as good as none.
             askers.retain(|_, (_, last)| now.saturating_duration_since(*last) < BURST);
             if askers.len() >= MAX_ASKERS {
-                asking = Asking::Others;
+                asking = RateKey::Others;
             }
         }
         let (rate, setting) = match asking {
-            Asking::Token(_) => (self.token, "limits.token_requests_per_s"),
-            Asking::Address(_) | Asking::Others => (self.address, "limits.address_requests_per_s"),
+            RateKey::Token(_) => (self.token, "limits.token_requests_per_s"),
+            RateKey::Address(_) | RateKey::Others => (self.address, "limits.address_requests_per_s"),
         };
         let (bucket, last) = askers.entry(asking).or_insert_with(|| (Bucket::new(rate, now), now));
         *last = now;
@@ -74,11 +74,11 @@ impl RequestRates {
 }
 
 /// Who asks; `None`: nobody who is bound.
-pub(super) fn asking(token: Option<TokenId>, peer: Option<&Peer>) -> Option<Asking> {
+pub(super) fn asking(token: Option<TokenId>, peer: Option<&Peer>) -> Option<RateKey> {
     match token {
         Some(TokenId::Local) => None,
-        Some(TokenId::Stored(number)) => Some(Asking::Token(number)),
-        None => peer.map(|peer| Asking::Address(site(peer.addr.ip()))),
+        Some(TokenId::Stored(number)) => Some(RateKey::Token(number)),
+        None => peer.map(|peer| RateKey::Address(site(peer.addr.ip()))),
     }
 }
 
@@ -98,15 +98,15 @@ mod tests {
     use super::*;
     use std::{net::Ipv4Addr, time::Duration};
 
-    fn address(i: usize) -> Asking {
-        Asking::Address(IpAddr::V4(Ipv4Addr::from(i as u32)))
+    fn address(i: usize) -> RateKey {
+        RateKey::Address(IpAddr::V4(Ipv4Addr::from(i as u32)))
     }
 
     #[test]
     fn requests_at_the_bounds() {
         let limits = Limits { token_requests_per_s: 10, address_requests_per_s: 5, ..Limits::default() };
         let (rates, now) = (RequestRates::new(&limits), Instant::now());
-        for (asking, burst) in [(Asking::Token(1), 20), (address(1), 10), (Asking::Token(2), 20)] {
+        for (asking, burst) in [(RateKey::Token(1), 20), (address(1), 10), (RateKey::Token(2), 20)] {
             assert!((0..burst).all(|_| rates.take(asking, now).is_ok()), "{asking:?}");
             let refused = rates.take(asking, now).unwrap_err();
             assert_eq!((refused.status, refused.code), (StatusCode::TOO_MANY_REQUESTS, "rate_limited"));

@@ -7,7 +7,7 @@
 //! A kept answer is given at the door, before the request has found its route: tokens do not change but by their end, which
 //! is looked at each time, and what is kept was asked by the same token before.
 
-use super::{App, AppState, authorise::Asker, safe_headers};
+use super::{App, AppState, authorise::Caller, safe_headers};
 use crate::identity::TokenId;
 use axum::{
     body::{Body, Bytes, HttpBody as _, to_bytes},
@@ -68,7 +68,7 @@ impl IntoResponse for Answer {
 }
 
 #[derive(Debug, Default)]
-struct Kept {
+struct CacheEntry {
     stamp: Stamp,
     answers: HashMap<Question, Answer>,
     bytes: usize,
@@ -76,10 +76,10 @@ struct Kept {
 
 /// The answers that are kept.
 #[derive(Debug, Default)]
-pub(super) struct ReusedAnswers(Mutex<Kept>);
+pub(super) struct ReusedAnswers(Mutex<CacheEntry>);
 
 impl ReusedAnswers {
-    fn lock(&self) -> MutexGuard<'_, Kept> {
+    fn lock(&self) -> MutexGuard<'_, CacheEntry> {
         // What a panic could leave half done is only a count of bytes that is too high.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -95,7 +95,7 @@ impl ReusedAnswers {
         let mut kept = self.lock();
         let bytes = address + answer.body.len();
         if kept.stamp != read || kept.bytes + bytes > MAX_KEPT {
-            *kept = Kept { stamp: read, ..Kept::default() };
+            *kept = CacheEntry { stamp: read, ..CacheEntry::default() };
         }
         kept.bytes += bytes;
         if let Some(earlier) = kept.answers.insert(question, answer) {
@@ -140,7 +140,7 @@ pub(super) async fn reused(app: &AppState, request: Request, next: Next) -> Resp
 fn question(request: &Request) -> Option<(&'static str, Question)> {
     let matched = request.extensions().get::<MatchedPath>()?.as_str();
     let route = REUSED.into_iter().find(|route| *route == matched && request.method() == Method::GET)?;
-    let token = request.extensions().get::<Asker>()?.principal.token;
+    let token = request.extensions().get::<Caller>()?.principal.token;
     Some((route, Question { token, path_and_query: request.uri().path_and_query()?.as_str().to_owned() }))
 }
 

@@ -24,7 +24,7 @@ use crate::{
         maps::{self, MapRow},
         models,
         pictures::Digest,
-        refused_views::LeftOut,
+        refused_views::SkippedView,
         views::{self, QuadCrop, TrainingViewRow},
     },
 };
@@ -261,14 +261,14 @@ struct LearningInput {
     /// Points of its photographs, of at most [`MAX_POINT_VIEWS`] evenly chosen ones.
     points: Vec<Vec<TaughtPoint>>,
     /// Photographs that are not in it, or only with their icons.
-    left_out: Vec<LeftOut>,
+    left_out: Vec<SkippedView>,
 }
 
 fn learning_input(m: &Material, id: LandmarkId) -> LearningInput {
     let stored = m.views.get(&id).map_or(&[][..], Vec::as_slice);
     let (stored, beyond) = stored.split_at(stored.len().min(MAX_VIEWS));
-    let mut left_out: Vec<LeftOut> =
-        beyond.iter().map(|l| LeftOut { view: l.view, reason: "beyond_limit" }).collect();
+    let mut left_out: Vec<SkippedView> =
+        beyond.iter().map(|l| SkippedView { view: l.view, reason: "beyond_limit" }).collect();
     let mut views: Vec<TrainingView> = stored
         .iter()
         .map(|l| TrainingView {
@@ -295,7 +295,7 @@ fn learning_input(m: &Material, id: LandmarkId) -> LearningInput {
             continue;
         }
         let Some(image) = m.pictures.of(view) else {
-            left_out.push(LeftOut { view: view.view, reason: "picture_unreadable" });
+            left_out.push(SkippedView { view: view.view, reason: "picture_unreadable" });
             continue;
         };
         if gives_points {

@@ -11,7 +11,7 @@ use crate::{
         maps::{self, MapRow},
         models::{self, NewModel},
         now_ms,
-        refused_views::{self, LeftOut},
+        refused_views::{self, SkippedView},
     },
 };
 use serde_json::json;
@@ -35,7 +35,7 @@ pub(super) struct Learnt {
     /// Landmarks of the lesson that are refused, and the one in use that each looks like.
     pub(super) refused: BTreeMap<LandmarkId, LookAlike>,
     /// For each landmark of the lesson, the photographs that it left out.
-    pub(super) left_out: BTreeMap<LandmarkId, Vec<LeftOut>>,
+    pub(super) left_out: BTreeMap<LandmarkId, Vec<SkippedView>>,
 }
 
 /// Stores models, thresholds and the end of the job. Errors: `Changed` where the job was cancelled meanwhile.

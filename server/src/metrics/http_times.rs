@@ -16,7 +16,7 @@ pub(crate) const OTHER: &str = "other";
 const METHODS: [&str; 6] = ["GET", "HEAD", "POST", "PUT", "PATCH", "DELETE"];
 
 #[derive(Debug, Default)]
-struct OfRoute {
+struct RouteStats {
     /// By method and status.
     counts: BTreeMap<(&'static str, u16), u64>,
     times: Times,
@@ -24,7 +24,7 @@ struct OfRoute {
 
 #[derive(Debug, Default)]
 struct State {
-    routes: BTreeMap<String, OfRoute>,
+    routes: BTreeMap<String, RouteStats>,
     /// Counts of all routes.
     series: usize,
 }
@@ -58,7 +58,7 @@ impl HttpTimes {
     /// Counts by method, route and status.
     pub(crate) fn counts(&self) -> Vec<((&'static str, String, u16), u64)> {
         let state = self.lock();
-        let of = |(route, of): (&String, &OfRoute)| {
+        let of = |(route, of): (&String, &RouteStats)| {
             let of =
                 of.counts.iter().map(|((method, status), count)| ((*method, route.clone(), *status), *count));
             of.collect::<Vec<_>>()

@@ -20,7 +20,7 @@ use engine::{
 use protos::{Name, keys::alive_slot, prost::Message, v1};
 use ros2::{
     messages::MessageKind,
-    robot::{Lack, Problem, RobotAdapter, RobotMessage, Taken, TopicUse},
+    robot::{ConvertedMessage, MissingInput, Problem, RobotAdapter, RobotMessage, TopicUse},
 };
 use std::{
     collections::BTreeMap,
@@ -101,7 +101,7 @@ impl RobotThread {
         self.take(&topic, taken);
     }
 
-    fn take(&mut self, topic: &str, Taken { messages, problems }: Taken) {
+    fn take(&mut self, topic: &str, ConvertedMessage { messages, problems }: ConvertedMessage) {
         for problem in &problems {
             self.note(topic, Problem::word(problem), problem);
         }
@@ -111,7 +111,7 @@ impl RobotThread {
                     let image = self.adapter.settings().cameras.iter().find(|c| c.name == camera);
                     let image = image.map_or(String::new(), |camera| camera.image.clone());
                     for lack in &lacks {
-                        self.note(&image, Lack::word(lack), lack);
+                        self.note(&image, MissingInput::word(lack), lack);
                     }
                     if self.frame_ids.get(&camera) != Some(&frame_id) {
                         self.frame_ids.insert(camera.clone(), frame_id);

@@ -46,9 +46,9 @@ impl Answer {
 
 /// The keys of creations that are at work: one for each open request with a key, or write of one.
 #[derive(Debug, Clone, Default)]
-pub(super) struct KeysAtWork(Arc<Mutex<BTreeSet<String>>>);
+pub(super) struct InFlightKeys(Arc<Mutex<BTreeSet<String>>>);
 
-impl KeysAtWork {
+impl InFlightKeys {
     fn lock(&self) -> MutexGuard<'_, BTreeSet<String>> {
         // Every change is one insertion or removal: nothing can be left half done.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
@@ -60,7 +60,7 @@ impl KeysAtWork {
 pub(crate) struct CreationKey {
     key: String,
     request: RequestDigest,
-    at_work: KeysAtWork,
+    at_work: InFlightKeys,
     /// Most answers that are kept.
     max: usize,
 }
@@ -82,7 +82,7 @@ pub(crate) enum Creation {
 
 tokio::task_local! {
     static KEY: Arc<CreationKey>;
-    static KEEPING: Keeping;
+    static KEEPING: IdempotencyRecord;
 }
 
 impl CreationKey {
@@ -96,7 +96,7 @@ type AnswerOf = dyn Fn(&dyn Any) -> Option<Result<Answer, StoreError>> + Send + 
 
 /// A key, and how the answer under it is made.
 #[derive(Clone)]
-pub(super) struct Keeping {
+pub(super) struct IdempotencyRecord {
     key: Arc<CreationKey>,
     answer_of: Arc<AnswerOf>,
 }
@@ -108,10 +108,10 @@ pub(crate) async fn answered<T: 'static, R>(
 ) -> R {
     let Ok(key) = KEY.try_with(Arc::clone) else { return work.await };
     let answer_of = Arc::new(move |made: &dyn Any| made.downcast_ref().map(&answer));
-    KEEPING.scope(Keeping { key, answer_of }, work).await
+    KEEPING.scope(IdempotencyRecord { key, answer_of }, work).await
 }
 
-impl Keeping {
+impl IdempotencyRecord {
     /// That of the present task, if its request has a key.
     pub(super) fn current() -> Option<Self> {
         KEEPING.try_with(Self::clone).ok()

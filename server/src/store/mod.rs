@@ -84,7 +84,7 @@ pub(crate) struct Store {
     disk: Arc<DiskGuard>,
     /// Held while a write is prepared and made.
     turn: Arc<Mutex<()>>,
-    keys: kept_answers::KeysAtWork,
+    keys: kept_answers::InFlightKeys,
     /// Most answers that are kept for repeats.
     kept_answers: usize,
     /// Most entries of the audit log.
@@ -161,7 +161,7 @@ impl Store {
         let (close, closed) = oneshot::channel();
         let task = tokio::spawn(writer.run(closed, vitals.begin(WRITER)));
         let task = WriterTask { task, close, reads: opened.reads.clone(), _lock: opened.lock };
-        let (turn, keys) = (Arc::default(), kept_answers::KeysAtWork::default());
+        let (turn, keys) = (Arc::default(), kept_answers::InFlightKeys::default());
         let (kept_answers, audit_entries) = (config.limits.kept_answers, config.limits.audit_entries);
         let (reads, probe_ms) = (opened.reads, Arc::default());
         let store = Self {
@@ -196,8 +196,8 @@ impl Store {
         F: for<'t> FnOnce(&'t mut Tx) -> BoxFuture<'t, Result<T, StoreError>> + Send + 'static,
     {
         let caller = Arc::new(());
-        let beside = writer::Beside {
-            keeping: kept_answers::Keeping::current(),
+        let beside = writer::WriteContext {
+            keeping: kept_answers::IdempotencyRecord::current(),
             actor: actor::Actor::current(),
             audit_entries: self.audit_entries,
         };

@@ -44,7 +44,7 @@ pub(crate) struct RefusedUpload {
 
 /// A view that a lesson left out, or did not use as a whole.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct LeftOut {
+pub(crate) struct SkippedView {
     pub(crate) view: i64,
     /// A code.
     pub(crate) reason: &'static str,
@@ -94,11 +94,11 @@ pub(crate) async fn add(
 pub(crate) async fn replace_of_lesson(
     tx: &mut Tx,
     landmark: i64,
-    left_out: &[LeftOut],
+    left_out: &[SkippedView],
 ) -> Result<(), StoreError> {
     let at = || StoreError::during("keep what a lesson left out");
     sqlx::query(FORGET_LESSON).bind(landmark).execute(&mut tx.conn).await.map_err(at())?;
-    for LeftOut { view, reason } in left_out.iter().take(MAX_REFUSED) {
+    for SkippedView { view, reason } in left_out.iter().take(MAX_REFUSED) {
         let row = sqlx::query(INSERT_OF_LESSON).bind(view).bind(now_ms()).bind(reason).bind(landmark);
         row.execute(&mut tx.conn).await.map_err(at())?;
     }

@@ -15,7 +15,7 @@ use super::{
     checkpoint::{empty_log, move_long_log},
     error::StoreError,
     history::{self, Author, HistoryLimits},
-    kept_answers::Keeping,
+    kept_answers::IdempotencyRecord,
     note_head,
     on_commit::{CommittedChange, OnCommit},
 };
@@ -37,7 +37,7 @@ use std::{
 use tokio::sync::{Notify, mpsc, oneshot};
 
 /// Runs once the transaction is committed and visible. Short: the writer waits for it.
-type After = Box<dyn FnOnce() + Send>;
+type PostCommit = Box<dyn FnOnce() + Send>;
 
 /// An open transaction and what it will make visible.
 pub(crate) struct Tx {
@@ -47,7 +47,7 @@ pub(crate) struct Tx {
     pub(super) author: Author,
     pub(super) history: HistoryLimits,
     changes: Vec<CommittedChange>,
-    after: Vec<After>,
+    after: Vec<PostCommit>,
 }
 
 impl std::fmt::Debug for Tx {
@@ -104,9 +104,9 @@ pub(super) enum Command {
 }
 
 /// What goes into the transaction of a write besides its change.
-pub(super) struct Beside {
+pub(super) struct WriteContext {
     /// The answer to what it made.
-    pub(super) keeping: Option<Keeping>,
+    pub(super) keeping: Option<IdempotencyRecord>,
     /// Who asks for it; `None` for the server's own bookkeeping.
     pub(super) actor: Option<Arc<Actor>>,
     /// Most entries of the audit log.
@@ -116,14 +116,14 @@ pub(super) struct Beside {
 /// Wraps a closure for the channel. The write is wanted for as long as `caller` lives.
 pub(super) fn command<T, F>(
     write: F,
-    beside: Beside,
+    beside: WriteContext,
     caller: &Arc<()>,
 ) -> (Command, oneshot::Receiver<Result<T, StoreError>>)
 where
     T: Send + 'static,
     F: for<'t> FnOnce(&'t mut Tx) -> BoxFuture<'t, Result<T, StoreError>> + Send + 'static,
 {
-    let Beside { keeping, actor, audit_entries } = beside;
+    let WriteContext { keeping, actor, audit_entries } = beside;
     let (reply, answer) = oneshot::channel();
     let run: Run = Box::new(move |tx, begun| {
         Box::pin(async move {

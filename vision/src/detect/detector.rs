@@ -11,7 +11,7 @@ use crate::{
         quad::Quad,
         refine::{
             full_size::at_full_size,
-            rating::{ScoredQuad, rate},
+            rating::{ScoredQuad, score_proposals},
             refit::refit_corners,
         },
         segments::{
@@ -28,8 +28,8 @@ use crate::{
     frame::PictureRef,
     paper::{
         detector::quads_by_relaxation,
-        three_sided::leftover,
-        tiling::floor_tiling::{Untiled, untile},
+        three_sided::find_three_sided,
+        tiling::floor_tiling::{Untiled, remove_floor_tiling},
     },
     trace::{Stage, Trace},
 };
@@ -126,7 +126,7 @@ fn by_proposals(
     let mut quads: Vec<Quad> = quads.into_iter().map(|q| refit_corners(q, &gradients, &p.quads)).collect();
     if p.quads.three_sided {
         let shown: Vec<Quad> = quads.iter().filter(|quad| p.quads.is_shown(quad)).cloned().collect();
-        let open = leftover(&segments, &shown, &gradients, p);
+        let open = find_three_sided(&segments, &shown, &gradients, p);
         // Three-sided quads never replace a full quad.
         quads.truncate(MAX_QUADS);
         let room = MAX_QUADS - quads.len();
@@ -161,7 +161,7 @@ fn proposed(
     let seeds = proposals(&segments, &gradients, &p.quads.proposals);
     trace.seeds(&seeds);
     trace.finished(Stage::Pairs);
-    let mut rated = rate(&seeds, &gradients, &p.quads);
+    let mut rated = score_proposals(&seeds, &gradients, &p.quads);
     let mut scale = 1;
     for _ in 1..p.quads.scales.clamp(1, MAX_SCALES) {
         scale *= 2;
@@ -171,10 +171,10 @@ fn proposed(
         let level = work.map(|plane| reduce(plane, scale));
         let edges = memory.edges((&level).into(), &p.edges);
         let segments = straight_segments(&chains(&edges, &p.chains), &edges, &p.segments);
-        let segments = untile(segments, (level.width(), level.height()), &p.tiling).kept;
+        let segments = remove_floor_tiling(segments, (level.width(), level.height()), &p.tiling).kept;
         let gradients = Gradients { image: level.grey(), gx: edges.gx(), gy: edges.gy() };
         let seeds = proposals(&segments, &gradients, &p.quads.proposals);
-        let coarse = rate(&seeds, &gradients, &p.quads);
+        let coarse = score_proposals(&seeds, &gradients, &p.quads);
         rated.extend(coarse.into_iter().filter_map(|r| r.scaled(scale as f64)));
         memory.give_back(edges);
     }
@@ -197,7 +197,8 @@ fn traced_segments(
     trace.chains(&chains);
     trace.finished(Stage::Chains);
     let segments = straight_segments(&chains, &edges, &p.segments);
-    let Untiled { kept: segments, removed } = untile(segments, (image.width(), image.height()), &p.tiling);
+    let Untiled { kept: segments, removed } =
+        remove_floor_tiling(segments, (image.width(), image.height()), &p.tiling);
     if !removed.is_empty() {
         trace.tiling(&removed);
     }

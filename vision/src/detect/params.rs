@@ -8,7 +8,7 @@ use crate::{
         edges::edge_map::EdgeParams,
         proposals::quad_proposals::ProposalParams,
         quad::{Quad, QuadKind},
-        segments::{bridging::ChainParams, joining::SegmentParams},
+        segments::{collinear_merge::SegmentParams, gap_closing::ChainParams},
     },
     paper::{
         relaxation::{labelling::RelaxationParams, similarity::SimilarityParams},

@@ -52,7 +52,12 @@ struct OpenSet {
 
 /// Three-sided quads made of what `quads` leave over, best first, ties by corners. Each segment is used once; none
 /// crosses one of `quads` or lies in one.
-pub fn leftover(segments: &[EdgeSegment], quads: &[Quad], g: &Gradients, p: &DetectParams) -> Vec<Quad> {
+pub fn find_three_sided(
+    segments: &[EdgeSegment],
+    quads: &[Quad],
+    g: &Gradients,
+    p: &DetectParams,
+) -> Vec<Quad> {
     let left = unexplained(segments, quads);
     let mut sets = open_sets(segments, &left, g, p);
     sets.sort_by(|a, b| b.score.total_cmp(&a.score).then(a.sides.cmp(&b.sides)));
@@ -107,7 +112,7 @@ pub fn unexplained(segments: &[EdgeSegment], quads: &[Quad]) -> Vec<usize> {
 }
 
 /// A segment that meets the middle one.
-struct Meeting {
+struct CornerJunction {
     outer: usize,
     corner: Point2<f64>,
     /// The outer segment's end at the corner and its other end.
@@ -121,7 +126,7 @@ fn open_sets(segments: &[EdgeSegment], left: &[usize], g: &Gradients, p: &Detect
     let mut sets = Vec::new();
     for &m in left {
         let middle = &segments[m];
-        let mut ends: [Vec<Meeting>; 2] = [Vec::new(), Vec::new()];
+        let mut ends: [Vec<CornerJunction>; 2] = [Vec::new(), Vec::new()];
         for &outer in left.iter().filter(|o| **o != m) {
             let Some((end, meeting)) = meet(middle, outer, &segments[outer], p) else { continue };
             ends[end].push(meeting);
@@ -140,7 +145,12 @@ fn open_sets(segments: &[EdgeSegment], left: &[usize], g: &Gradients, p: &Detect
 }
 
 /// Whether an outer segment starts where the middle one ends, at its end 0 (p) or 1 (q).
-fn meet(middle: &EdgeSegment, outer: usize, s: &EdgeSegment, p: &DetectParams) -> Option<(usize, Meeting)> {
+fn meet(
+    middle: &EdgeSegment,
+    outer: usize,
+    s: &EdgeSegment,
+    p: &DetectParams,
+) -> Option<(usize, CornerJunction)> {
     if middle.normal.perp(&s.normal).abs() < MIN_CORNER_SIN {
         return None;
     }
@@ -154,12 +164,12 @@ fn meet(middle: &EdgeSegment, outer: usize, s: &EdgeSegment, p: &DetectParams) -
     // Both gaps count towards c5, whose reach grows with the chord; beyond this neither end can pass.
     let reach = p.similarity.closing_gap * middle.length_px + p.similarity.closing_gap_px;
     (gap_px <= 3.0 * reach && distance(&far) > distance(&near))
-        .then_some((end, Meeting { outer, corner, near, far, gap_px }))
+        .then_some((end, CornerJunction { outer, corner, near, far, gap_px }))
 }
 
 fn open_set(
     segments: &[EdgeSegment],
-    (first, m, last): (&Meeting, usize, &Meeting),
+    (first, m, last): (&CornerJunction, usize, &CornerJunction),
     g: &Gradients,
     p: &DetectParams,
 ) -> Option<OpenSet> {
@@ -169,7 +179,7 @@ fn open_set(
         return None;
     }
     let shape = shape_similarity(k, l, &p.similarity)?;
-    let free = |meeting: &Meeting| free_end(g, &meeting.near, &meeting.far, p.quads.min_step);
+    let free = |meeting: &CornerJunction| free_end(g, &meeting.near, &meeting.far, p.quads.min_step);
     let mut corners_px = [free(first), first.corner, last.corner, free(last)];
     let mut sides = [first.outer, m, last.outer];
     if polygon::signed_area(&corners_px) < 0.0 {

@@ -70,7 +70,7 @@ struct Mated {
 
 /// A distractor, no look-alike, that was accepted as a landmark.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-struct Taken {
+struct FalseAcceptance {
     /// Its stratum, and its index among all distractors.
     stratum: &'static str,
     number: usize,
@@ -87,7 +87,7 @@ struct Report {
     mated: Mated,
     /// All but look-alikes, all look-alikes, then each stratum.
     unknown: Vec<Stratum>,
-    taken: Vec<Taken>,
+    taken: Vec<FalseAcceptance>,
     /// By the paper's distances alone: H^r, C^r.
     pairs: [Pairs; 2],
     histograms: [DistanceHistograms; 2],
@@ -298,7 +298,7 @@ fn taken(
     distractors: &[Distractor],
     views: &[Vec<DistractorView>],
     name: impl Fn(LandmarkId) -> String,
-) -> Vec<Taken> {
+) -> Vec<FalseAcceptance> {
     let mut all = Vec::new();
     for (number, (distractor, of_one)) in
         distractors.iter().zip(views).enumerate().filter(|(_, (s, _))| !s.hard)
@@ -311,7 +311,7 @@ fn taken(
         }
         let of = of_one.len();
         let stratum = distractor.stratum;
-        all.extend(views.into_iter().map(|(id, views)| Taken {
+        all.extend(views.into_iter().map(|(id, views)| FalseAcceptance {
             stratum,
             number,
             landmark: name(id),
@@ -393,7 +393,7 @@ mod tests {
         );
         let taken = taken(&distractors, &views, |id| format!("landmark {}", id.0));
         let expected =
-            Taken { stratum: "posters", number: 0, landmark: "landmark 1".into(), views: 2, of: 3 };
+            FalseAcceptance { stratum: "posters", number: 0, landmark: "landmark 1".into(), views: 2, of: 3 };
         assert_eq!(taken, [expected]);
         assert!((posters.bound - upper_bound(2, 6)).abs() < 1e-12 && (all[3].bound - 0.95).abs() < 1e-9);
     }

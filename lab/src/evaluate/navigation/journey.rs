@@ -103,7 +103,7 @@ pub(super) struct Named {
 
 /// Settings of a drive.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Way {
+pub(super) struct DriveSettings {
     pub(super) seed: u64,
     /// From the far end.
     pub(super) back: bool,
@@ -207,7 +207,7 @@ pub(super) fn of(log: &Corrections, modality: &str, outcomes: &[&str]) -> u64 {
 }
 
 /// Drives the length of the corridor once.
-pub(super) fn drive(world: &World, way: Way) -> anyhow::Result<Journey> {
+pub(super) fn drive(world: &World, way: DriveSettings) -> anyhow::Result<Journey> {
     let start_m = if way.back { FAR_END_M } else { 0.0 };
     let (seed, reverse, rate_hz) = (way.seed, way.back, way.rate_hz);
     let drive = DriveParams { seed, start_m, reverse, rate_hz, ..DriveParams::default() };

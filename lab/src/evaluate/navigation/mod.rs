@@ -10,7 +10,7 @@ mod report;
 mod world;
 
 use super::experiment::{mixed, of_each, say, write_plot};
-use journey::{Journey, Way, drive};
+use journey::{DriveSettings, Journey, drive};
 use report::Report;
 use std::path::PathBuf;
 use world::{Course, World};
@@ -110,7 +110,14 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let seeds: Vec<u64> = (0..args.drives).map(|n| mixed(&[args.seed, 10, u64::from(n)])).collect();
     let (rate_hz, laser, exact) = (args.rate_hz, !args.no_laser, !args.own_errors);
     let kidnap_m = args.kidnap_m;
-    let way = |n: usize, seed: &u64| Way { seed: *seed, back: n % 2 == 1, rate_hz, laser, exact, kidnap_m };
+    let way = |n: usize, seed: &u64| DriveSettings {
+        seed: *seed,
+        back: n % 2 == 1,
+        rate_hz,
+        laser,
+        exact,
+        kidnap_m,
+    };
     let journeys = of_each(&seeds, "drives", |n, seed| drive(&world, way(n, seed)));
     let journeys = journeys.into_iter().collect::<anyhow::Result<Vec<Journey>>>()?;
     let report = Report::new(&world, &journeys, (laser, exact), args.seed);

@@ -9,7 +9,7 @@ mod single;
 
 use super::experiment::say;
 use joint::{Drives, Joint};
-use peers::{Beside, Errors};
+use peers::{Errors, PeerComparison};
 use serde::Serialize;
 use single::{Cell, Cost, Exact, Row};
 use stated_camera::Cameras;
@@ -47,7 +47,7 @@ struct Report {
     cells_inside_95: usize,
     cells_inside_99: usize,
     unflagged_flips: usize,
-    opencv: Result<Beside, String>,
+    opencv: Result<PeerComparison, String>,
     joint: Vec<Joint>,
     fused: Drives,
     /// The same with intrinsics that have the errors of a usual calibration.
@@ -189,7 +189,7 @@ fn drives_line(f: &Drives) -> String {
     )
 }
 
-fn opencv(beside: &Result<Beside, String>) -> Vec<String> {
+fn opencv(beside: &Result<PeerComparison, String>) -> Vec<String> {
     let b = match beside {
         Ok(b) => b,
         Err(why) => return vec![format!("  without OpenCV: {why}")],

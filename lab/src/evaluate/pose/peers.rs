@@ -24,7 +24,7 @@ pub(super) struct Errors {
 
 /// Errors of Waymark and OpenCV on the same corners.
 #[derive(Debug, Clone, Serialize)]
-pub(super) struct Beside {
+pub(super) struct PeerComparison {
     pub(super) version: String,
     pub(super) draws: usize,
     pub(super) flagged: usize,
@@ -51,7 +51,7 @@ struct Answer {
     us: f64,
 }
 
-pub(super) fn beside(python: &Path, n: usize, seed: u64) -> Result<Beside, String> {
+pub(super) fn beside(python: &Path, n: usize, seed: u64) -> Result<PeerComparison, String> {
     let drawn = draws(n, seed);
     let (mut python, Greeting { version }) = Python::start(python, PROGRAM, &[])?;
     let corners: Vec<[[f64; 2]; 4]> = drawn.iter().map(|(_, c, _)| (*c).into()).collect();
@@ -74,7 +74,7 @@ pub(super) fn beside(python: &Path, n: usize, seed: u64) -> Result<Beside, Strin
         .map(|((_, _, a), b)| (a.best.camera_from_landmark.translation.vector - b.translation.vector).norm())
         .fold(0.0, f64::max);
     let ((ours, all_theirs), (ours_unflagged, theirs_unflagged)) = (pick(false), pick(true));
-    Ok(Beside {
+    Ok(PeerComparison {
         version,
         draws: drawn.len(),
         flagged: drawn.iter().filter(|d| d.2.ambiguous).count(),

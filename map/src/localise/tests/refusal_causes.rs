@@ -49,7 +49,7 @@ fn causes(truth: &Truth, seeds: std::ops::Range<u64>) -> Vec<[Vec<RefusalCause>;
         let home = place();
         let observations = [observation(1, &seen, &home)];
         let answer = robot_pose(&observations, &mounting(), None, &p).unwrap();
-        if !matches!(answer, FixResult::Refused(FixRefusal::Room { .. })) {
+        if !matches!(answer, FixResult::Refused(FixRefusal::ReprojectionError { .. })) {
             return None;
         }
         let prior = prior_at(&at, &mut random);

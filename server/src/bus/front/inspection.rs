@@ -2,7 +2,7 @@
 //! them costs, or why the connection ends.
 //!
 //! A router panics where it forwards a key of more than 65 535 bytes, which a declared prefix and a suffix may make, and where
-//! it compares a key that is no key expression with others; its access control looks at a message after that. So each declared
+//! it compares a key that is no key expression with peers; its access control looks at a message after that. So each declared
 //! key is kept here, and of what a message names, the whole must be a key expression of at most [`MAX_KEY_BYTES`]. Of a message
 //! in fragments, the first one names its key. What follows it is a fragment of the same message for the router only if it goes
 //! on without a gap, so each gap ends the connection.

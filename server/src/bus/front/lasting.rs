@@ -38,11 +38,11 @@ pub(in crate::bus) struct Lasting {
 /// The keys in which one robot or address was interested.
 #[derive(Debug, Default)]
 pub(super) struct InterestKeys {
-    kept: Mutex<Kept>,
+    kept: Mutex<DeclaredKeys>,
 }
 
 #[derive(Debug, Default)]
-struct Kept {
+struct DeclaredKeys {
     hasher: RandomState,
     /// The texts would take as much again. Two keys of one hash count once.
     hashes: HashSet<u64>,

@@ -60,7 +60,7 @@ const TOLD: usize = 1024;
 const STOP_GRACE: Duration = Duration::from_secs(3);
 
 /// Where connections lead.
-pub(super) enum Way {
+pub(super) enum Destination {
     /// To the server's own router, whoever it is.
     Plain(PathBuf, Arc<Lasting>),
     /// To the gate, where the client's certificate is a robot's.
@@ -75,7 +75,7 @@ pub(super) struct Front {
 
 /// What all connections of a listener share.
 struct Connections {
-    way: Way,
+    way: Destination,
     places: Arc<Semaphore>,
     of_robot: Arc<Shares<Name>>,
     /// Where refusals of robots are counted.
@@ -100,7 +100,7 @@ pub(super) async fn bind(endpoint: &str) -> Result<(TcpListener, String), BusErr
 
 impl Front {
     /// Takes connections from now on; at most `robots`, and some to spare.
-    pub(super) fn open(listener: TcpListener, way: Way, robots: usize, live: Arc<LiveHub>) -> Self {
+    pub(super) fn open(listener: TcpListener, way: Destination, robots: usize, live: Arc<LiveHub>) -> Self {
         let connections = Arc::new(Connections {
             way,
             places: Arc::new(Semaphore::new(robots + SPARE_SESSIONS)),
@@ -149,7 +149,7 @@ async fn end_in_order(mut stream: impl AsyncRead + AsyncWrite + Unpin) {
 impl Connections {
     async fn connection(self: Arc<Self>, stream: TcpStream, peer: SocketAddr, place: Place) {
         match &self.way {
-            Way::Plain(router, lasting) => {
+            Destination::Plain(router, lasting) => {
                 // One that sends nothing takes no place of a robot.
                 match timeout(HANDSHAKE, stream.peek(&mut [0])).await {
                     Ok(Ok(1)) => {}
@@ -165,7 +165,7 @@ impl Connections {
                 let interests = lasting.of(Peer::Address(peer.ip()));
                 self.relayed(None, peer, stream, ToRouter { read, write }, interests).await;
             }
-            Way::Certified(admission, gate) => {
+            Destination::Certified(admission, gate) => {
                 let handshake = admission.acceptor().accept(stream);
                 let stream = match timeout(HANDSHAKE, handshake).await {
                     Ok(Ok(stream)) => stream,

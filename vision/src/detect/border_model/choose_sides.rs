@@ -8,7 +8,8 @@ use crate::detect::{
     border_model::{
         network::Network,
         side_features::{
-            BAND_FEATURES, LogGreyLevels, Met, SIDE_FEATURES, SideMeasurement, Sides, joined, meet_all,
+            BAND_FEATURES, CornerNeighbours, LogGreyLevels, SIDE_FEATURES, SideMeasurement, Sides, joined,
+            meet_all,
         },
     },
     edge_support::gradients::Gradients,
@@ -49,7 +50,7 @@ pub fn choose_sides(g: &Gradients, corners: &[Point2<f64>; 4], model: &Network) 
         return None;
     }
     let mut met = sides.met(&chosen, None);
-    let measure = |met: &Met, lines: &[Option<usize>; 4]| {
+    let measure = |met: &CornerNeighbours, lines: &[Option<usize>; 4]| {
         let of_line = |i: usize, j: usize| SideMeasurement {
             features: joined(&known[i][j].0, &sides.corner_features(i, j, &met[i])),
             tones: known[i][j].1,

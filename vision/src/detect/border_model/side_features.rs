@@ -55,7 +55,7 @@ pub(crate) fn joined(band: &[f64; BAND_FEATURES], corners: &[f64; CORNER_FEATURE
 /// The ends of the line chosen for each side.
 pub(crate) type Ends = [[Point2<f64>; 2]; 4];
 /// The sides that each side meets, the one before it and the one after it, with their mean steps.
-pub(crate) type Met = [[Option<Neighbour>; 2]; 4];
+pub(crate) type CornerNeighbours = [[Option<Neighbour>; 2]; 4];
 
 /// A side relative to one that it meets.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -110,7 +110,11 @@ impl<'a> Sides<'a> {
 
     /// What each side meets when these lines are chosen. `earlier`: what they met before, and the sides whose line is
     /// another since.
-    pub(crate) fn met(&self, chosen: &[Option<usize>; 4], earlier: Option<(&Met, &[bool; 4])>) -> Met {
+    pub(crate) fn met(
+        &self,
+        chosen: &[Option<usize>; 4],
+        earlier: Option<(&CornerNeighbours, &[bool; 4])>,
+    ) -> CornerNeighbours {
         let ends = self.ends(chosen);
         let neighbour = |ends: [Point2<f64>; 2], shares: [f64; 2]| {
             let along = (ends[1] - ends[0]).try_normalize(1e-9)?;

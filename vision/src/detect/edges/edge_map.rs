@@ -6,9 +6,9 @@
 use crate::{
     detect::edges::{
         deriche::{FilterMemory, gradients},
+        edge_thinning::{EDGE, changing_ring_code, keep, thin},
         maxima::{Maxima, Maximum},
         strongest_plane::{ColourMemory, colour_gradients},
-        thinning::{EDGE, changing_ring_code, keep, thin},
     },
     frame::PictureRef,
 };

@@ -4,5 +4,5 @@ pub(crate) mod row_transpose;
 pub(crate) mod deriche;
 pub(crate) mod strongest_plane;
 pub(crate) mod maxima;
-pub(crate) mod thinning;
+pub(crate) mod edge_thinning;
 pub mod edge_map;

@@ -80,7 +80,7 @@ type CornerTable = Vec<[Vec<Corner>; 2]>;
 pub fn proposals(segments: &[EdgeSegment], g: &Gradients, p: &ProposalParams) -> Vec<QuadSeed> {
     let order = longest(segments);
     let table = corners(segments, &order, p);
-    let mut found = Tightest::default();
+    let mut found = BestProposals::default();
     for &a in &order {
         for end in [0, 1] {
             chains_from(&table, a, end, |chain| {
@@ -109,11 +109,11 @@ pub fn proposals(segments: &[EdgeSegment], g: &Gradients, p: &ProposalParams) ->
 
 /// Proposals with their looseness, in bounded memory.
 #[derive(Debug, Default)]
-struct Tightest {
+struct BestProposals {
     found: Vec<(f64, QuadSeed)>,
 }
 
-impl Tightest {
+impl BestProposals {
     fn add(&mut self, looseness: f64, seed: QuadSeed) {
         self.found.push((looseness, seed));
         if self.found.len() >= MAX_COLLECTED {
@@ -202,7 +202,7 @@ fn chains_from(table: &CornerTable, a: usize, a_end: usize, mut found: impl FnMu
 
 /// Adds the quads that a fourth segment closes. Each is added once: its smallest index first, in the direction with
 /// the smaller second index.
-fn closed(table: &CornerTable, chain: &Chain, found: &mut Tightest) {
+fn closed(table: &CornerTable, chain: &Chain, found: &mut BestProposals) {
     let (a, b, c) = (chain.a, chain.ab.other, chain.bc.other);
     for cd in &table[c][1 - chain.bc.other_end] {
         let d = cd.other;
@@ -232,7 +232,7 @@ fn complete(
     order: &[usize],
     g: &Gradients,
     p: &ProposalParams,
-    found: &mut Tightest,
+    found: &mut BestProposals,
 ) {
     let ends: Vec<[Point2<f64>; 2]> = segments
         .iter()
@@ -273,7 +273,7 @@ fn complete(
 }
 
 /// Adds quads of two segments that face each other.
-fn paired(segments: &[EdgeSegment], order: &[usize], found: &mut Tightest) {
+fn paired(segments: &[EdgeSegment], order: &[usize], found: &mut BestProposals) {
     for (i, &a) in order.iter().enumerate() {
         for p in partners(segments, a, &order[i + 1..]) {
             let seed = clockwise([Some(a), None, Some(p.other), None], p.corners_px);
@@ -292,7 +292,8 @@ mod tests {
         detect::{
             edges::edge_map::{EdgeParams, edges},
             segments::{
-                bridging::ChainParams, chains::chains, edge_segments::segments, joining::SegmentParams,
+                chains::chains, collinear_merge::SegmentParams, edge_segments::segments,
+                gap_closing::ChainParams,
             },
             tests::fixtures::render,
         },
@@ -310,7 +311,7 @@ mod tests {
         // Many equally tight proposals, which differ in sides and order only.
         let looseness = |i: usize| (i * 7919 % 1000) as f64;
         let count = 3 * MAX_COLLECTED + 5;
-        let (mut tightest, mut all) = (Tightest::default(), Vec::new());
+        let (mut tightest, mut all) = (BestProposals::default(), Vec::new());
         for i in 0..count {
             tightest.add(looseness(i), seed(i));
             assert!(tightest.found.len() < MAX_COLLECTED);

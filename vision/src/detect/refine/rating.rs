@@ -37,7 +37,7 @@ impl ScoredQuad {
 
 /// Refits the seeds, best first, and drops those whose sides the gradient does not support. A share is reserved for
 /// small seeds: large ones on a crowded wall would take every place.
-pub fn rate(seeds: &[QuadSeed], g: &Gradients, p: &QuadParams) -> Vec<ScoredQuad> {
+pub fn score_proposals(seeds: &[QuadSeed], g: &Gradients, p: &QuadParams) -> Vec<ScoredQuad> {
     let mut order: Vec<(f64, &QuadSeed)> = seeds.iter().map(|s| (s.fit * size(&s.corners_px), s)).collect();
     order.sort_by(|a, b| b.0.total_cmp(&a.0));
     let search = rating_search(p, p.refit_reach_px + 1.0);
@@ -146,8 +146,9 @@ pub(crate) mod tests {
     fn the_number_of_refitted_seeds_is_bounded() {
         let (image, map, seeds) = squares(16);
         let g = Gradients { image: &image, gx: map.gx(), gy: map.gy() };
-        let rated =
-            |max_refitted| rate(&seeds, &g, &QuadParams { max_refitted, ..QuadParams::default() }).len();
+        let rated = |max_refitted| {
+            score_proposals(&seeds, &g, &QuadParams { max_refitted, ..QuadParams::default() }).len()
+        };
         assert_eq!(seeds.len(), 256);
         assert_eq!(rated(usize::MAX), MAX_REFITTED + MAX_REFITTED / 2);
         assert_eq!([rated(0), rated(10)], [0, 15]);

@@ -6,9 +6,9 @@
 use crate::detect::{
     edges::{
         edge_map::EdgeMap,
-        thinning::{BRANCHES, EDGE, RING, changing_ring_code, ring_code},
+        edge_thinning::{BRANCHES, EDGE, RING, changing_ring_code, ring_code},
     },
-    segments::bridging::{ChainParams, PixelRun, bridged},
+    segments::gap_closing::{ChainParams, PixelRun, bridged},
 };
 use nalgebra::{Point2, Vector2};
 

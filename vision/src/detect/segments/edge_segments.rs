@@ -7,7 +7,7 @@ use crate::detect::{
     edges::{edge_map::EdgeMap, maxima::BORDER_PX},
     segments::{
         chains::EdgeChain,
-        joining::{Fragment, MAX_SEGMENTS, SegmentParams, join},
+        collinear_merge::{Fragment, MAX_SEGMENTS, SegmentParams, join},
         polyline::{Polyline, Tolerance, interior},
     },
 };

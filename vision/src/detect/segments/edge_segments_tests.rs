@@ -2,7 +2,7 @@ use super::*;
 use crate::{
     detect::{
         edges::edge_map::{EdgeParams, edges},
-        segments::{bridging::ChainParams, chains::chains},
+        segments::{chains::chains, gap_closing::ChainParams},
         tests::rendering::{Noise, flipped, polygon, quarter_turned, rectangle},
     },
     frame::GrayImage,

@@ -1,7 +1,7 @@
 //! Edge map in, straight segments out (method 1.2 to 1.4).
 
-pub mod bridging;
+pub mod gap_closing;
 pub mod chains;
 pub(crate) mod polyline;
-pub mod joining;
+pub mod collinear_merge;
 pub mod edge_segments;

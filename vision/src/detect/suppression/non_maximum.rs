@@ -211,7 +211,7 @@ mod tests {
     use crate::{
         detect::{
             quad::QuadKind,
-            refine::rating::{rate, tests::squares},
+            refine::rating::{score_proposals, tests::squares},
         },
         geometry::corners::Corners,
     };
@@ -223,7 +223,7 @@ mod tests {
         let g = Gradients { image: &image, gx: map.gx(), gy: map.gy() };
         // No quad is an object, so none suppresses another.
         let p = QuadParams { max_refitted: usize::MAX, sure_probability: 2.0, ..QuadParams::default() };
-        let rated = rate(&seeds, &g, &p);
+        let rated = score_proposals(&seeds, &g, &p);
         assert!(rated.len() > MAX_RATED && MAX_RATED > MAX_CLASSIFIED);
         assert_eq!(suppress_overlaps(rated.clone(), &p).len(), MAX_RATED);
         assert_eq!(snap_sides(rated.clone(), &g, &p).len(), MAX_CLASSIFIED);

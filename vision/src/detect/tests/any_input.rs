@@ -14,8 +14,8 @@ use crate::{
         refine::rating::MAX_REFITTED,
         segments::{
             chains::{EdgeChain, MAX_CHAIN_POINTS},
+            collinear_merge::MAX_SEGMENTS,
             edge_segments::EdgeSegment,
-            joining::MAX_SEGMENTS,
         },
         tests::rendering::Noise,
     },

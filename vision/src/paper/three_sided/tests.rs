@@ -159,5 +159,5 @@ fn the_number_of_measured_sets_is_bounded() {
     let p = DetectParams::default();
     let sets = open_sets(&segments, &unexplained(&segments, &[]), &g, &p);
     assert!(sets.len() > 10 && sets.len() <= MAX_LEFT_SEGMENTS * MAX_CORNERS * MAX_CORNERS, "{}", sets.len());
-    assert!(leftover(&segments, &[], &g, &p).is_empty());
+    assert!(find_three_sided(&segments, &[], &g, &p).is_empty());
 }

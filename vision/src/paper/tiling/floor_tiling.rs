@@ -26,7 +26,11 @@ const MIN_FAMILY_GAP_DEG: f64 = 30.0;
 const BIN_DEG: f64 = 2.0;
 
 /// Sets the lines of regular patterns on the floor apart. Leaves everything in `kept` when `p.remove` is off.
-pub fn untile(segments: Vec<EdgeSegment>, image_size: (usize, usize), p: &TilingParams) -> Untiled {
+pub fn remove_floor_tiling(
+    segments: Vec<EdgeSegment>,
+    image_size: (usize, usize),
+    p: &TilingParams,
+) -> Untiled {
     let is_tiling = if p.remove { patterned_floor(&segments, image_size, p) } else { Vec::new() };
     let mut untiled = Untiled::default();
     for (i, segment) in segments.into_iter().enumerate() {

@@ -12,9 +12,9 @@ use crate::{
     recognise::{
         alignment::{
             align_params::{self, AlignParams, LEVELS},
-            goal::{Goal, Levels},
+            cost::{Cost, Levels},
+            minimise::{Limits, LmResult, minimise},
             sampling_grid::{PaddedIcon, Pattern, SamplingGrid, SquareMap, sample, square},
-            settle::{Limits, Settled, settle},
             surroundings::{Surroundings, coarse_size},
         },
         features::{correlation::CorrelationParams, harris::blurred},
@@ -53,7 +53,7 @@ pub struct Alignment {
 pub struct Template<'a> {
     icon: &'a Icon,
     coarse: &'a [f32],
-    second: OnceCell<Goal<8>>,
+    second: OnceCell<Cost<8>>,
     last: OnceCell<Levels>,
 }
 
@@ -69,7 +69,7 @@ impl<'a> Template<'a> {
 pub struct CoarseAlignment {
     corners: [Point2<f64>; 4],
     /// Mean squared correlation of the buckets, 0 to 1.
-    pub alike: f64,
+    pub likeness: f64,
 }
 
 /// Sampling grids of all levels for icons of one size. Computed once, for any number of pictures.
@@ -129,15 +129,15 @@ impl<'a> Aligner<'a> {
         }
         let picture = around.coarse(self.p);
         let (lattice, start, limits) = (&self.on.coarse, square(size), self.limits(0, size));
-        let settled: Option<Settled> = dispatch!(Level::new(), _s => {
+        let settled: Option<LmResult> = dispatch!(Level::new(), _s => {
             let see = |map: &SquareMap, seen: &mut [f32]| sample(picture, map, &lattice.x, &lattice.y, seen);
-            settle(&Goal::<4>::new(lattice, template.coarse, self.on.min_deviation), lattice, see, start, limits)
+            minimise(&Cost::<4>::new(lattice, template.coarse, self.on.min_deviation), lattice, see, start, limits)
         });
-        let settled = settled.filter(|s| s.alike >= self.p.min_alike[0])?;
+        let settled = settled.filter(|s| s.likeness >= self.p.min_alike[0])?;
         let scale = self.on.size as f64 / size as f64;
         let corners =
             settled.corners.map(|c| Point2::new((c.x + 0.5) * scale - 0.5, (c.y + 0.5) * scale - 0.5));
-        Some(CoarseAlignment { corners, alike: settled.alike })
+        Some(CoarseAlignment { corners, likeness: settled.likeness })
     }
 
     /// The two fine levels, from the corners of the coarse one.
@@ -147,7 +147,7 @@ impl<'a> Aligner<'a> {
         template: &Template<'_>,
         from: &CoarseAlignment,
     ) -> Option<Alignment> {
-        let enough = |settled: &Settled, level: usize| settled.alike >= self.p.min_alike[level];
+        let enough = |settled: &LmResult, level: usize| settled.likeness >= self.p.min_alike[level];
         let second = self.second(around, template, from.corners).filter(|s| enough(s, 1))?;
         let last = self.last(around, template, second.corners).filter(|s| enough(s, 2))?;
         let corners = last.corners;
@@ -169,14 +169,14 @@ impl<'a> Aligner<'a> {
         around: &Surroundings<'_>,
         template: &Template<'_>,
         start: [Point2<f64>; 4],
-    ) -> Option<Settled> {
+    ) -> Option<LmResult> {
         let (sigma, lattice, size) = (self.p.sigmas[1], &self.on.second, self.on.size);
         let (picture, limits) = (around.smooth(sigma), self.limits(1, size));
         dispatch!(Level::new(), _s => {
             let smooth = || blurred(&template.icon.pixels, size, sigma);
-            let goal = template.second.get_or_init(|| Goal::new(lattice, &smooth(), self.on.min_deviation));
+            let cost = template.second.get_or_init(|| Cost::new(lattice, &smooth(), self.on.min_deviation));
             let see = |map: &SquareMap, seen: &mut [f32]| sample(picture, map, &lattice.x, &lattice.y, seen);
-            settle(goal, lattice, see, start, limits)
+            minimise(cost, lattice, see, start, limits)
         })
     }
 
@@ -188,7 +188,7 @@ impl<'a> Aligner<'a> {
         around: &Surroundings<'_>,
         template: &Template<'_>,
         start: [Point2<f64>; 4],
-    ) -> Option<Settled> {
+    ) -> Option<LmResult> {
         let (sigma, lattice, size) = (self.p.sigmas[2], &self.on.last, self.on.size);
         let (picture, limits) = (around.full(), self.limits(2, size));
         dispatch!(Level::new(), _s => {
@@ -197,7 +197,7 @@ impl<'a> Aligner<'a> {
                 template.last.get_or_init(|| Levels::new(lattice, &smooth(), self.on.min_deviation));
             let cut = |map: &SquareMap| blurred(&whole(map, size, picture), size, sigma);
             let first = cut(&SquareMap::new(size, &start)?);
-            let own = Goal::<8>::with_slopes_of(lattice, levels, &first);
+            let own = Cost::<8>::with_slopes_of(lattice, levels, &first);
             let mut first = Some(first);
             let see = |map: &SquareMap, seen: &mut [f32]| {
                 // The iteration begins at the position of the gradients.
@@ -206,7 +206,7 @@ impl<'a> Aligner<'a> {
                     *seen = cut[*at as usize];
                 }
             };
-            settle(&own, lattice, see, start, limits)
+            minimise(&own, lattice, see, start, limits)
         })
     }
 

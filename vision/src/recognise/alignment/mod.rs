@@ -2,8 +2,8 @@
 
 pub mod align_params;
 pub(crate) mod sampling_grid;
-pub(crate) mod goal;
+pub(crate) mod cost;
 pub(crate) mod certainty;
-pub(crate) mod settle;
+pub(crate) mod minimise;
 pub mod surroundings;
 pub mod aligner;

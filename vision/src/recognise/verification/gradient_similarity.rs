@@ -62,13 +62,13 @@ const SHOWS_SHARE: f32 = 0.1;
 const SHOWS_LEAST: f32 = 10.0;
 
 /// Compares two aligned icons.
-pub fn alike(a: &Icon, b: &Icon, p: &CorrelationParams) -> IconComparison {
+pub fn compare_gradients(a: &Icon, b: &Icon, p: &CorrelationParams) -> IconComparison {
     between(&Smoothed::new(a), &Smoothed::new(b), p)
 }
 
 /// Gradient similarity, see [`IconComparison::likeness`].
 pub fn likeness(a: &Icon, b: &Icon, p: &CorrelationParams) -> f64 {
-    alike(a, b, p).likeness
+    compare_gradients(a, b, p).likeness
 }
 
 /// The same as [`alike`] of smoothed icons.
@@ -239,8 +239,8 @@ mod tests {
         let icon = made(waves);
         let with = |lower: fn(f64, f64) -> f64| {
             let other = made(|x, y| if y > 0.6 { lower(x, y) } else { waves(x, y) });
-            let comparison = alike(&icon, &other, &p);
-            assert!(alike(&other, &icon, &p) == comparison, "{comparison:?}");
+            let comparison = compare_gradients(&icon, &other, &p);
+            assert!(compare_gradients(&other, &icon, &p) == comparison, "{comparison:?}");
             comparison.contradicting
         };
         assert!(with(waves) < 1e-9);

@@ -135,7 +135,7 @@ fn tiles_are_removed_and_posters_stay() {
     for room in rooms() {
         for p in [calibrated(&room), uncalibrated()] {
             let all = room.segments();
-            let untiled = untile(all.clone(), SIZE, &p);
+            let untiled = remove_floor_tiling(all.clone(), SIZE, &p);
             let (floor, left) =
                 (below(&all, room.foot_px() + 3.0), below(&untiled.kept, room.foot_px() + 3.0));
             let name = format!(
@@ -155,7 +155,7 @@ fn tiles_are_removed_and_posters_stay() {
 #[test]
 fn segments_keep_their_order_and_number() {
     let all = room(-0.2, 0.35, 0.3).segments();
-    let untiled = untile(all.clone(), SIZE, &uncalibrated());
+    let untiled = remove_floor_tiling(all.clone(), SIZE, &uncalibrated());
     let (mut kept, mut removed) = (untiled.kept.iter().peekable(), untiled.removed.iter().peekable());
     for s in &all {
         let next = if kept.peek() == Some(&s) { kept.next() } else { removed.next() };
@@ -168,7 +168,7 @@ fn segments_keep_their_order_and_number() {
 fn nothing_is_removed_by_default_or_with_an_implausible_camera() {
     let scene = room(-0.2, 0.35, 0.3);
     let all = scene.segments();
-    let still = |p: &TilingParams| assert_eq!(untile(all.clone(), SIZE, p).kept, all);
+    let still = |p: &TilingParams| assert_eq!(remove_floor_tiling(all.clone(), SIZE, p).kept, all);
     still(&TilingParams::default());
     still(&TilingParams { remove: false, ..calibrated(&scene) });
     let p = calibrated(&scene);
@@ -182,7 +182,7 @@ fn nothing_is_removed_by_default_or_with_an_implausible_camera() {
         still(&TilingParams { floor: Some(floor), ..p.clone() });
     }
     still(&TilingParams { period_range: [0.0, f64::NAN], ..p.clone() });
-    assert_eq!(untile(Vec::new(), SIZE, &p), Untiled::default());
+    assert_eq!(remove_floor_tiling(Vec::new(), SIZE, &p), Untiled::default());
 }
 
 #[test]
@@ -192,7 +192,7 @@ fn nothing_is_removed_in_a_room_without_tiling() {
         let all = plain.segments();
         assert!(on_posters(&all, &plain) >= 8);
         for p in [calibrated(&plain), uncalibrated()] {
-            assert_eq!(untile(all.clone(), SIZE, &p).removed, Vec::new());
+            assert_eq!(remove_floor_tiling(all.clone(), SIZE, &p).removed, Vec::new());
         }
     }
 }
@@ -216,7 +216,8 @@ fn clutter(seed: u64) -> Vec<EdgeSegment> {
 fn random_clutter_gives_no_pattern() {
     let scene = room(-0.15, 0.0, 0.3);
     for p in [calibrated(&scene), uncalibrated()] {
-        let alarms = (0..300).filter(|s| !untile(clutter(*s), SIZE, &p).removed.is_empty()).count();
+        let alarms =
+            (0..300).filter(|s| !remove_floor_tiling(clutter(*s), SIZE, &p).removed.is_empty()).count();
         assert!(alarms == 0, "{alarms} alarms, calibrated {}", p.floor.is_some());
     }
 }
@@ -250,7 +251,8 @@ fn a_mirrored_image_removes_the_mirrored_lines() {
     let all = scene.segments();
     let mirrored: Vec<EdgeSegment> = all.iter().map(mirror).collect();
     for p in [calibrated(&scene), uncalibrated()] {
-        let (a, b) = (untile(all.clone(), SIZE, &p), untile(mirrored.clone(), SIZE, &p));
+        let (a, b) =
+            (remove_floor_tiling(all.clone(), SIZE, &p), remove_floor_tiling(mirrored.clone(), SIZE, &p));
         let expected: Vec<EdgeSegment> = a.removed.iter().map(mirror).collect();
         assert!(!expected.is_empty());
         assert_eq!(b.removed, expected);
@@ -266,8 +268,8 @@ fn a_reduced_image_removes_the_same_lines() {
     };
     let p = TilingParams { horizon_gap_px: 0.0, ..calibrated(&scene) };
     let all = scene.segments();
-    let whole = untile(all.clone(), SIZE, &p);
-    let half = untile(all.iter().map(halved).collect(), (SIZE.0 / 2, SIZE.1 / 2), &p);
+    let whole = remove_floor_tiling(all.clone(), SIZE, &p);
+    let half = remove_floor_tiling(all.iter().map(halved).collect(), (SIZE.0 / 2, SIZE.1 / 2), &p);
     assert_eq!(half.removed, whole.removed.iter().map(halved).collect::<Vec<_>>());
 }
 

@@ -8,7 +8,7 @@
 
 use crate::recognise::alignment::{
     certainty::corner_covariances,
-    goal::{Goal, dot},
+    cost::{Cost, dot},
     sampling_grid::{SamplingGrid, SquareMap, square},
 };
 use nalgebra::{Const, DimMin, Matrix2, Point2, SMatrix, SVector, Vector2};
@@ -22,10 +22,10 @@ const MOST_DAMPING: f64 = 1.0;
 
 /// Result of the iteration: the corners and the similarity there.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Settled {
+pub(crate) struct LmResult {
     pub(crate) corners: [Point2<f64>; 4],
     /// Mean squared correlation of the buckets.
-    pub(crate) alike: f64,
+    pub(crate) likeness: f64,
     /// Covariances of the corners, in squared pixels of the icon, where all eight coordinates moved.
     pub(crate) covariances: Option<[Matrix2<f64>; 4]>,
 }
@@ -40,19 +40,19 @@ pub(crate) struct Limits {
     pub(crate) settled_px: f64,
 }
 
-/// Moves the corners of the icon, beginning at `start`; `see` samples the picture at the grid's points under a map.
+/// Moves the corners of the icon, beginning at `start`; `sample` reads the picture at the grid's points under a map.
 /// `None` when the buckets do not determine the corners.
 ///
 /// Levenberg-Marquardt: a rejected step is retried with more damping. Inverse compositional (Baker and Matthews
-/// 2004): the derivatives of the goal are computed once, not at every step.
+/// 2004): the derivatives of the cost are computed once, not at every step.
 #[inline(always)]
-pub(crate) fn settle<const D: usize>(
-    goal: &Goal<D>,
+pub(crate) fn minimise<const D: usize>(
+    cost: &Cost<D>,
     lattice: &SamplingGrid,
-    mut see: impl FnMut(&SquareMap, &mut [f32]),
+    mut sample: impl FnMut(&SquareMap, &mut [f32]),
     start: [Point2<f64>; 4],
     limits: Limits,
-) -> Option<Settled>
+) -> Option<LmResult>
 where
     Const<D>: DimMin<Const<D>, Output = Const<D>>,
 {
@@ -60,7 +60,7 @@ where
     let mut damping = LEAST_DAMPING;
     let mut map = SquareMap::new(lattice.size, &start)?;
     let mut seen = vec![0.0; lattice.len()];
-    let (mut corners, mut here) = (start, Equations::new(goal, lattice, &mut see, &map, -1.0, &mut seen));
+    let (mut corners, mut here) = (start, Equations::new(cost, lattice, &mut sample, &map, -1.0, &mut seen));
     for _ in 0..limits.steps {
         let step = corner_moves(&here.step(damping)?);
         // Inverse composition: the map is composed with the inverse of the template's step.
@@ -68,9 +68,10 @@ where
         let shift = moved.iter().zip(&square).map(|(m, s)| (m - s).amax()).fold(0.0, f64::max);
         let next = (shift <= limits.shift_px).then(|| SquareMap::new(lattice.size, &moved)).flatten();
         let length_px = step.iter().map(Vector2::amax).fold(0.0, f64::max);
-        let next = next.map(|m| (m, Equations::new(goal, lattice, &mut see, &m, here.likeness, &mut seen)));
+        let next =
+            next.map(|m| (m, Equations::new(cost, lattice, &mut sample, &m, here.objective, &mut seen)));
         match next {
-            Some((there, equations)) if equations.likeness > here.likeness => {
+            Some((there, equations)) if equations.objective > here.objective => {
                 (map, corners, here) = (there, moved, equations);
                 damping = LEAST_DAMPING.max(damping / 10.0);
                 if length_px < limits.settled_px {
@@ -81,10 +82,10 @@ where
             _ => damping *= 10.0,
         }
     }
-    let said: Vec<_> =
-        here.said.iter().map(|s| (goal.buckets[s.bucket].normal * s.weight, s.gradient)).collect();
-    let covariances = corner_covariances(&said);
-    Some(Settled { corners, alike: here.alike / lattice.all_buckets as f64, covariances })
+    let terms: Vec<_> =
+        here.terms.iter().map(|s| (cost.buckets[s.bucket].normal * s.weight, s.gradient)).collect();
+    let covariances = corner_covariances(&terms);
+    Some(LmResult { corners, likeness: here.likeness / lattice.all_buckets as f64, covariances })
 }
 
 /// Moves of TL, TR, BR, BL: from those of the left, right, top and bottom sides, or as they are.
@@ -110,11 +111,11 @@ struct Equations<const D: usize> {
     normal: SMatrix<f64, D, D>,
     right: SVector<f64, D>,
     /// Contribution of each bucket.
-    said: Vec<BucketTerm<D>>,
+    terms: Vec<BucketTerm<D>>,
     /// The objective, weighted correlation: a partly covered bucket has far less weight than an uncovered one.
-    likeness: f64,
+    objective: f64,
     /// Squared correlations of the buckets, added up.
-    alike: f64,
+    likeness: f64,
 }
 
 impl<const D: usize> Equations<D>
@@ -124,9 +125,9 @@ where
     /// The similarity at `map`, and the normal equations there if it exceeds `least`.
     #[inline(always)]
     fn new(
-        goal: &Goal<D>,
+        cost: &Cost<D>,
         lattice: &SamplingGrid,
-        see: &mut impl FnMut(&SquareMap, &mut [f32]),
+        sample: &mut impl FnMut(&SquareMap, &mut [f32]),
         map: &SquareMap,
         least: f64,
         seen: &mut [f32],
@@ -134,13 +135,13 @@ where
         let mut sum = Self {
             normal: SMatrix::zeros(),
             right: SVector::zeros(),
-            said: vec![],
+            terms: vec![],
+            objective: 0.0,
             likeness: 0.0,
-            alike: 0.0,
         };
-        see(map, seen);
-        let mut weighted = Vec::with_capacity(goal.buckets.len());
-        for (i, bucket) in goal.buckets.iter().enumerate() {
+        sample(map, seen);
+        let mut weighted = Vec::with_capacity(cost.buckets.len());
+        for (i, bucket) in cost.buckets.iter().enumerate() {
             let part = bucket.cells.start..bucket.cells.end;
             let (seen, real) = (&seen[part.clone()], &lattice.real[part.clone()]);
             let mean = dot(seen, real) / bucket.cells.count as f32;
@@ -148,30 +149,30 @@ where
             if norm.is_nan() || norm <= 0.0 {
                 continue;
             }
-            let correlation = dot(seen, &goal.values[part]) / norm;
+            let correlation = dot(seen, &cost.values[part]) / norm;
             if correlation > 0.0 {
                 let correlation = f64::from(correlation);
                 let weight = correlation * correlation * correlation;
-                sum.likeness += weight * correlation;
-                sum.alike += correlation * correlation;
+                sum.objective += weight * correlation;
+                sum.likeness += correlation * correlation;
                 weighted.push((i, norm, weight));
             }
         }
-        if sum.likeness <= least {
+        if sum.objective <= least {
             return sum;
         }
         for (i, norm, weight) in weighted {
-            let bucket = &goal.buckets[i];
+            let bucket = &cost.buckets[i];
             let part = bucket.cells.start..bucket.cells.end;
             sum.normal += bucket.normal * weight;
             let mut gradient = SVector::zeros();
             for d in 0..D {
                 // Slopes have mean 0: the mean of the grey levels cancels.
-                let level = f64::from(dot(&goal.slopes[d][part.clone()], &seen[part.clone()]) / norm);
+                let level = f64::from(dot(&cost.slopes[d][part.clone()], &seen[part.clone()]) / norm);
                 gradient[d] = weight * (bucket.level[d] - level);
             }
             sum.right += gradient;
-            sum.said.push(BucketTerm { bucket: i, weight, gradient });
+            sum.terms.push(BucketTerm { bucket: i, weight, gradient });
         }
         sum
     }

@@ -3,14 +3,14 @@
 //! same rule and without a word to the others, so that exactly one answers.
 
 use super::{
-    claims::{Claim, Claims},
-    others::Others,
+    claims::{Claims, MapClaim},
+    peers::Peers,
 };
 use protos::{Code, Name, Rejection, ServerToken};
 
 /// What a server does with a message of a robot.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum Duty {
+pub(crate) enum Responsibility {
     /// It takes it.
     Take,
     /// Another one answers, or none yet.
@@ -38,11 +38,11 @@ pub(crate) struct World<'a> {
     /// This server.
     pub(crate) own: &'a Name,
     pub(crate) claims: &'a Claims,
-    pub(crate) others: &'a Others,
+    pub(crate) others: &'a Peers,
 }
 
 /// The rule.
-pub(crate) fn duty(world: World<'_>, message: Addressed<'_>) -> Duty {
+pub(crate) fn responsibility(world: World<'_>, message: Addressed<'_>) -> Responsibility {
     if message.map.is_empty() {
         return by_registration(world, message);
     }
@@ -52,61 +52,63 @@ pub(crate) fn duty(world: World<'_>, message: Addressed<'_>) -> Duty {
         Some(duty) => duty,
         None => {
             match (world.others.gone(&ServerToken::Holds(map.clone())), by_registration(world, message)) {
-                (_, Duty::Silent) => Duty::Silent,
-                (Some(server), _) => Duty::Refuse(gone("map", &format!("map {map}"), server)),
+                (_, Responsibility::Silent) => Responsibility::Silent,
+                (Some(server), _) => Responsibility::Refuse(gone("map", &format!("map {map}"), server)),
                 // Robots that nobody knows, and maps that nobody has: the intake says so.
-                (None, _) => Duty::Take,
+                (None, _) => Responsibility::Take,
             }
         }
     }
 }
 
 /// What follows from the map alone; `None` if nobody has it.
-fn on_map(World { own, claims, others }: World<'_>, map: &Name) -> Option<Duty> {
+fn on_map(World { own, claims, others }: World<'_>, map: &Name) -> Option<Responsibility> {
     let claim = claims.of(map);
-    if claim == Some(Claim::Served) {
-        return Some(Duty::Take);
+    if claim == Some(MapClaim::Served) {
+        return Some(Responsibility::Take);
     }
     if !others.with(&ServerToken::Serves(map.clone())).is_empty() {
-        return Some(Duty::Silent);
+        return Some(Responsibility::Silent);
     }
     let holders = others.with(&ServerToken::Holds(map.clone()));
     match claim {
-        Some(Claim::Refused { .. }) if holders.first().is_none_or(|first| own < first) => {
-            Some(Duty::Refuse(contested_map(map, own, &holders)))
+        Some(MapClaim::Refused { .. }) if holders.first().is_none_or(|first| own < first) => {
+            Some(Responsibility::Refuse(contested_map(map, own, &holders)))
         }
-        Some(_) => Some(Duty::Silent),
-        None => (!holders.is_empty()).then_some(Duty::Silent),
+        Some(_) => Some(Responsibility::Silent),
+        None => (!holders.is_empty()).then_some(Responsibility::Silent),
     }
 }
 
-fn by_registration(world: World<'_>, message: Addressed<'_>) -> Duty {
+fn by_registration(world: World<'_>, message: Addressed<'_>) -> Responsibility {
     let World { own, others, .. } = world;
     let robot = message.robot;
     let elsewhere = others.with(&ServerToken::Robot(robot.clone()));
     match (message.registered, elsewhere.first()) {
-        (Some(_), _) if !message.is_announced => Duty::Silent,
-        (Some(_), Some(first)) if own < first => Duty::Refuse(contested_robot(robot, own, &elsewhere)),
-        (Some(map), None) => {
-            Name::new(map).ok().and_then(|map| on_own_map(world, &map)).unwrap_or(Duty::Take)
+        (Some(_), _) if !message.is_announced => Responsibility::Silent,
+        (Some(_), Some(first)) if own < first => {
+            Responsibility::Refuse(contested_robot(robot, own, &elsewhere))
         }
-        (_, Some(_)) => Duty::Silent,
-        (None, None) if others.living().next().is_some_and(|first| first < own) => Duty::Silent,
+        (Some(map), None) => {
+            Name::new(map).ok().and_then(|map| on_own_map(world, &map)).unwrap_or(Responsibility::Take)
+        }
+        (_, Some(_)) => Responsibility::Silent,
+        (None, None) if others.living().next().is_some_and(|first| first < own) => Responsibility::Silent,
         (None, None) => match others.gone(&ServerToken::Robot(robot.clone())) {
-            Some(server) => Duty::Refuse(gone("robot", &format!("robot {robot}"), server)),
-            None => Duty::Take,
+            Some(server) => Responsibility::Refuse(gone("robot", &format!("robot {robot}"), server)),
+            None => Responsibility::Take,
         },
     }
 }
 
 /// A robot that is registered here alone, on a map that this server may not serve: then this one says so.
-fn on_own_map(World { own, claims, others }: World<'_>, map: &Name) -> Option<Duty> {
+fn on_own_map(World { own, claims, others }: World<'_>, map: &Name) -> Option<Responsibility> {
     match claims.of(map)? {
-        Claim::Served => Some(Duty::Take),
-        Claim::Waiting { .. } => Some(Duty::Silent),
-        Claim::Refused { .. } => {
+        MapClaim::Served => Some(Responsibility::Take),
+        MapClaim::Waiting { .. } => Some(Responsibility::Silent),
+        MapClaim::Refused { .. } => {
             let holders = others.with(&ServerToken::Holds(map.clone()));
-            Some(Duty::Refuse(contested_map(map, own, &holders)))
+            Some(Responsibility::Refuse(contested_map(map, own, &holders)))
         }
     }
 }

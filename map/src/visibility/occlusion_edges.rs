@@ -19,7 +19,7 @@ pub(super) const MIN_NEAR_M: f64 = 1e-6;
 
 /// The rims of one quarter.
 #[derive(Default)]
-pub(super) struct Rims {
+pub(super) struct OcclusionEdges {
     pub far: Vec<Piece>,
     pub near: Vec<Piece>,
     /// The ranges of slope in which the landmark is visible, in order.
@@ -41,16 +41,16 @@ impl Span {
     }
 }
 
-struct Follower<'a> {
+struct ContourTracer<'a> {
     limits: &'a Limits,
     /// Direction of the quarter's axis, radians.
     ahead_rad: f64,
-    made: Rims,
+    made: OcclusionEdges,
 }
 
 /// The rims of the quarter about a direction.
-pub(super) fn rims(limits: &Limits, ahead_rad: f64) -> Rims {
-    let mut follower = Follower { limits, ahead_rad, made: Rims::default() };
+pub(super) fn occlusion_edges(limits: &Limits, ahead_rad: f64) -> OcclusionEdges {
+    let mut follower = ContourTracer { limits, ahead_rad, made: OcclusionEdges::default() };
     let slope = |i: u32| MAX_SLOPE * (2.0 * f64::from(i) / f64::from(GRID) - 1.0);
     for i in 0..GRID {
         follower.between(slope(i), slope(i + 1), DEPTH);
@@ -58,7 +58,7 @@ pub(super) fn rims(limits: &Limits, ahead_rad: f64) -> Rims {
     follower.made
 }
 
-impl Follower<'_> {
+impl ContourTracer<'_> {
     fn span(&self, slope: f64) -> Option<Span> {
         let (near_m, far_m) = self.limits.span_m(self.ahead_rad + slope.atan())?;
         let near_m = near_m.max(MIN_NEAR_M);
@@ -131,12 +131,13 @@ mod tests {
             let mut visible = 0;
             for quarter in 0..4 {
                 let ahead = f64::from(quarter) * FRAC_PI_2;
-                let rims = rims(&limits, ahead);
-                let (far, near) = (Envelope::upper(rims.far), Envelope::upper(rims.near));
+                let occlusion_edges = occlusion_edges(&limits, ahead);
+                let (far, near) =
+                    (Envelope::upper(occlusion_edges.far), Envelope::upper(occlusion_edges.near));
                 for k in 0..997 {
                     let slope = -1.0 + 2.0 * f64::from(k) / 997.0;
                     let span = limits.span_m(ahead + slope.atan());
-                    let open = rims.open.iter().any(|(from, to)| (*from..=*to).contains(&slope));
+                    let open = occlusion_edges.open.iter().any(|(from, to)| (*from..=*to).contains(&slope));
                     assert_eq!(open, span.is_some(), "{tilt_rad} {quarter} {slope}");
                     let Some((nearest, furthest)) = span else { continue };
                     visible += 1;

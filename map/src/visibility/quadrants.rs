@@ -3,16 +3,16 @@
 use crate::visibility::{
     envelope::{Envelope, Piece},
     limits::Limits,
+    occlusion_edges::{MIN_NEAR_M, occlusion_edges},
     penumbra::{Footprint, penumbra},
     quarter_turn::turned,
-    rims::{MIN_NEAR_M, rims},
 };
 use nalgebra::Point2;
 use std::f64::consts::FRAC_PI_2;
 
 /// The bounds of one quarter.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(super) struct Quarter {
+pub(super) struct Quadrant {
     /// Farthest visible distance; nothing is visible where it is not defined.
     pub far: Envelope,
     /// Nearest visible distance; defined wherever `far` is.
@@ -20,24 +20,27 @@ pub(super) struct Quarter {
 }
 
 /// The bounds of all quarters, the first ahead, the others to the left. `obstacles` in the landmark's frame.
-pub(super) fn quarters(
+pub(super) fn quadrants(
     limits: &Limits,
     footprint: &Footprint,
     obstacles: &[(Point2<f64>, Point2<f64>)],
-) -> [Quarter; 4] {
+) -> [Quadrant; 4] {
     std::array::from_fn(|quarter| {
-        let rims = rims(limits, quarter as f64 * FRAC_PI_2);
-        if rims.open.is_empty() {
-            return Quarter::default();
+        let occlusion_edges = occlusion_edges(limits, quarter as f64 * FRAC_PI_2);
+        if occlusion_edges.open.is_empty() {
+            return Quadrant::default();
         }
-        let mut far: Vec<Piece> = rims.far;
+        let mut far: Vec<Piece> = occlusion_edges.far;
         far.extend(obstacles.iter().flat_map(|(a, b)| penumbra(footprint, a, b, quarter)));
-        Quarter { far: Envelope::upper(far).within(&rims.open), near: Envelope::upper(rims.near) }
+        Quadrant {
+            far: Envelope::upper(far).within(&occlusion_edges.open),
+            near: Envelope::upper(occlusion_edges.near),
+        }
     })
 }
 
 /// Whether a point about the origin is within the bounds.
-pub(super) fn contains(quarters: &[Quarter; 4], q: &Point2<f64>) -> bool {
+pub(super) fn contains(quadrants: &[Quadrant; 4], q: &Point2<f64>) -> bool {
     let quarter = match (q.x.abs() >= q.y.abs(), q.x >= 0.0, q.y >= 0.0) {
         (true, true, _) => 0,
         (false, _, true) => 1,
@@ -48,7 +51,7 @@ pub(super) fn contains(quarters: &[Quarter; 4], q: &Point2<f64>) -> bool {
     // The centre itself counts as the point next to it.
     let ahead = q.x.max(2.0 * MIN_NEAR_M);
     let (slope, inverse) = (q.y / ahead, 1.0 / ahead);
-    let Quarter { far, near } = &quarters[quarter];
+    let Quadrant { far, near } = &quadrants[quarter];
     far.at(slope).is_some_and(|far| inverse >= far) && near.at(slope).is_none_or(|near| inverse <= near)
 }
 

@@ -13,14 +13,14 @@ pub(crate) const MAX_GONE: usize = 2048;
 
 /// What other servers announce.
 #[derive(Debug, Default)]
-pub(crate) struct Others {
+pub(crate) struct Peers {
     servers: BTreeMap<Name, BTreeSet<ServerToken>>,
     gone: VecDeque<(ServerToken, Name)>,
     /// Tokens beyond the bounds.
     ignored: u64,
 }
 
-impl Others {
+impl Peers {
     /// A token of a server came or went.
     pub(crate) fn hear(&mut self, server: &Name, token: ServerToken, is_there: bool) {
         if is_there {
@@ -99,9 +99,9 @@ mod tests {
 
     #[test]
     fn what_a_dead_server_had_is_remembered_and_what_a_living_one_gives_up_is_not() {
-        let mut others = Others::default();
+        let mut others = Peers::default();
         let hear =
-            |others: &mut Others, token: ServerToken, is_there| others.hear(&name("b"), token, is_there);
+            |others: &mut Peers, token: ServerToken, is_there| others.hear(&name("b"), token, is_there);
         for token in [ServerToken::Alive(1), robot("r1"), robot("r2")] {
             hear(&mut others, token, true);
         }
@@ -120,7 +120,7 @@ mod tests {
 
     #[test]
     fn servers_tokens_and_memory_are_bounded() {
-        let mut others = Others::default();
+        let mut others = Peers::default();
         for i in 0..=MAX_SERVERS {
             others.hear(&name(&format!("s{i}")), ServerToken::Alive(1), true);
         }

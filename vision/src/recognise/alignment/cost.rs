@@ -14,7 +14,7 @@ use nalgebra::{SMatrix, SVector};
 
 /// A template on a lattice, with `D` ways to move: 4 for the sides, 8 for the coordinates of the corners.
 #[derive(Debug, Clone)]
-pub(crate) struct Goal<const D: usize> {
+pub(crate) struct Cost<const D: usize> {
     /// Grey levels, zeros for padding and for flat buckets.
     pub(crate) values: Vec<f32>,
     /// Buckets that are not flat, with the products that do not change from step to step.
@@ -81,7 +81,7 @@ fn moved<const D: usize>([gx, gy]: [[f32; LANES]; 2], s: [f32; LANES], t: [f32; 
     ways
 }
 
-impl<const D: usize> Goal<D> {
+impl<const D: usize> Cost<D> {
     /// Of the smoothed icon `smooth`. A bucket with a standard deviation below `min_deviation` is flat and ignored.
     #[inline(always)]
     pub(crate) fn new(lattice: &SamplingGrid, smooth: &[f32], min_deviation: f32) -> Self {
@@ -218,8 +218,8 @@ mod tests {
     fn slopes_are_the_finite_differences() {
         let lattice = SamplingGrid::new(75, 5, 4, Pattern::Fourth);
         let pixels: Vec<f32> = (0..75 * 75).map(|i| waves(i % 75, i / 75)).collect();
-        let goal = Goal::<8>::new(&lattice, &pixels, 1.0);
-        assert_eq!(goal.buckets.len(), 25);
+        let cost = Cost::<8>::new(&lattice, &pixels, 1.0);
+        assert_eq!(cost.buckets.len(), 25);
         // The picture with 10 px around, and one corner moved there and back.
         let wide: Vec<f32> = (0..95 * 95).map(|i| waves((i % 95) - 10, (i / 95) - 10)).collect();
         let picture = PaddedIcon { pixels: &wide, width: 95, margin: 10 };
@@ -236,7 +236,7 @@ mod tests {
                 seen
             };
             let (ahead, behind) = (seen(0.5), seen(-0.5));
-            let slope = &goal.slopes[way];
+            let slope = &cost.slopes[way];
             let error: f32 =
                 slope.iter().zip(ahead.iter().zip(&behind)).map(|(s, (a, b))| (s - (a - b)).powi(2)).sum();
             let all: f32 = slope.iter().map(|s| s * s).sum();
@@ -249,7 +249,7 @@ mod tests {
         let lattice = SamplingGrid::new(25, 5, 1, Pattern::All);
         let pixels: Vec<f32> = (0..625).map(|i| waves(3 * (i % 25), 3 * (i / 25))).collect();
         let (sides, corners) =
-            (Goal::<4>::new(&lattice, &pixels, 1.0), Goal::<8>::new(&lattice, &pixels, 1.0));
+            (Cost::<4>::new(&lattice, &pixels, 1.0), Cost::<8>::new(&lattice, &pixels, 1.0));
         for (side, [a, b]) in [[0, 6], [2, 4], [1, 3], [5, 7]].into_iter().enumerate() {
             for i in 0..lattice.len() {
                 let sum = corners.slopes[a][i] + corners.slopes[b][i];
@@ -263,8 +263,8 @@ mod tests {
         let lattice = SamplingGrid::new(75, 5, 0, Pattern::All);
         let pixels: Vec<f32> =
             (0..75 * 75).map(|i| if i % 75 < 15 { waves(i % 75, i / 75) } else { 80.0 }).collect();
-        let goal = Goal::<4>::new(&lattice, &pixels, 1.0);
-        assert_eq!(goal.buckets.len(), 5);
-        assert!(Goal::<4>::new(&lattice, &vec![f32::NAN; 5625], 1.0).buckets.is_empty());
+        let cost = Cost::<4>::new(&lattice, &pixels, 1.0);
+        assert_eq!(cost.buckets.len(), 5);
+        assert!(Cost::<4>::new(&lattice, &vec![f32::NAN; 5625], 1.0).buckets.is_empty());
     }
 }
