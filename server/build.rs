@@ -1,6 +1,6 @@
-//! Lists the files of the administrator's pages for `src/http/pages.rs`, each as it is and compressed. They are built by
-//! `npm run build` in `web` and committed, so that the server is built without Node. The guides of `docs`, which the pages
-//! show, are among them.
+//! Lists the files of the administrator's pages for `src/http/pages.rs`, each as it is and
+//! compressed. They are built by `npm run build` in `web` and committed, so that the server is
+//! built without Node. The guides of `docs`, which the pages show, are among them.
 
 use flate2::{Compression, write::GzEncoder};
 use std::{

@@ -1,6 +1,7 @@
-//! Claim: encrypted links of robots that carry much in both directions at once lose and change nothing, and a thousand
-//! handshakes that do not come keep nobody out. All of it passes the front and the gate twice: two programs of one robot of
-//! ROS 2 speak below their prefix, each over a link of its own. A process of its own: a fault of memory ends it.
+//! Claim: encrypted links of robots that carry much in both directions at once lose and change
+//! nothing, and a thousand handshakes that do not come keep nobody out. All of it passes the front
+//! and the gate twice: two programs of one robot of ROS 2 speak below their prefix, each over a
+//! link of its own. A process of its own: a fault of memory ends it.
 
 use client::{RobotOptions, RobotTls, api::NewMap};
 use link::{Credentials, EncryptedLink};
@@ -26,8 +27,8 @@ const MESSAGES: u64 = 1_000;
 const BYTES: usize = 40_000;
 /// Longest time for a round.
 const LONGEST: Duration = Duration::from_mins(2);
-/// Rounds that are repeated at most: a router ends a link that takes nothing for a second, and a machine may stand still for
-/// longer.
+/// Rounds that are repeated at most: a router ends a link that takes nothing for a second, and a
+/// machine may stand still for longer.
 const REPEATED: usize = 3;
 /// Longest time until the end of a link is known at both ends, with some to spare.
 const LEASE: Duration = Duration::from_secs(10);
@@ -124,7 +125,8 @@ async fn publish(session: &Session, key: &str) {
     }
 }
 
-/// One round over two new links. False: a link ended on the way, and nothing that came before was changed.
+/// One round over two new links. False: a link ended on the way, and nothing that came before was
+/// changed.
 async fn round(options: &RobotOptions) -> bool {
     let ((one, one_link), (other, other_link)) = (session(options).await, session(options).await);
     let (_outward, out) = counted(&other, "own/out").await;

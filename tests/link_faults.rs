@@ -1,6 +1,7 @@
-//! Claim: whatever the link between a robot and its server does, the robot goes on by itself, gets no answer twice, none out of
-//! order and none to work that began too late; every frame ends in one way, and those that were lost are counted; memory stays
-//! level, and another robot notices nothing. So it is on plain links and on encrypted ones. A process of its own: it counts the
+//! Claim: whatever the link between a robot and its server does, the robot goes on by itself, gets
+//! no answer twice, none out of order and none to work that began too late; every frame ends in one
+//! way, and those that were lost are counted; memory stays level, and another robot notices
+//! nothing. So it is on plain links and on encrypted ones. A process of its own: it counts the
 //! panics of all threads.
 
 use client::{
@@ -36,7 +37,8 @@ const EVERY: Duration = Duration::from_millis(100);
 const DEADLINE_MS: u32 = 2_000;
 /// A thread may stand so long between two clocks.
 const SLACK_MS: f64 = 2_000.0;
-/// The most that memory may grow over all faults: messages that wait, and pages that the allocator keeps.
+/// The most that memory may grow over all faults: messages that wait, and pages that the allocator
+/// keeps.
 const GROWTH_BYTES: u64 = 64 << 20;
 /// 1 Mbit/s: less than a robot sends.
 const SLOW: Link = Link::Slow(125_000);
@@ -157,7 +159,8 @@ fn capture(frame: &[u8]) -> Capture {
     Capture::encoded(frame.to_vec()).expect("a picture").with_deadline_ms(DEADLINE_MS)
 }
 
-/// A fault of the link, and for how long. One that leaves new connections alone lasts until the robot has one.
+/// A fault of the link, and for how long. One that leaves new connections alone lasts until the
+/// robot has one.
 struct Fault {
     name: &'static str,
     link: Link,
@@ -186,7 +189,8 @@ fn faults() -> Vec<Fault> {
     all
 }
 
-/// One fault, and how long the robot needs after it, or from its beginning where new connections pass.
+/// One fault, and how long the robot needs after it, or from its beginning where new connections
+/// pass.
 async fn fault(proxy: &Proxy, robot: &Sender, neighbour: &Sender, fault: &Fault) -> Duration {
     let connections = proxy.connections();
     let begun = Instant::now();

@@ -1,5 +1,6 @@
-//! Claim: a server whose zenoh threads are held is not ready within seconds, names the part, and ends with an error.
-//! A process of its own: the threads that are held are those of every session in it.
+//! Claim: a server whose zenoh threads are held is not ready within seconds, names the part, and
+//! ends with an error. A process of its own: the threads that are held are those of every session
+//! in it.
 
 use server::config::{Limits, RawConfig};
 use std::{

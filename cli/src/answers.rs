@@ -89,7 +89,8 @@ fn quad_line(quad: &QuadAnswer) -> Option<String> {
     Some(line + &by_points(quad) + &pose_text(quad))
 }
 
-/// The line for verdict ambiguous: one landmark and why it is not named, or several that the quad fits.
+/// The line for verdict ambiguous: one landmark and why it is not named, or several that the quad
+/// fits.
 fn ambiguous_line(quad: &QuadAnswer) -> String {
     let refused = |why: &str| quad.candidates.iter().find(|c| c.refusal == why).map(|c| c.landmark.as_str());
     match (refused("plain"), refused("corners")) {
@@ -118,7 +119,8 @@ fn fitting(quad: &QuadAnswer) -> Vec<&str> {
     quad.candidates.iter().filter(|c| c.ratio < 1.0).map(|c| c.landmark.as_str()).collect()
 }
 
-/// Distance of a landmark with a pose, or that its size is missing for one; nothing where no camera was given.
+/// Distance of a landmark with a pose, or that its size is missing for one; nothing where no camera
+/// was given.
 fn pose_text(quad: &QuadAnswer) -> String {
     match quad.pose.as_ref().and_then(|pose| pose.camera_from_landmark.as_ref()) {
         Some(p) => format!(", {:.2} m away", p.x_m.hypot(p.y_m).hypot(p.z_m)),

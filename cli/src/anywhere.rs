@@ -1,5 +1,6 @@
-//! Options that stand before a command or between its words. In: the arguments. Out: the same, with those options behind the
-//! command, where each has its own: `waymark --server URL map list` is `waymark map list --server URL`.
+//! Options that stand before a command or between its words. In: the arguments. Out: the same, with
+//! those options behind the command, where each has its own: `waymark --server URL map list` is
+//! `waymark map list --server URL`.
 
 use std::ffi::OsString;
 
@@ -11,7 +12,8 @@ const WORDS: u8 = 2;
 /// Options of the program itself that have a value.
 const OWN: [&str; 2] = ["--log", "--log-format"];
 
-/// The arguments with the options that stand before the command, or between its two words, behind it. What follows `--` stays where it is.
+/// The arguments with the options that stand before the command, or between its two words, behind
+/// it. What follows `--` stays where it is.
 pub(crate) fn behind_the_command(arguments: impl IntoIterator<Item = OsString>) -> Vec<OsString> {
     let mut rest = arguments.into_iter();
     let mut kept: Vec<OsString> = rest.next().into_iter().collect();

@@ -36,8 +36,8 @@ enum Verb {
     },
     /// Compute the digest of every entry anew, and compare
     ///
-    /// The last line is the head of the chain. Keep it outside of the server: whoever can write the database could write
-    /// another log, but none with that digest. For example:
+    /// The last line is the head of the chain. Keep it outside of the server: whoever can write the
+    /// database could write another log, but none with that digest. For example:
     ///   waymark audit verify
     ///   waymark audit verify --head 1042:6f1c...
     ///   waymark audit verify --file office.waymark

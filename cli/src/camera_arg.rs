@@ -30,7 +30,8 @@ impl CameraArg {
         (self.intrinsics, self.size_px)
     }
 
-    /// What to say of the lens of a photograph. Error: it has another focal length than that of the calibration.
+    /// What to say of the lens of a photograph. Error: it has another focal length than that of the
+    /// calibration.
     pub(super) fn check_lens(&self, photograph: Option<&Lens>) -> Result<Option<String>, Failure> {
         let Some((known, taken)) = self.lens.as_ref().zip(photograph) else { return Ok(None) };
         match known.difference(taken) {
@@ -47,8 +48,9 @@ impl CameraArg {
         }
     }
 
-    /// The intrinsics for a photograph, a file's bytes: those of another scale are scaled. Errors: the photograph has other
-    /// proportions than those of the calibration, or the principal point is far off its middle.
+    /// The intrinsics for a photograph, a file's bytes: those of another scale are scaled. Errors:
+    /// the photograph has other proportions than those of the calibration, or the principal point
+    /// is far off its middle.
     pub(super) fn of_photograph(&self, photograph: &[u8]) -> Result<Intrinsics, Failure> {
         // Without a size in the header the server says what is wrong with the file.
         let Some(picture) = upright_size(photograph) else { return Ok(self.intrinsics) };
@@ -58,8 +60,8 @@ impl CameraArg {
     }
 }
 
-/// A camera: `fx,fy,cx,cy` in pixels, with standard deviations of focal length and centre where there are six numbers; or
-/// the name of a file with a calibration.
+/// A camera: `fx,fy,cx,cy` in pixels, with standard deviations of focal length and centre where
+/// there are six numbers; or the name of a file with a calibration.
 pub(super) fn camera(text: &str) -> Result<CameraArg, String> {
     let made = match (numbers(text, ','), numbers(text, ',')) {
         (Some([fx, fy, cx, cy]), _) => Intrinsics::new(fx, fy, cx, cy, Distortion::None),

@@ -1,5 +1,5 @@
-//! Processor time of this thread, which other programs on the machine do not lengthen. On systems without such a clock, wall
-//! time.
+//! Processor time of this thread, which other programs on the machine do not lengthen. On systems
+//! without such a clock, wall time.
 
 /// Seconds from one moment to a later one on the same thread.
 #[derive(Debug, Clone, Copy)]

@@ -1,5 +1,6 @@
-//! Pictures with lines, dots and words on them, to show a person the stages of the detector. Colours are RGB,
-//! coordinates pixels with (0, 0) the centre of the top-left one. Anything outside is cut off.
+//! Pictures with lines, dots and words on them, to show a person the stages of the detector.
+//! Colours are RGB, coordinates pixels with (0, 0) the centre of the top-left one. Anything outside
+//! is cut off.
 
 use image::{ExtendedColorType, ImageEncoder as _, codecs::png};
 use sim::font;
@@ -109,7 +110,8 @@ impl Picture {
         }
     }
 
-    /// The part of a line that can be seen (Liang and Barsky), so that nothing far outside takes time.
+    /// The part of a line that can be seen (Liang and Barsky), so that nothing far outside takes
+    /// time.
     fn cut(&self, from: [f64; 2], to: [f64; 2], margin: f64) -> Option<([f64; 2], [f64; 2])> {
         if from.iter().chain(&to).any(|x| !x.is_finite()) {
             return None;

@@ -1,5 +1,5 @@
-//! Which names there are where one does not exist, and which command helps. In: a failure. Out: the same with a sentence for
-//! people and the next command.
+//! Which names there are where one does not exist, and which command helps. In: a failure. Out: the
+//! same with a sentence for people and the next command.
 
 use super::failure::{Class, Failure};
 use client::MapClient;

@@ -1,4 +1,5 @@
-//! Why a command did not do what was asked: a class with its own exit status, one sentence, and what to do next.
+//! Why a command did not do what was asked: a class with its own exit status, one sentence, and
+//! what to do next.
 
 use client::ClientError;
 use serde_json::{Value, json};
@@ -86,7 +87,8 @@ impl Failure {
         Self::new(Class::Usage, "usage", sentence)
     }
 
-    /// One failure for several of one command, of the class of the first. `sentence` is about all of them.
+    /// One failure for several of one command, of the class of the first. `sentence` is about all
+    /// of them.
     pub(crate) fn of_several(sentence: impl Into<String>, code: &str, all: &[Self]) -> Self {
         let class = all.first().map_or(Class::Failed, |first| first.class);
         let lines: Vec<String> = all.iter().map(ToString::to_string).collect();

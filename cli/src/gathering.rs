@@ -1,4 +1,5 @@
-//! `waymark gathering`: lets a robot gather training views while it drives, shows its tracks, discards them.
+//! `waymark gathering`: lets a robot gather training views while it drives, shows its tracks,
+//! discards them.
 
 use super::{
     screen::{Table, counted},

@@ -52,8 +52,9 @@ enum Verb {
     },
     /// Make the map what it was at a commit
     ///
-    /// Landmarks come back with their views, pictures and models, byte for byte; walls and settings, too. It is a commit of
-    /// its own, so it can be undone. Robots get the map at once. Look first what it changes: waymark history diff COMMIT
+    /// Landmarks come back with their views, pictures and models, byte for byte; walls and
+    /// settings, too. It is a commit of its own, so it can be undone. Robots get the map at once.
+    /// Look first what it changes: waymark history diff COMMIT
     #[command(verbatim_doc_comment)]
     Rollback {
         /// Number of the commit.
@@ -82,7 +83,8 @@ enum Verb {
     },
     /// Try a draft: what the map's robots would be told otherwise in their last frames
     ///
-    /// Nothing is changed. The server keeps the frames of stored answers in memory: let robots drive first.
+    /// Nothing is changed. The server keeps the frames of stored answers in memory: let robots
+    /// drive first.
     #[command(verbatim_doc_comment)]
     Replay {
         /// The draft.

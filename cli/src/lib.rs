@@ -1,5 +1,5 @@
-//! The `waymark` command line: one file per command. In: arguments, files, and a server over HTTP. Out: results on standard
-//! output, everything else on standard error, and an exit status.
+//! The `waymark` command line: one file per command. In: arguments, files, and a server over HTTP.
+//! Out: results on standard output, everything else on standard error, and an exit status.
 
 mod answers;
 mod anywhere;
@@ -50,8 +50,8 @@ use std::{process::ExitCode, time::Duration};
 use traces::Traces;
 use tracing_subscriber::{EnvFilter, Layer as _, layer::SubscriberExt as _, util::SubscriberInitExt as _};
 
-/// Maps and landmarks for fleets of robots: teach the pictures and doors of a building once, and every robot that
-/// sends camera frames learns where it is.
+/// Maps and landmarks for fleets of robots: teach the pictures and doors of a building once, and
+/// every robot that sends camera frames learns where it is.
 #[derive(Debug, Parser)]
 #[command(name = "waymark", version, propagate_version = true, after_help = EXIT_STATUSES)]
 struct Cli {
@@ -77,8 +77,8 @@ struct Cli {
 pub enum LogFormat {
     /// Lines for people.
     Text,
-    /// An object a line: `timestamp`, `level`, `target`, `fields` with the event as `message`, and the `span` of a
-    /// request or a frame.
+    /// An object a line: `timestamp`, `level`, `target`, `fields` with the event as `message`, and
+    /// the `span` of a request or a frame.
     Json,
 }
 
@@ -86,10 +86,11 @@ pub enum LogFormat {
 enum Command {
     /// A server, a simulated corridor and robots that drive and are localised, all in this program.
     ///
-    /// A first drive teaches the posters, then robots drive and send frames over zenoh. Watch it at the printed
-    /// address. Ends with a summary; exit status 1 if there was a false match.
+    /// A first drive teaches the posters, then robots drive and send frames over zenoh. Watch it at
+    /// the printed address. Ends with a summary; exit status 1 if there was a false match.
     Demo(demo::Args),
-    /// Write the files that the guides name: photographs of a rendered office, a laser log, floor plans
+    /// Write the files that the guides name: photographs of a rendered office, a laser log, floor
+    /// plans
     ///
     /// With them the guides can be followed without a poster, a camera or a robot. For example:
     ///   waymark sample office
@@ -114,14 +115,15 @@ enum Command {
     Audit(audit::Args),
     /// Write the whole state of a running server to one file
     ///
-    /// Maps, pictures, models, robots and jobs, as they were at one moment; the server goes on meanwhile. The file is
-    /// verified before it gets its name. For example:
+    /// Maps, pictures, models, robots and jobs, as they were at one moment; the server goes on
+    /// meanwhile. The file is verified before it gets its name. For example:
     ///   waymark backup office.waymark
     #[command(verbatim_doc_comment)]
     Backup(backup::Args),
     /// Put a backup in the place of the data of a stopped server
     ///
-    /// The backup is verified first: digests, integrity, schema. What was there stays in a folder beside it. For example:
+    /// The backup is verified first: digests, integrity, schema. What was there stays in a folder
+    /// beside it. For example:
     ///   waymark restore office.waymark --dry-run
     ///   waymark restore office.waymark --data /var/lib/waymark
     #[command(verbatim_doc_comment)]
@@ -130,7 +132,8 @@ enum Command {
     Map(map::Args),
     /// Landmarks: teach, list, show, place, size, rename, delete, accept.
     Landmark(landmark::Args),
-    /// Changes of a map, by whom and why: list, diff; the way back: rollback, undo; drafts: draft, publish
+    /// Changes of a map, by whom and why: list, diff; the way back: rollback, undo; drafts: draft,
+    /// publish
     ///
     /// Every change of a map is a commit. For example:
     ///   waymark history list
@@ -153,7 +156,8 @@ enum Command {
     ///   waymark landmark accept 1 3=poster 5=fire-plan
     #[command(verbatim_doc_comment)]
     Gathering(gathering::Args),
-    /// Record a robot's run against a reference trajectory: the map learns which modality to trust where
+    /// Record a robot's run against a reference trajectory: the map learns which modality to trust
+    /// where
     ///
     /// For example:
     ///   waymark run start r1
@@ -163,15 +167,18 @@ enum Command {
     Run(run::Args),
     /// Record what robots and the server send, as an MCAP file that Foxglove shows.
     ///
-    /// Frames, odometry, scans, answers and poses, with the walls and landmarks of the robots' maps. For example:
+    /// Frames, odometry, scans, answers and poses, with the walls and landmarks of the robots'
+    /// maps. For example:
     ///   waymark record drive.mcap
     ///   waymark record drive.mcap --robot r1 --seconds 60
     #[command(verbatim_doc_comment)]
     Record(recording::record::Args),
-    /// Play a recording, or a bag of ROS 2, into a running server as a robot, and compare the answers.
+    /// Play a recording, or a bag of ROS 2, into a running server as a robot, and compare the
+    /// answers.
     ///
-    /// The robot must be registered, or --map given. Two builds or two versions of a map are compared by playing the same
-    /// file into both. Exit status 1 if --compare finds a difference. For example:
+    /// The robot must be registered, or --map given. Two builds or two versions of a map are
+    /// compared by playing the same file into both. Exit status 1 if --compare finds a difference.
+    /// For example:
     ///   waymark replay drive.mcap --compare
     ///   waymark replay drive.mcap --answers before.mcap
     ///   waymark replay drive.mcap --compare before.mcap --json
@@ -188,10 +195,11 @@ enum Command {
     Recognise(recognise::Args),
     /// The quads of pictures; no server needed
     ///
-    /// Prints the corners of every quad, best first. With --draw, pictures show what each stage made of the image, and
-    /// so where a quad was lost: no edges (lower --edge-steps), edges but no segments (lower --min-segment), segments
-    /// but no quad proposal, or a proposal with a lower score than others (see the scores). A picture that cannot be read
-    /// is one line on standard error and exit status 1; the others are still done.
+    /// Prints the corners of every quad, best first. With --draw, pictures show what each stage
+    /// made of the image, and so where a quad was lost: no edges (lower --edge-steps), edges but no
+    /// segments (lower --min-segment), segments but no quad proposal, or a proposal with a lower
+    /// score than others (see the scores). A picture that cannot be read is one line on standard
+    /// error and exit status 1; the others are still done.
     ///
     /// For example:
     ///   waymark detect hall.jpg --draw stages
@@ -317,7 +325,8 @@ fn run<T>(work: impl Future<Output = anyhow::Result<T>>) -> anyhow::Result<T> {
     done
 }
 
-/// Starts the log on standard error (standard output belongs to results), with `filter` or else with `default`.
+/// Starts the log on standard error (standard output belongs to results), with `filter` or else
+/// with `default`.
 pub fn start_log(filter: Option<&str>, default: &str, format: LogFormat) {
     start_log_and(filter, default, format, None);
 }

@@ -1,4 +1,5 @@
-//! Names of maps, landmarks and robots on the command line: checked, and another suggested for one that breaks the rules.
+//! Names of maps, landmarks and robots on the command line: checked, and another suggested for one
+//! that breaks the rules.
 
 /// Most characters of a name.
 const MAX_NAME: usize = 64;

@@ -1,5 +1,6 @@
-//! Tells the supervisor of the process how it is: the datagrams of `sd_notify(3)` to the socket that systemd names. In: states
-//! and the parts of a server. Out: `READY=1`, `STOPPING=1`, and `WATCHDOG=1` for as long as every part goes on.
+//! Tells the supervisor of the process how it is: the datagrams of `sd_notify(3)` to the socket
+//! that systemd names. In: states and the parts of a server. Out: `READY=1`, `STOPPING=1`, and
+//! `WATCHDOG=1` for as long as every part goes on.
 
 use engine::vitals::Vitals;
 use std::{
@@ -36,8 +37,8 @@ impl Supervisor {
         }
     }
 
-    /// Gives signs of life while every part of the server runs and goes on. They come from the runtime that serves: one that
-    /// is stuck gives none.
+    /// Gives signs of life while every part of the server runs and goes on. They come from the
+    /// runtime that serves: one that is stuck gives none.
     pub(crate) async fn keep_alive(&self, vitals: &Vitals) -> Infallible {
         let every = self.watchdog.map_or(NO_WATCHDOG, |limit| limit / 3);
         loop {

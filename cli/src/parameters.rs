@@ -1,5 +1,5 @@
-//! Detection parameters from the command line: a file, flags for those that are changed most, and any other by its
-//! path. Later ones win: file, then flags, then `--set`.
+//! Detection parameters from the command line: a file, flags for those that are changed most, and
+//! any other by its path. Later ones win: file, then flags, then `--set`.
 
 use super::pictures;
 use anyhow::{Context as _, bail};
@@ -11,17 +11,20 @@ use vision::detect::DetectParams;
 #[derive(Debug, Clone, Default, clap::Args)]
 #[command(next_help_heading = "Detection parameters")]
 pub struct ParameterArgs {
-    /// Parameters as JSON, only what differs from the defaults, such as {"quads": {"grouping": "relaxation"}}.
+    /// Parameters as JSON, only what differs from the defaults, such as {"quads": {"grouping":
+    /// "relaxation"}}.
     #[arg(long, value_name = "FILE")]
     params: Option<PathBuf>,
-    /// How segments become quads: `proposals` searches and completes missing sides, `relaxation` is the paper's way.
+    /// How segments become quads: `proposals` searches and completes missing sides, `relaxation` is
+    /// the paper's way.
     #[arg(long, value_name = "NAME")]
     grouping: Option<String>,
-    /// Work on the image reduced by a whole factor to about this longer side; 0 for full size. Larger finds smaller
-    /// quads and takes longer.
+    /// Work on the image reduced by a whole factor to about this longer side; 0 for full size.
+    /// Larger finds smaller quads and takes longer.
     #[arg(long, value_name = "PX")]
     working_side: Option<u32>,
-    /// Scales of the search, 1 to 4, each half the one before: coarse ones see through ragged, ornate frames.
+    /// Scales of the search, 1 to 4, each half the one before: coarse ones see through ragged,
+    /// ornate frames.
     #[arg(long, value_name = "N")]
     scales: Option<u32>,
     /// Segments shorter than this are left out: lower for small quads.
@@ -33,7 +36,8 @@ pub struct ParameterArgs {
     /// Share of each side that edges must support, 0 to 1: higher for fewer false quads.
     #[arg(long, value_name = "SHARE")]
     min_support: Option<f64>,
-    /// Smallest score of a quad of the search, the probability that it is an object, 0 to 1: higher for fewer false quads.
+    /// Smallest score of a quad of the search, the probability that it is an object, 0 to 1: higher
+    /// for fewer false quads.
     #[arg(long, value_name = "SCORE")]
     min_score: Option<f64>,
     /// What a quad inside another becomes: one of its `alternates`, or one of the `quads`.
@@ -45,8 +49,8 @@ pub struct ParameterArgs {
     /// Remove floor tiling before sides are grouped.
     #[arg(long)]
     remove_tiling: bool,
-    /// Any parameter by its path, as in `quads.proposals.min_corner_angle_deg=20`. May be repeated; --show-params of
-    /// `waymark detect` lists all.
+    /// Any parameter by its path, as in `quads.proposals.min_corner_angle_deg=20`. May be
+    /// repeated; --show-params of `waymark detect` lists all.
     #[arg(long, value_name = "PATH=VALUE")]
     set: Vec<String>,
 }
@@ -117,7 +121,8 @@ pub fn assign(all: &mut Value, assignment: &str) -> anyhow::Result<()> {
     put(all, path, serde_json::from_str(text).unwrap_or_else(|_| Value::from(text)))
 }
 
-/// Sets what is at a path of names between dots. The path must exist: a typing error must not add a parameter.
+/// Sets what is at a path of names between dots. The path must exist: a typing error must not add a
+/// parameter.
 fn put(all: &mut Value, path: &str, value: Value) -> anyhow::Result<()> {
     let mut at = all;
     for name in path.split('.') {

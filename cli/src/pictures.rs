@@ -42,8 +42,9 @@ pub fn read(path: &Path) -> Result<GrayImage, PictureError> {
     Ok(read_picture(path)?.into_grey())
 }
 
-/// Reads and decodes a photograph, in colour if it has any, and turns it upright as the server does, by the orientation
-/// that it states: corners are of the upright picture, and of the smaller one where [`photograph`] makes it smaller.
+/// Reads and decodes a photograph, in colour if it has any, and turns it upright as the server
+/// does, by the orientation that it states: corners are of the upright picture, and of the smaller
+/// one where [`photograph`] makes it smaller.
 pub fn read_picture(path: &Path) -> Result<Picture, PictureError> {
     let Sent { bytes, .. } = photograph(path)?;
     picture::decode(&bytes, ImageLimits::UPLOAD).map_err(|refused| PictureError::Refused(refused.detail))
@@ -60,8 +61,9 @@ pub struct Sent {
     pub(crate) lens: Option<Lens>,
 }
 
-/// Reads a photograph. One of more bytes or pixels than a server takes is made smaller, and a BMP file is made a JPEG, upright.
-/// What cannot be decoded stays as it is: the server says what is wrong with it.
+/// Reads a photograph. One of more bytes or pixels than a server takes is made smaller, and a BMP
+/// file is made a JPEG, upright. What cannot be decoded stays as it is: the server says what is
+/// wrong with it.
 pub fn photograph(path: &Path) -> Result<Sent, PictureError> {
     let mut bytes = Vec::new();
     File::open(path)?.take(MAX_PHOTOGRAPH_BYTES).read_to_end(&mut bytes)?;
@@ -70,8 +72,8 @@ pub fn photograph(path: &Path) -> Result<Sent, PictureError> {
     Ok(Sent { lens, ..sent.unwrap_or(Sent { bytes, shrunk: None, lens: None }) })
 }
 
-/// Reads a photograph as a robot sends it: upright, for frames are not turned by what their file states, and no larger than
-/// the largest frame. What cannot be decoded stays as it is.
+/// Reads a photograph as a robot sends it: upright, for frames are not turned by what their file
+/// states, and no larger than the largest frame. What cannot be decoded stays as it is.
 pub fn frame(path: &Path) -> Result<Sent, PictureError> {
     let mut bytes = Vec::new();
     File::open(path)?.take(MAX_PHOTOGRAPH_BYTES).read_to_end(&mut bytes)?;
@@ -104,7 +106,8 @@ fn pixels([width, height]: [u32; 2]) -> u64 {
     u64::from(width) * u64::from(height)
 }
 
-/// A JPEG of the photograph, upright and with no more pixels than the limits say; `None` if it cannot be decoded.
+/// A JPEG of the photograph, upright and with no more pixels than the limits say; `None` if it
+/// cannot be decoded.
 fn made(bytes: &[u8], limits: ImageLimits) -> Option<Sent> {
     let format = image::guess_format(bytes).ok()?;
     let mut decoder = image::ImageReader::with_format(Cursor::new(bytes), format).into_decoder().ok()?;
@@ -133,7 +136,8 @@ pub fn is_picture(path: &Path) -> bool {
         .is_some_and(|e| ["png", "jpg", "jpeg", "bmp"].iter().any(|known| e.eq_ignore_ascii_case(known)))
 }
 
-/// Detection parameters from a JSON file that names only what differs from the defaults; no file, the defaults.
+/// Detection parameters from a JSON file that names only what differs from the defaults; no file,
+/// the defaults.
 pub fn detect_params(file: Option<&Path>) -> anyhow::Result<DetectParams> {
     let Some(path) = file else { return Ok(DetectParams::default()) };
     let text = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;

@@ -15,9 +15,10 @@ pub(crate) struct Args {
     /// Photographs, PNG, JPEG or BMP; those over the server's limit of pixels are sent smaller.
     #[arg(required = true, value_name = "PHOTO")]
     photographs: Vec<PathBuf>,
-    /// Camera for poses: the file that `waymark camera calibrate --json` wrote, ROS' ost.yaml, or fx,fy,cx,cy in pixels;
-    /// and its standard deviations, where known: of the focal length, of the principal point. A photograph of another
-    /// scale than that of the file has scaled intrinsics; one by a lens of another focal length, by its EXIF, is refused.
+    /// Camera for poses: the file that `waymark camera calibrate --json` wrote, ROS' ost.yaml, or
+    /// fx,fy,cx,cy in pixels; and its standard deviations, where known: of the focal length, of the
+    /// principal point. A photograph of another scale than that of the file has scaled intrinsics;
+    /// one by a lens of another focal length, by its EXIF, is refused.
     #[arg(long, value_name = "FILE|FX,FY,CX,CY", value_parser = camera)]
     camera: Option<CameraArg>,
     #[command(flatten)]

@@ -1,4 +1,5 @@
-//! `waymark sample`: the files that the guides name, to follow them without a poster, a camera or a robot.
+//! `waymark sample`: the files that the guides name, to follow them without a poster, a camera or a
+//! robot.
 
 use crate::{
     failure::{Class, Failure},
@@ -35,7 +36,8 @@ The camera of all of them: 1280 x 960 px, fx = fy = 1000 px, centre 639.5, 479.5
 /// `waymark sample`.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// The folder; made if it does not exist. Files that are there with another content stay, and end the command.
+    /// The folder; made if it does not exist. Files that are there with another content stay, and
+    /// end the command.
     #[arg(value_name = "FOLDER")]
     folder: PathBuf,
 }

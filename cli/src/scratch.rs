@@ -3,8 +3,9 @@
 use server::config::{Config, ConfigError, RawConfig};
 use std::path::{Path, PathBuf};
 
-/// Settings of a server that only this program knows of: free ports, and frames as large as the wire allows. What it stores is
-/// removed again, so only a full disk stops it, not one that is nearly full.
+/// Settings of a server that only this program knows of: free ports, and frames as large as the
+/// wire allows. What it stores is removed again, so only a full disk stops it, not one that is
+/// nearly full.
 pub fn private_server(data: &Path) -> Result<Config, ConfigError> {
     let mut raw = RawConfig {
         data: data.to_owned(),

@@ -24,7 +24,8 @@ pub fn complain(line: &str) {
     writeln!(std::io::stderr(), "{line}").ok();
 }
 
-/// Whether text on a stream may have colours: a terminal, and nobody asked for none (<https://no-color.org>).
+/// Whether text on a stream may have colours: a terminal, and nobody asked for none
+/// (<https://no-color.org>).
 pub fn has_colour(stream: &impl IsTerminal) -> bool {
     may_colour(stream.is_terminal(), std::env::var_os("NO_COLOR").as_deref())
 }
@@ -49,7 +50,8 @@ pub fn counted(count: u64, what: &str) -> String {
     if count == 1 { format!("1 {what}") } else { format!("{count} {what}s") }
 }
 
-/// Rows under headings: aligned columns on a terminal; elsewhere a line for each row, cells between tabs, no headings.
+/// Rows under headings: aligned columns on a terminal; elsewhere a line for each row, cells between
+/// tabs, no headings.
 #[derive(Debug, Clone)]
 pub struct Table {
     headings: Vec<&'static str>,

@@ -61,16 +61,19 @@ pub(super) struct Serve {
     /// Settings file, TOML.
     #[arg(long, env = "WAYMARK_CONFIG", value_name = "FILE")]
     config: Option<PathBuf>,
-    /// Directory of the database; made if missing [default: the user's folder for data, ~/.local/share/waymark on Linux].
+    /// Directory of the database; made if missing [default: the user's folder for data,
+    /// ~/.local/share/waymark on Linux].
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
     /// Where HTTP listens; port 0 takes a free one [default: 127.0.0.1:8080].
     #[arg(long, value_name = "ADDR")]
     http: Option<String>,
-    /// Where robots connect; port 0 takes a free one [default: tcp/127.0.0.1:7447, with encryption tls/127.0.0.1:7447].
+    /// Where robots connect; port 0 takes a free one [default: tcp/127.0.0.1:7447, with encryption
+    /// tls/127.0.0.1:7447].
     #[arg(long, value_name = "ENDPOINT")]
     zenoh: Option<String>,
-    /// Where metrics are served without a token, besides /metrics for viewers; port 0 takes a free one [default: nowhere].
+    /// Where metrics are served without a token, besides /metrics for viewers; port 0 takes a free
+    /// one [default: nowhere].
     #[arg(long, value_name = "ADDR")]
     metrics: Option<String>,
     /// Name in every key, waymark/1/{fleet}/... [default: default].
@@ -79,20 +82,25 @@ pub(super) struct Serve {
     /// Vision threads [default: one per core].
     #[arg(long, value_name = "N")]
     workers: Option<usize>,
-    /// Encrypts connections, with a certificate of the server's own authority unless the settings name files.
+    /// Encrypts connections, with a certificate of the server's own authority unless the settings
+    /// name files.
     #[arg(long)]
     tls: bool,
-    /// A DNS name or address by which clients reach this server, for its certificate; may be given several times.
+    /// A DNS name or address by which clients reach this server, for its certificate; may be given
+    /// several times.
     #[arg(long, value_name = "NAME", requires = "tls")]
     tls_name: Vec<String>,
-    /// A zenoh router to join instead of being one, such as tls/router.example.org:7447; may be given several times.
+    /// A zenoh router to join instead of being one, such as tls/router.example.org:7447; may be
+    /// given several times.
     #[arg(long, value_name = "ENDPOINT", conflicts_with = "zenoh")]
     router: Vec<String>,
-    /// The server's name among those of a router [default: made once, and kept in the data directory].
+    /// The server's name among those of a router [default: made once, and kept in the data
+    /// directory].
     #[arg(long, value_name = "NAME")]
     server_name: Option<String>,
-    /// Allows addresses beyond loopback in plain text. There nothing is encrypted, and robots are not asked who they are:
-    /// only for a network that is trusted as a whole. Encrypted endpoints need no such permission.
+    /// Allows addresses beyond loopback in plain text. There nothing is encrypted and robots are
+    /// not authenticated: only for a network that is trusted as a whole. Encrypted endpoints need
+    /// no such permission.
     #[arg(long)]
     insecure: bool,
 }
@@ -137,7 +145,8 @@ impl Serve {
     }
 
     pub(super) async fn run(self) -> anyhow::Result<()> {
-        // This process is the server's own: what its libraries make is private, too, not only what it makes itself.
+        // This process is the server's own: what its libraries make is private, too, not only what
+        // it makes itself.
         #[cfg(unix)]
         rustix::process::umask(rustix::fs::Mode::from_raw_mode(0o077));
         let config = self.settings()?;
@@ -196,8 +205,8 @@ async fn after(failure: &vitals::Failure, server: RunningServer) -> anyhow::Erro
     anyhow!("{failure}; start the server again: it goes on from what is on the disk")
 }
 
-/// The first lines on stdout, for people and for programs that started this one on port 0. The link is a secret: where
-/// standard output is no terminal it may be a log.
+/// The first lines on stdout, for people and for programs that started this one on port 0. The link
+/// is a secret: where standard output is no terminal it may be a log.
 fn ready(server: &RunningServer, data: &Path) {
     let link = server.page_link().filter(|_| std::io::stdout().is_terminal());
     let open = link.unwrap_or_else(|| "waymark open prints a link that opens the page".to_owned());
@@ -213,7 +222,8 @@ fn ready(server: &RunningServer, data: &Path) {
     std::io::stdout().write_all(text.as_bytes()).ok();
 }
 
-/// SIGTERM and Ctrl-C. They are heard as soon as this is made, before anybody is told that the server is ready.
+/// SIGTERM and Ctrl-C. They are heard as soon as this is made, before anybody is told that the
+/// server is ready.
 #[cfg(unix)]
 struct StopSignals {
     terminate: Signal,

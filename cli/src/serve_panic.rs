@@ -1,8 +1,8 @@
-//! The end of the server after a panic inside zenoh. In: every panic of the process. Out: for one in zenoh's code a log entry
-//! with its cause, and the exit status of a failure.
+//! The end of the server after a panic inside zenoh. In: every panic of the process. Out: for one
+//! in zenoh's code a log entry with its cause, and the exit status of a failure.
 //!
-//! Such a panic leaves locks of zenoh poisoned: no robot is served any more, and a destructor that meets one of them would
-//! abort the process without the cause.
+//! Such a panic leaves locks of zenoh poisoned: no robot is served any more, and a destructor that
+//! meets one of them would abort the process without the cause.
 
 use super::failure::Class;
 use std::{

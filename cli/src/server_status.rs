@@ -22,11 +22,14 @@ pub(crate) struct Args {
 
 #[derive(Debug, clap::Subcommand)]
 enum Verb {
-    /// Whether the server is ready, its version, maps and robots. Exit status 0 only if everything is in order.
+    /// Whether the server is ready, its version, maps and robots. Exit status 0 only if everything
+    /// is in order.
     Status,
-    /// Whether the server does its work now: what a container or a load balancer asks. Needs no token.
+    /// Whether the server does its work now: what a container or a load balancer asks. Needs no
+    /// token.
     Health,
-    /// The servers that share a router with this one, with their maps, and what more than one of them has.
+    /// The servers that share a router with this one, with their maps, and what more than one of
+    /// them has.
     List,
 }
 

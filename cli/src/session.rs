@@ -35,7 +35,8 @@ pub(crate) struct ServerArgs {
         default_value = "http://127.0.0.1:8080"
     )]
     server: String,
-    /// Token for the server [default: that of `waymark login`; on the server's own machine none is needed].
+    /// Token for the server [default: that of `waymark login`; on the server's own machine none is
+    /// needed].
     #[arg(
         long,
         global = true,
@@ -45,7 +46,8 @@ pub(crate) struct ServerArgs {
         value_name = "TOKEN"
     )]
     token: Option<TokenArg>,
-    /// PEM file of who signs the server's certificate [default: that of `waymark login`, or those of the system]
+    /// PEM file of who signs the server's certificate [default: that of `waymark login`, or those
+    /// of the system]
     #[arg(long, global = true, env = "WAYMARK_AUTHORITY", help_heading = HEADING, value_name = "FILE")]
     authority: Option<PathBuf>,
     /// Print results and errors as JSON.
@@ -211,7 +213,8 @@ impl Session {
         }
     }
 
-    /// Waits until a job has ended, with a progress bar. Errors: it failed, was cancelled or takes too long.
+    /// Waits until a job has ended, with a progress bar. Errors: it failed, was cancelled or takes
+    /// too long.
     pub(crate) async fn finished(&self, job: Job, what: &'static str) -> Result<Job, ClientError> {
         let bar = screen::progress(JOB_STEPS, what);
         let report = |job: &Job| bar.set_position((job.progress * JOB_STEPS as f64) as u64);

@@ -1,5 +1,5 @@
-//! Errors that a simulated robot makes: in its intrinsics, its extrinsics, and on a survey in its pose. A covariance can only
-//! be evaluated where the errors that it states are made.
+//! Errors that a simulated robot makes: in its intrinsics, its extrinsics, and on a survey in its
+//! pose. A covariance can only be evaluated where the errors that it states are made.
 
 use map::{
     check::OutOfRange,
@@ -13,11 +13,12 @@ use vision::{
     random::Random,
 };
 
-/// How well a surveying robot knows its pose: standard deviations of x, y (metres) and heading (radians).
+/// How well a surveying robot knows its pose: standard deviations of x, y (metres) and heading
+/// (radians).
 const SURVEY_SIGMA: [f64; 3] = [0.01, 0.01, 0.002];
 
-/// The errors of one robot: those of intrinsics and extrinsics are the same in every picture, those of the pose are new each
-/// time.
+/// The errors of one robot: those of intrinsics and extrinsics are the same in every picture, those
+/// of the pose are new each time.
 #[derive(Debug, Clone)]
 pub struct SimulatedRobotErrors {
     /// The intrinsics that it states.
@@ -34,7 +35,8 @@ impl SimulatedRobotErrors {
         Self { camera: *camera, random: None, extrinsics_error: Vector6::zeros() }
     }
 
-    /// A robot with errors as large as it states: those of a usual calibration, of default extrinsics, of a survey.
+    /// A robot with errors as large as it states: those of a usual calibration, of default
+    /// extrinsics, of a survey.
     pub fn drawn(camera: &Intrinsics, seed: u64) -> Self {
         let mut random = Random::new(seed);
         let sigmas = IntrinsicsSigmas::usual(camera.fx_px);

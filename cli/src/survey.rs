@@ -1,9 +1,9 @@
-//! A first drive: a robot with a known pose maps the walls by laser and takes frames of every poster from several sides. In:
-//! stops. Out: walls, and views of each poster with its detected quad. The demo teaches them to a server, an evaluation to
-//! itself.
+//! A first drive: a robot with a known pose maps the walls by laser and takes frames of every
+//! poster from several sides. In: stops. Out: walls, and views of each poster with its detected
+//! quad. The demo teaches them to a server, an evaluation to itself.
 //!
-//! In the field a person gives the name of the poster and clicks on its quad; here the simulator's truth replaces the click.
-//! Corners, places and sizes are measured, not taken from the truth.
+//! In the field a person gives the name of the poster and clicks on its quad; here the simulator's
+//! truth replaces the click. Corners, places and sizes are measured, not taken from the truth.
 
 use super::{screen, simulated_errors::SimulatedRobotErrors};
 use map::{
@@ -87,8 +87,9 @@ fn clicked(readings: &SensorReadings, name: &str) -> Option<Quad> {
         .find(|quad| polygon::iou(quad.corners_px.points(), truth.corners_px.points()) >= IOU_CLICKED)
 }
 
-/// The place of a poster by its views, and the indices of the views that agree with it. The others show another border of the
-/// same object, or another object: their icons would not fit the model (method 7, rectangle consistency).
+/// The place of a poster by its views, and the indices of the views that agree with it. The others
+/// show another border of the same object, or another object: their icons would not fit the model
+/// (method 7, rectangle consistency).
 pub fn place_on_walls(
     views: &[SurveyView],
     walls: &[LaserSegment],

@@ -1,6 +1,6 @@
-//! Traces of requests and frames for a collector of OpenTelemetry, by OTLP over HTTP. Off unless the standard variables name
-//! an endpoint. In: the spans of the server. Out: batches, sent by a thread of their own; what does not fit into its queue
-//! is dropped.
+//! Traces of requests and frames for a collector of OpenTelemetry, by OTLP over HTTP. Off unless
+//! the standard variables name an endpoint. In: the spans of the server. Out: batches, sent by a
+//! thread of their own; what does not fit into its queue is dropped.
 
 use crate::failure::{Class, Failure};
 use opentelemetry::trace::TracerProvider as _;
@@ -14,7 +14,8 @@ use tracing::{Level, Subscriber, level_filters::LevelFilter};
 use tracing_opentelemetry::OpenTelemetryLayer;
 use tracing_subscriber::{Layer, filter::Targets, registry::LookupSpan};
 
-/// Either switches traces on; the first goes before. Those for protocol, headers, time, sampling and service are read, too.
+/// Either switches traces on; the first goes before. Those for protocol, headers, time, sampling
+/// and service are read, too.
 const ENDPOINTS: [&str; 2] = ["OTEL_EXPORTER_OTLP_TRACES_ENDPOINT", "OTEL_EXPORTER_OTLP_ENDPOINT"];
 /// The protocols that are spoken; the rest of the standard is gRPC and JSON.
 const PROTOCOLS: [&str; 2] = ["OTEL_EXPORTER_OTLP_TRACES_PROTOCOL", "OTEL_EXPORTER_OTLP_PROTOCOL"];

@@ -22,7 +22,8 @@ struct Arguments {
     /// The robot's name; `PUT /api/v1/robots/ROBOT {"map": ...}` makes it known.
     #[arg(long, default_value = "r1")]
     robot: String,
-    /// The file robot.json of `waymark robot enrol`, for an encrypted server: in place of the other three.
+    /// The file robot.json of `waymark robot enrol`, for an encrypted server: in place of the other
+    /// three.
     #[arg(long)]
     robot_file: Option<PathBuf>,
     /// JPEG or PNG files.
@@ -33,7 +34,8 @@ struct Arguments {
 #[tokio::main]
 async fn main() -> Result<(), anyhow::Error> {
     let arguments = Arguments::parse();
-    // Every photograph counts here, so wait for a full link. A driving robot keeps `Delivery::Latest`.
+    // Every photograph counts here, so wait for a full link. A driving robot keeps
+    // `Delivery::Latest`.
     let options = match &arguments.robot_file {
         Some(file) => RobotOptions::from_file(file)?,
         None => RobotOptions::new(&arguments.endpoint, &arguments.fleet, &arguments.robot),
@@ -44,8 +46,8 @@ async fn main() -> Result<(), anyhow::Error> {
     for (i, path) in arguments.images.iter().enumerate() {
         let image = std::fs::read(path)
             .map_err(|error| ClientError::File { path: path.display().to_string(), error })?;
-        // `Capture::raw(..)` takes pixels of a camera. `.with_intrinsics(..)` gives poses of landmarks,
-        // `.with_mounting(..)` also the robot's own.
+        // `Capture::raw(..)` takes pixels of a camera. `.with_intrinsics(..)` gives poses of
+        // landmarks, `.with_mounting(..)` also the robot's own.
         let capture = Capture::encoded(image)?;
         let answer = robot.recognise("camera", capture, Duration::from_secs(30)).await?;
         println!("[{}/{count}] {}: {}", i + 1, path.display(), sentence(&answer));

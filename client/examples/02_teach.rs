@@ -1,11 +1,13 @@
-//! A teacher: make a map, upload one photograph per landmark, learn, and try it on other photographs.
+//! A teacher: make a map, upload one photograph per landmark, learn, and try it on other
+//! photographs.
 //!
 //! ```text
 //! waymark serve                                      # in another terminal
 //! cargo run -p client --example 02_teach -- --map hall poster.jpg door.jpg --try wall.jpg
 //! ```
-//! The name of a landmark is the name of its file. With `--cropped` the whole image is the landmark; otherwise the
-//! server searches the dominant quad and refuses the image if there are several.
+//! The name of a landmark is the name of its file. With `--cropped` the whole image is the
+//! landmark; otherwise the server searches the dominant quad and refuses the image if there are
+//! several.
 #![expect(clippy::print_stdout, reason = "an example shows its results")]
 
 use anyhow::Context;

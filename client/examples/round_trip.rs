@@ -1,6 +1,6 @@
-//! The round trip of a frame, measured: for every line of the input, `jpeg` or `rgb8`, one frame is sent and its time
-//! from send to answer is printed, with what the server took of it, both in milliseconds.
-//! `client/python/bench/round_trip.py` runs this beside the same in Python.
+//! The round trip of a frame, measured: for every line of the input, `jpeg` or `rgb8`, one frame is
+//! sent and its time from send to answer is printed, with what the server took of it, both in
+//! milliseconds. `client/python/bench/round_trip.py` runs this beside the same in Python.
 #![expect(clippy::print_stdout, reason = "a measurement shows its results")]
 
 use anyhow::{Context, bail};

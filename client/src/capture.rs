@@ -21,7 +21,8 @@ use vision::{
     geometry::Corners,
 };
 
-/// One image, or the quads of one, with its capture data. Built from an image, then completed with `with_...`.
+/// One image, or the quads of one, with its capture data. Built from an image, then completed with
+/// `with_...`.
 #[derive(Debug, Clone)]
 pub struct Capture {
     /// Without an image where there are quads.
@@ -29,10 +30,11 @@ pub struct Capture {
     quads: Option<Vec<v1::FoundQuad>>,
 }
 
-/// What is sent around a quad, as a share of its width and height on each side: the learnt border may lie outside of the found
-/// one.
+/// What is sent around a quad, as a share of its width and height on each side: the learnt border
+/// may lie outside of the found one.
 const PATCH_MARGIN: f64 = 0.4;
-/// What a message has beside its pixels, in bytes: numbers of the camera, its place, a covariance, the name of a map.
+/// What a message has beside its pixels, in bytes: numbers of the camera, its place, a covariance,
+/// the name of a map.
 pub(crate) const MESSAGE_HEAD_BYTES: usize = 1024;
 
 impl Capture {
@@ -49,8 +51,9 @@ impl Capture {
         Self::new(v1::ImageEncoding::Gray8, image.width() as u32, image.height() as u32, bytes)
     }
 
-    /// Raw pixels, sent as they are: rows from the top without padding, `encoding` GRAY8 (mono8), RGB8 or BGR8. The
-    /// capture time is now. Error: not the bytes of `width_px` x `height_px` pixels of a raw encoding.
+    /// Raw pixels, sent as they are: rows from the top without padding, `encoding` GRAY8 (mono8),
+    /// RGB8 or BGR8. The capture time is now. Error: not the bytes of `width_px` x `height_px`
+    /// pixels of a raw encoding.
     pub fn raw(
         encoding: v1::ImageEncoding,
         (width_px, height_px): (u32, u32),
@@ -75,9 +78,10 @@ impl Capture {
         Ok(Self::new(encoding, width_px, height_px, pixels))
     }
 
-    /// The quads that the robot's own detector found in an image, best first, with the pixels around them in place of the image.
-    /// Those with four sides are sent, at most [`MAX_FOUND_QUADS`], and as many as have together no more pixels than the largest
-    /// frame. The capture time is now.
+    /// The quads that the robot's own detector found in an image, best first, with the pixels
+    /// around them in place of the image. Those with four sides are sent, at most
+    /// [`MAX_FOUND_QUADS`], and as many as have together no more pixels than the largest frame. The
+    /// capture time is now.
     pub fn quads(image: &GrayImage, quads: &[Quad]) -> Self {
         let mut spare_px = MAX_FRAME_PX;
         let is_room = |found: &v1::FoundQuad| {
@@ -91,7 +95,8 @@ impl Capture {
         Self::found((image.width() as u32, image.height() as u32), cut.take(MAX_FOUND_QUADS).collect())
     }
 
-    /// The same of quads whose patches are cut out and encoded already; `size_px` is that of the image.
+    /// The same of quads whose patches are cut out and encoded already; `size_px` is that of the
+    /// image.
     pub fn found((width_px, height_px): (u32, u32), quads: Vec<v1::FoundQuad>) -> Self {
         let of = Self::new(v1::ImageEncoding::Unspecified, width_px, height_px, Bytes::new());
         Self { quads: Some(quads), ..of }
@@ -181,8 +186,8 @@ impl Capture {
         self.frame.image.len() + patches.map(|patch| patch.image.len()).sum::<usize>()
     }
 
-    /// The same, or without the image if the message would have more than `most` bytes: what is larger is dropped on the way
-    /// without a word, and this is refused with its code.
+    /// The same, or without the image if the message would have more than `most` bytes: what is
+    /// larger is dropped on the way without a word, and this is refused with its code.
     pub(crate) fn withheld(mut self, most: usize) -> Self {
         if self.pixel_bytes() + MESSAGE_HEAD_BYTES > most {
             self.frame.withheld_bytes = self.pixel_bytes() as u64;

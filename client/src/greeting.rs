@@ -1,4 +1,5 @@
-//! How an encrypted session begins. In: the options of a robot. Out: a session whose messages arrive.
+//! How an encrypted session begins. In: the options of a robot. Out: a session whose messages
+//! arrive.
 
 use crate::{
     ClientError, RobotOptions,
@@ -12,16 +13,19 @@ use std::time::{Duration, Instant};
 const HELLO_WAIT: Duration = Duration::from_millis(500);
 /// Time between two questions for it.
 const HELLO_EVERY: Duration = Duration::from_millis(50);
-/// A session that was not greeted for so long is opened anew; each later one is given twice the time of the one before.
+/// A session that was not greeted for so long is opened anew; each later one is given twice the
+/// time of the one before.
 const FIRST_GREETED: Duration = Duration::from_millis(500);
 /// The most that is given to one session.
 const GREETED: Duration = Duration::from_secs(2);
 
-/// Opens an encrypted session and waits for the answer to a hello: without access, everything is dropped without a word.
+/// Opens an encrypted session and waits for the answer to a hello: without access, everything is
+/// dropped without a word.
 ///
-/// A session that is not greeted is opened anew: one that meets the server's gate as that closes, to open again with other
-/// rights, may keep a link to what was closed, for ever. The first sessions are given up early, so that there is time for
-/// several. That the robot is not admitted is said only if the last session was linked or something still listens.
+/// A session that is not greeted is opened anew: one that meets the server's gate as that closes,
+/// to open again with other rights, may keep a link to what was closed, for ever. The first
+/// sessions are given up early, so that there is time for several. That the robot is not admitted
+/// is said only if the last session was linked or something still listens.
 pub(crate) async fn admitted(
     keys: &Keys,
     robot: &Name,
@@ -34,7 +38,8 @@ pub(crate) async fn admitted(
     loop {
         let opened = match transport::open(&RobotOptions { timeout: left, ..options.clone() }).await {
             Ok(opened) => opened,
-            // The server was there and silent: that says more than that the rest of the time was too short for one more link.
+            // The server was there and silent: that says more than that the rest of the time was
+            // too short for one more link.
             Err(ClientError::TlsRefused { .. }) if was_linked => return Err(silent()),
             Err(error) => return Err(error),
         };

@@ -1,9 +1,11 @@
 //! Robot SDK over zenoh and HTTP.
 //!
-//! [`RobotClient`] is the robot's side: frames, odometry and scans go out, answers and poses come back, over zenoh.
-//! [`MapClient`] is the teacher's side over HTTP: it has a method for every operation of the API, with the types of
-//! [`api`]. On the server's own machine it finds its token by itself; else it is given one. [`FleetListener`] hears what all robots and the server send, for recordings. [`named_landmarks`] lists the landmarks that an answer names, each global or guided. No vision runs in
-//! the client. `examples/` shows both sides, numbered in reading order.
+//! [`RobotClient`] is the robot's side: frames, odometry and scans go out, answers and poses come
+//! back, over zenoh. [`MapClient`] is the teacher's side over HTTP: it has a method for every
+//! operation of the API, with the types of [`api`]. On the server's own machine it finds its token
+//! by itself; else it is given one. [`FleetListener`] hears what all robots and the server send,
+//! for recordings. [`named_landmarks`] lists the landmarks that an answer names, each global or
+//! guided. No vision runs in the client. `examples/` shows both sides, numbered in reading order.
 
 pub mod capture;
 pub mod error;

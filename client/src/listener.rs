@@ -1,5 +1,5 @@
-//! Hears what the robots of a fleet and the server send, for recordings. In: samples of zenoh. Out: messages as bytes
-//! with their keys, in the order of receipt. Sends nothing.
+//! Hears what the robots of a fleet and the server send, for recordings. In: samples of zenoh. Out:
+//! messages as bytes with their keys, in the order of receipt. Sends nothing.
 
 use crate::{ClientError, Delivery, transport};
 use protos::{Key, Keys, Name};
@@ -46,8 +46,8 @@ pub struct FleetListener {
 }
 
 impl FleetListener {
-    /// Connects, and hears frames, answers, odometry, scans and poses of `robots`, of all if that is empty, and the
-    /// changes of all maps.
+    /// Connects, and hears frames, answers, odometry, scans and poses of `robots`, of all if that
+    /// is empty, and the changes of all maps.
     pub async fn connect(
         endpoint: &str,
         fleet: &Name,

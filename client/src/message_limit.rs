@@ -1,5 +1,6 @@
-//! How large a message of the robot may be. In: captures. Out: the same, or without an image that the server does not take:
-//! what is larger than its router takes is dropped on the way, and no answer comes.
+//! How large a message of the robot may be. In: captures. Out: the same, or without an image that
+//! the server does not take: what is larger than its router takes is dropped on the way, and no
+//! answer comes.
 
 use crate::{Capture, ClientError, RobotClient, error::fault};
 use protos::{Key, prost::Message as _, v1};
@@ -8,7 +9,8 @@ use std::{
     time::Duration,
 };
 
-/// Captures up to here are sent without a question, in bytes of their pixels: one batch of the transport.
+/// Captures up to here are sent without a question, in bytes of their pixels: one batch of the
+/// transport.
 const SMALL_BYTES: usize = 60_000;
 /// Longest wait for the server's answer. A frame is sent whole after that.
 const WAIT: Duration = Duration::from_secs(1);
@@ -18,8 +20,8 @@ const WAIT: Duration = Duration::from_secs(1);
 pub(crate) struct MessageLimit(AtomicUsize);
 
 impl MessageLimit {
-    /// The capture as it can be sent. The server is asked where that is larger than what it was known to take: another one, with
-    /// other settings, may have taken its place.
+    /// The capture as it can be sent. The server is asked where that is larger than what it was
+    /// known to take: another one, with other settings, may have taken its place.
     pub(crate) async fn within(&self, robot: &RobotClient, capture: Capture) -> Result<Capture, ClientError> {
         let bytes = capture.pixel_bytes() + crate::capture::MESSAGE_HEAD_BYTES;
         if bytes <= SMALL_BYTES || bytes <= self.0.load(Ordering::Relaxed) {

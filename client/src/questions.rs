@@ -29,7 +29,8 @@ pub struct LocaliseQuery {
 }
 
 impl LocaliseQuery {
-    /// With a frame, which needs intrinsics and mounting; its odometry, prior and deadline are not used.
+    /// With a frame, which needs intrinsics and mounting; its odometry, prior and deadline are not
+    /// used.
     #[must_use]
     pub fn with_frame(mut self, frame: Capture) -> Self {
         self.frame = Some(frame);
@@ -52,9 +53,10 @@ impl LocaliseQuery {
 }
 
 impl RobotClient {
-    /// Asks where the robot is by what it senses at one place, without its history; the server searches for at most 10 s. "No
-    /// match" is an answer, and the fused pose stays as it is. Errors: [`ClientError::Rejected`] with code and field, of which
-    /// `too_many` says to ask again later; [`ClientError::Transport`] after `wait`.
+    /// Asks where the robot is by what it senses at one place, without its history; the server
+    /// searches for at most 10 s. "No match" is an answer, and the fused pose stays as it is.
+    /// Errors: [`ClientError::Rejected`] with code and field, of which `too_many` says to ask again
+    /// later; [`ClientError::Transport`] after `wait`.
     pub async fn localise(
         &self,
         query: LocaliseQuery,
@@ -103,8 +105,8 @@ impl RobotClient {
             .map_err(|e| ClientError::Transport { action: "read gaze advice", detail: e.to_string() })
     }
 
-    /// The present version of a map; `None` if the server has no such map. For programs that store data derived
-    /// from a map: `MapChanged` events may be lost on a full link.
+    /// The present version of a map; `None` if the server has no such map. For programs that store
+    /// data derived from a map: `MapChanged` events may be lost on a full link.
     pub async fn map_version(&self, map: &str, wait: Duration) -> Result<Option<u64>, ClientError> {
         let key = self.keys.build(&Key::MapVersion(name("map", map)?));
         let replies = self.session.get(key).timeout(wait).await.map_err(fault("ask for a map's version"))?;
@@ -117,8 +119,8 @@ impl RobotClient {
             .map_err(|e| ClientError::Transport { action: hear, detail: e.to_string() })
     }
 
-    /// The versions of a map: the present one at once, then each new one. For programs that store data derived from a map, also
-    /// those that start after its last change.
+    /// The versions of a map: the present one at once, then each new one. For programs that store
+    /// data derived from a map, also those that start after its last change.
     pub async fn map_versions(&self, map: &str, wait: Duration) -> Result<MapVersions, ClientError> {
         let (sender, newest) = watch::channel(None);
         let changed = {

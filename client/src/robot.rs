@@ -1,5 +1,6 @@
-//! The robot's side. Out: frames, odometry, scans, a liveliness token. In: answers and fused poses. Frames are best
-//! effort and numbered; the server keeps the newest of each camera, so a robot that sends fast never queues.
+//! The robot's side. Out: frames, odometry, scans, a liveliness token. In: answers and fused poses.
+//! Frames are best effort and numbered; the server keeps the newest of each camera, so a robot that
+//! sends fast never queues.
 
 use crate::{
     Capture, ClientError, RobotTls,
@@ -51,9 +52,10 @@ pub struct RobotOptions {
     pub delivery: Delivery,
     /// Longest time to find the server.
     pub timeout: Duration,
-    /// Epoch of an earlier session, for a program that restarts while odometry goes on; random if absent. It works
-    /// only if the server restarted, too: a running server drops sequence numbers that begin anew as stale. Two
-    /// programs must not use one robot's name at a time: the later one is refused with `epoch_conflict`.
+    /// Epoch of an earlier session, for a program that restarts while odometry goes on; random if
+    /// absent. It works only if the server restarted, too: a running server drops sequence numbers
+    /// that begin anew as stale. Two programs must not use one robot's name at a time: the later
+    /// one is refused with `epoch_conflict`.
     pub epoch: Option<u64>,
     /// What the robot shows at a `tls/` endpoint.
     pub tls: Option<RobotTls>,
@@ -176,27 +178,29 @@ impl RobotClient {
         })
     }
 
-    /// Epoch of this start of the robot's software; random at [`Self::connect`] unless the options state it.
+    /// Epoch of this start of the robot's software; random at [`Self::connect`] unless the options
+    /// state it.
     pub fn epoch(&self) -> u64 {
         self.epoch
     }
 
-    /// From now on frames, odometry, scans and questions name this map, unless they name one themselves; `None`: none, and the
-    /// server where the robot is registered takes them. For a robot that drives into a building whose map another server on
-    /// the same router has: it is registered there, too, and goes on.
+    /// From now on frames, odometry, scans and questions name this map, unless they name one
+    /// themselves; `None`: none, and the server where the robot is registered takes them. For a
+    /// robot that drives into a building whose map another server on the same router has: it is
+    /// registered there, too, and goes on.
     pub fn enter_map(&self, map: Option<&str>) -> Result<(), ClientError> {
         self.servers.enter(map.map(|map| name("map", map)).transpose()?);
         Ok(())
     }
 
-    /// When the server of the robot's map goes and comes back, where several servers share a router. The map is that of
-    /// [`Self::enter_map`], or the robot's own.
+    /// When the server of the robot's map goes and comes back, where several servers share a
+    /// router. The map is that of [`Self::enter_map`], or the robot's own.
     pub fn server_events(&self) -> broadcast::Receiver<ServerEvent> {
         self.servers.events()
     }
 
-    /// Sends a frame, or the quads of one, and returns its number, at once. One that is larger than the server takes is sent
-    /// without its image, and its answer says `too_large`.
+    /// Sends a frame, or the quads of one, and returns its number, at once. One that is larger than
+    /// the server takes is sent without its image, and its answer says `too_large`.
     pub async fn publish_frame(&self, camera: &str, capture: Capture) -> Result<u64, ClientError> {
         let seq = self.next_seq.fetch_add(1, Ordering::Relaxed);
         let (robot, camera) = (self.robot.clone(), name("camera", camera)?);
@@ -206,8 +210,9 @@ impl RobotClient {
         Ok(seq)
     }
 
-    /// Sends a frame, or the quads of one, and waits for its answer. One at a time per camera, or the older is superseded.
-    /// [`ClientError::ServerGone`] as soon as it is known that the server of the robot's map is not there.
+    /// Sends a frame, or the quads of one, and waits for its answer. One at a time per camera, or
+    /// the older is superseded. [`ClientError::ServerGone`] as soon as it is known that the server
+    /// of the robot's map is not there.
     pub async fn recognise(
         &self,
         camera: &str,
@@ -247,13 +252,15 @@ impl RobotClient {
         }
     }
 
-    /// Every answer from now on, of all cameras. A reader more than [`INBOX`] behind misses the oldest.
+    /// Every answer from now on, of all cameras. A reader more than [`INBOX`] behind misses the
+    /// oldest.
     pub fn answers(&self) -> broadcast::Receiver<CameraAnswer> {
         self.answers.subscribe()
     }
 
-    /// Every fused pose of this epoch from now on; [`v1::RobotPose::age_ms`] says how old it was when it was sent.
-    /// The server sends none that is more than 2 s old, so that silence means that the pose is unknown.
+    /// Every fused pose of this epoch from now on; [`v1::RobotPose::age_ms`] says how old it was
+    /// when it was sent. The server sends none that is more than 2 s old, so that silence means
+    /// that the pose is unknown.
     pub fn poses(&self) -> broadcast::Receiver<v1::RobotPose> {
         self.poses.subscribe()
     }
@@ -263,7 +270,8 @@ impl RobotClient {
         self.publish_odometry_at(crate::capture::now_ns(), odom_from_robot).await
     }
 
-    /// Sends odometry that was read at `captured_ns` of the robot's clock, ns; the same clock as in frames and scans.
+    /// Sends odometry that was read at `captured_ns` of the robot's clock, ns; the same clock as in
+    /// frames and scans.
     pub async fn publish_odometry_at(
         &self,
         captured_ns: i64,
@@ -324,7 +332,8 @@ pub(crate) fn name(field: &'static str, text: &str) -> Result<Name, ClientError>
     Name::new(text).map_err(|error| ClientError::Name { field, text: text.to_owned(), error })
 }
 
-/// A random epoch by the system's randomness: 53 bits, so that JSON readers with doubles keep it whole.
+/// A random epoch by the system's randomness: 53 bits, so that JSON readers with doubles keep it
+/// whole.
 fn new_epoch() -> u64 {
     (RandomState::new().hash_one(std::process::id()) >> 11).max(1)
 }

@@ -66,7 +66,8 @@ impl RobotOptions {
         Ok(Self { tls: Some(tls), ..Self::new(file.endpoint, file.fleet, file.robot) })
     }
 
-    /// Options of the file that the variable `WAYMARK_ROBOT_FILE` names; `None` where it is not set.
+    /// Options of the file that the variable `WAYMARK_ROBOT_FILE` names; `None` where it is not
+    /// set.
     pub fn from_environment() -> Result<Option<Self>, ClientError> {
         std::env::var_os(ROBOT_FILE_VARIABLE).map(Self::from_file).transpose()
     }

@@ -1,5 +1,6 @@
-//! The servers that a robot meets, where several share a router. In: their liveliness tokens, and what they send. Out: which
-//! server a map follows, and events when the robot's server goes and comes back.
+//! The servers that a robot meets, where several share a router. In: their liveliness tokens, and
+//! what they send. Out: which server a map follows, and events when the robot's server goes and
+//! comes back.
 //!
 //! A server that is its own router announces nothing; then nothing here changes what a client does.
 
@@ -197,7 +198,8 @@ impl Servers {
         self.0.events.subscribe()
     }
 
-    /// The error while the robot's server is gone. A map that the message itself names is not looked at.
+    /// The error while the robot's server is gone. A map that the message itself names is not
+    /// looked at.
     pub(crate) fn gone_error(&self) -> Option<ClientError> {
         let gone = self.0.gone.borrow().clone()?;
         Some(ClientError::ServerGone { server: gone.to_string(), map: self.map() })

@@ -99,7 +99,8 @@ pub(crate) async fn open_at(
     }
     let unreachable = |detail: String| ClientError::Unreachable { endpoint: endpoint.to_owned(), detail };
     let config = config(endpoint, delivery, timeout).map_err(|e| unreachable(in_words(&e)))?;
-    // zenoh's own timeout is per endpoint; a silent listener (not zenoh) can hold a handshake longer.
+    // zenoh's own timeout is per endpoint; a silent listener (not zenoh) can hold a handshake
+    // longer.
     match tokio::time::timeout(timeout + Duration::from_secs(1), zenoh::open(config)).await {
         Ok(session) => session.map_err(|e| unreachable(in_words(&e))),
         Err(_) => Err(unreachable(format!("no session within {timeout:?}"))),
@@ -114,8 +115,9 @@ async fn listens(endpoint: &str) -> bool {
 }
 
 fn config(endpoint: &str, delivery: Delivery, timeout: Duration) -> zenoh::Result<zenoh::Config> {
-    // Both waits in microseconds. A frame larger than one batch needs the longer wait, or most of them are dropped
-    // silently on a slow link; and a session whose sender waits must not be closed.
+    // Both waits in microseconds. A frame larger than one batch needs the longer wait, or most of
+    // them are dropped silently on a slow link; and a session whose sender waits must not be
+    // closed.
     let (drop_us, close_us) = match delivery {
         Delivery::Latest => (50_000, 5_000_000),
         Delivery::Every => (50_000, 60_000_000),

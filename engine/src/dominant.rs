@@ -1,5 +1,5 @@
-//! The dominant quad of a photograph: the only one, or the one that is far larger than any other. In: the detector's quads.
-//! Out: one of them, or those between which a person must choose.
+//! The dominant quad of a photograph: the only one, or the one that is far larger than any other.
+//! In: the detector's quads. Out: one of them, or those between which a person must choose.
 
 use nalgebra::Matrix2;
 use vision::{
@@ -12,7 +12,8 @@ use vision::{
 
 /// A dominant quad has this many times the area of any other.
 const DOMINANT_AREA_RATIO: f64 = 3.0;
-/// A larger photograph is reduced before detection: the detector is made for robots' cameras, and this bounds its time.
+/// A larger photograph is reduced before detection: the detector is made for robots' cameras, and
+/// this bounds its time.
 const MAX_DETECT_PX: usize = 1_920 * 1_200;
 /// Quads with a greater intersection over union show the same object.
 const SAME_OBJECT_IOU: f64 = 0.5;
@@ -36,8 +37,8 @@ impl WholeQuad {
     }
 }
 
-/// The quads of a photograph, largest first, px of the photograph: each with four detected sides, none clipped by the image
-/// border.
+/// The quads of a photograph, largest first, px of the photograph: each with four detected sides,
+/// none clipped by the image border.
 pub fn whole_quads<'a>(picture: impl Into<PictureRef<'a>>, p: &Params) -> Vec<WholeQuad> {
     let picture = picture.into();
     let factor = ((picture.width() * picture.height()) as f64 / MAX_DETECT_PX as f64).sqrt().ceil() as usize;
@@ -72,7 +73,8 @@ fn inside(inner: &Corners, outer: &Corners) -> bool {
     inner.points().iter().all(|c| vision::geometry::polygon::contains(outer.points(), c, 1.0))
 }
 
-/// A plane reduced by means of `factor` x `factor` pixels; a remainder at the right and the bottom is left out.
+/// A plane reduced by means of `factor` x `factor` pixels; a remainder at the right and the bottom
+/// is left out.
 fn reduced(image: &GrayImage, factor: usize) -> GrayImage {
     GrayImage::from_fn(image.width() / factor, image.height() / factor, |u, v| {
         let rows = (v * factor..(v + 1) * factor).map(|row| &image.data()[row * image.width()..]);
@@ -83,8 +85,8 @@ fn reduced(image: &GrayImage, factor: usize) -> GrayImage {
     })
 }
 
-/// A quad of the reduced image in px of the photograph. Pixel centres are integers, so a block's centre lies between its
-/// pixels.
+/// A quad of the reduced image in px of the photograph. Pixel centres are integers, so a block's
+/// centre lies between its pixels.
 fn enlarged(quad: &Quad, factor: usize) -> Option<WholeQuad> {
     let scale = factor as f64;
     let corners_px =

@@ -1,11 +1,12 @@
-//! Decides which epoch of a robot is live. In: liveliness tokens and the epoch of every message, with the time of receipt.
-//! Out: the message is admitted, or refused because another epoch of the robot is live. Knows no transport; time is passed
-//! in.
+//! Decides which epoch of a robot is live. In: liveliness tokens and the epoch of every message,
+//! with the time of receipt. Out: the message is admitted, or refused because another epoch of the
+//! robot is live. Knows no transport; time is passed in.
 //!
-//! An epoch begins with its first message. It is live while its liveliness token is there, or for [`MESSAGE_LIVE`] after its
-//! last message. While one epoch of a robot is live, every other one is refused. When its token goes, the epoch ends at once,
-//! and the next one is admitted. A token names the slot of its epoch, one of [`protos::keys::ALIVE_SLOTS`]: of two epochs that
-//! share a slot, the token says nothing, and the later one waits for [`MESSAGE_LIVE`].
+//! An epoch begins with its first message. It is live while its liveliness token is there, or for
+//! [`MESSAGE_LIVE`] after its last message. While one epoch of a robot is live, every other one is
+//! refused. When its token goes, the epoch ends at once, and the next one is admitted. A token
+//! names the slot of its epoch, one of [`protos::keys::ALIVE_SLOTS`]: of two epochs that share a
+//! slot, the token says nothing, and the later one waits for [`MESSAGE_LIVE`].
 
 use protos::{
     Code, Name, Rejection,
@@ -17,12 +18,15 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// An epoch without a liveliness token is live for this long after its last message: the longest wait of a restarted robot.
-/// Longer than zenoh's lease (2 s), after which the token of a lost link goes.
+/// An epoch without a liveliness token is live for this long after its last message: the longest
+/// wait of a restarted robot. Longer than zenoh's lease (2 s), after which the token of a lost link
+/// goes.
 pub const MESSAGE_LIVE: Duration = Duration::from_secs(3);
-/// Epochs of one robot whose end is remembered: late messages of an ended epoch are not a robot that came back.
+/// Epochs of one robot whose end is remembered: late messages of an ended epoch are not a robot
+/// that came back.
 pub const MAX_ENDED: usize = 8;
-/// Robots beyond the registered ones; a further one replaces the one with the oldest token or message.
+/// Robots beyond the registered ones; a further one replaces the one with the oldest token or
+/// message.
 pub const MAX_UNREGISTERED: usize = 1024;
 /// Robots in all.
 pub const MAX_TRACKED_ROBOTS: usize = 10_000 + MAX_UNREGISTERED;
@@ -129,7 +133,8 @@ impl RobotEpochs {
         !self.has_token(epoch) && self.ended.iter().any(late)
     }
 
-    /// Counts a message that is refused because of the live epoch; gives the count if it is to be logged.
+    /// Counts a message that is refused because of the live epoch; gives the count if it is to be
+    /// logged.
     fn refuse(&mut self, epoch: u64, now: Instant) -> Option<u64> {
         let shown = |r: &Refused| now.saturating_duration_since(r.last) < CONFLICT_SHOWN;
         let count = self.refused.filter(shown).map_or(0, |r| r.count) + 1;
@@ -147,8 +152,9 @@ impl RobotEpochs {
 pub struct Epochs(Mutex<BTreeMap<Name, RobotEpochs>>);
 
 impl Epochs {
-    /// Admits a message of a registered robot, or refuses it with [`Code::EpochConflict`] because another epoch is live, or
-    /// with [`Code::NotNewer`] because its own ended less than [`MESSAGE_LIVE`] ago.
+    /// Admits a message of a registered robot, or refuses it with [`Code::EpochConflict`] because
+    /// another epoch is live, or with [`Code::NotNewer`] because its own ended less than
+    /// [`MESSAGE_LIVE`] ago.
     pub fn admit(&self, robot: &Name, epoch: u64, now: Instant) -> Result<(), Rejection> {
         let mut robots = self.lock();
         if robots.len() >= MAX_TRACKED_ROBOTS && !robots.contains_key(robot) {
@@ -187,7 +193,8 @@ impl Epochs {
     }
 
     /// The liveliness token of a slot appeared or went. Names that are not registered
-    /// (`is_registered`) never replace registered ones. `Some(true)` if the robot came by that, `Some(false)` if it went.
+    /// (`is_registered`) never replace registered ones. `Some(true)` if the robot came by that,
+    /// `Some(false)` if it went.
     pub fn token(
         &self,
         robot: &Name,
@@ -266,8 +273,8 @@ fn make_room(robots: &mut BTreeMap<Name, RobotEpochs>, is_registered: impl Fn(&N
 /// Epochs of one camera whose last number is remembered besides the present one's.
 pub const PAST_EPOCHS: usize = 8;
 
-/// The last sequence number of a stream in each of its latest epochs. [`Epochs`] decides which epoch is live;
-/// one that comes back continues after its last number.
+/// The last sequence number of a stream in each of its latest epochs. [`Epochs`] decides which
+/// epoch is live; one that comes back continues after its last number.
 #[derive(Debug, Default)]
 pub struct SequenceTracker {
     last: Option<(u64, u64)>,

@@ -1,5 +1,6 @@
-//! Which landmark a robot's pan-tilt camera shall look at, over one version of its map: `map::gaze` with the landmarks that
-//! are learnt, placed and trusted. A robot keeps one landmark until another is clearly better; a page gets the ranking.
+//! Which landmark a robot's pan-tilt camera shall look at, over one version of its map: `map::gaze`
+//! with the landmarks that are learnt, placed and trusted. A robot keeps one landmark until another
+//! is clearly better; a page gets the ranking.
 
 use crate::snapshot::MapSnapshot;
 use map::{
@@ -51,8 +52,8 @@ pub fn ranked(map: &MapSnapshot, query: &GazeQuery) -> Result<Vec<GazeTarget>, O
 pub struct GazeControllers(Mutex<BTreeMap<Name, (u64, GazeController)>>);
 
 impl GazeControllers {
-    /// The action of a robot at its own time `at_ns`; `outcome` says whether the last target was recognised. Errors: a query
-    /// out of range.
+    /// The action of a robot at its own time `at_ns`; `outcome` says whether the last target was
+    /// recognised. Errors: a query out of range.
     pub fn choose(
         &self,
         robot: &Name,

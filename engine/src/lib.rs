@@ -1,8 +1,10 @@
-//! The engine. In: frames, odometry and scans of robots. Out: answers and poses. It knows no transport, store or HTTP:
-//! one slot a camera, workers, the snapshots that they read, and the state of each robot (`motion`).
+//! The engine. In: frames, odometry and scans of robots. Out: answers and poses. It knows no
+//! transport, store or HTTP: one slot a camera, workers, the snapshots that they read, and the
+//! state of each robot (`motion`).
 //!
-//! `frame` is the way of a frame, `observers` is what watches frames and motion, `supervision` is what watches threads.
-//! Imports go one way: `observers -> frame -> motion -> snapshot, supervision`. The workers give answers to an
+//! `frame` is the way of a frame, `observers` is what watches frames and motion, `supervision` is
+//! what watches threads. Imports go one way:
+//! `observers -> frame -> motion -> snapshot, supervision`. The workers give answers to an
 //! implementation of `Publish`. Only the journal of a mapping is written to disk.
 
 mod frame;

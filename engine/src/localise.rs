@@ -1,5 +1,6 @@
-//! Global localisation without a history: one frame, one scan or both, and the map. In: what a robot senses at one place. Out: its
-//! pose with covariance, the poses that it may be at, or none. Nothing of it changes a robot's fused pose.
+//! Global localisation without a history: one frame, one scan or both, and the map. In: what a
+//! robot senses at one place. Out: its pose with covariance, the poses that it may be at, or none.
+//! Nothing of it changes a robot's fused pose.
 
 use crate::{
     frame::{
@@ -29,7 +30,8 @@ use vision::{
 
 /// Most poses of a result.
 pub const MAX_HYPOTHESES: usize = MAX_POSES;
-/// A pose with a larger standard deviation of its position is no pose: along a bare corridor the walls tell nothing.
+/// A pose with a larger standard deviation of its position is no pose: along a bare corridor the
+/// walls tell nothing.
 const MAX_SIGMA_M: f64 = 1.0;
 /// Least worth of a point without a wall, as squared standard deviations of one with a wall.
 const MISSED2: f64 = 9.0;
@@ -69,7 +71,8 @@ pub struct LocaliseHypothesis {
     pub landmarks: Vec<LandmarkId>,
     /// Share of the scan's points with a wall, 0 to 1; absent where the scan was not used.
     pub matched: Option<f64>,
-    /// Quads that may be several landmarks give it: in one frame alone, that is never enough for a pose.
+    /// Quads that may be several landmarks give it: in one frame alone, that is never enough for a
+    /// pose.
     by_look_alikes: bool,
 }
 
@@ -119,7 +122,8 @@ pub struct Localisation {
     pub answer: Option<v1::Answer>,
 }
 
-/// Localises. `stop` is asked now and then; a stopped search has the reason [`LocaliseReason::Stopped`].
+/// Localises. `stop` is asked now and then; a stopped search has the reason
+/// [`LocaliseReason::Stopped`].
 pub fn localise(input: &LocaliseInput<'_>, stop: &dyn Fn() -> bool) -> Localisation {
     let (found, mut answer) = match &input.frame {
         Some(frame) => {
@@ -271,8 +275,8 @@ fn by_scan(map: &MapSnapshot, scan: &Scan, stop: &dyn Fn() -> bool) -> Found {
     Ok(fixes.iter().map(one).collect())
 }
 
-/// Likelihood of a scan at a pose, up to a factor: points with a wall by their distances, each of the others as one that is
-/// three standard deviations off.
+/// Likelihood of a scan at a pose, up to a factor: points with a wall by their distances, each of
+/// the others as one that is three standard deviations off.
 fn likelihood(fix: &LaserFix, p: &LaserFixParams) -> f64 {
     let all = fix.points as f64 / fix.matched.max(1e-3);
     let of_one = (fix.rms_m / p.outlier_m).powi(2).min(MISSED2);

@@ -1,6 +1,7 @@
-//! Mappings: walls of a map made while a robot drives. In: the scans of one robot in order, each with its odometry. Out:
-//! progress, and the walls once somebody finishes the mapping and stores them. A bounded queue passes scans to `map::slam` on
-//! a thread of its own. A journal stores them, so that a mapping resumes after a restart of the server.
+//! Mappings: walls of a map made while a robot drives. In: the scans of one robot in order, each
+//! with its odometry. Out: progress, and the walls once somebody finishes the mapping and stores
+//! them. A bounded queue passes scans to `map::slam` on a thread of its own. A journal stores them,
+//! so that a mapping resumes after a restart of the server.
 
 mod journal;
 mod session;
@@ -34,7 +35,8 @@ pub type Walls = Vec<map::segments::LaserSegment>;
 /// Stage of a mapping.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MappingStage {
-    /// The server has restarted: the scans in the journal are mapped once more. New ones wait in the queue.
+    /// The server has restarted: the scans in the journal are mapped once more. New ones wait in
+    /// the queue.
     Resuming,
     /// Scans are mapped as they come.
     Mapping,
@@ -71,7 +73,8 @@ pub struct MappingProgress {
     pub loop_closures: Option<usize>,
     /// Why it failed.
     pub reason: Option<String>,
-    /// Why further scans are not in the journal: a restart of the server would lose them. Absent while they are.
+    /// Why further scans are not in the journal: a restart of the server would lose them. Absent
+    /// while they are.
     pub journal_error: Option<String>,
 }
 
@@ -113,13 +116,14 @@ impl MappingSessions {
         self.panics.get_or_init(|| panics);
     }
 
-    /// Says whether the disk has room for journals. Without, a journal ends with its next scan; the mapping goes on.
+    /// Says whether the disk has room for journals. Without, a journal ends with its next scan; the
+    /// mapping goes on.
     pub fn set_room(&self, has_room: bool) {
         self.no_room.store(!has_room, Ordering::Relaxed);
     }
 
-    /// Writes journals to a folder from now on, and resumes the mappings there whose robot is still on the map (`is_on`); the
-    /// other journals are removed.
+    /// Writes journals to a folder from now on, and resumes the mappings there whose robot is still
+    /// on the map (`is_on`); the other journals are removed.
     pub fn resume_in(&self, dir: PathBuf, is_on: impl Fn(&Name, &Name) -> bool) {
         let dir = self.dir.get_or_init(|| dir);
         let mut all = self.lock();
@@ -177,8 +181,9 @@ impl MappingSessions {
         }
     }
 
-    /// Takes no more scans; the walls come once the pose graph is optimised, or at once where they are held already. Their fate
-    /// is reported to [`MappingSessions::stored`] or [`MappingSessions::hold`].
+    /// Takes no more scans; the walls come once the pose graph is optimised, or at once where they
+    /// are held already. Their fate is reported to [`MappingSessions::stored`] or
+    /// [`MappingSessions::hold`].
     pub fn finish(
         &self,
         map: &str,
@@ -192,7 +197,8 @@ impl MappingSessions {
     /// The number of walls that were stored, or why they were not.
     pub fn stored(&self, map: &str, stored: Result<usize, String>) {
         if let Some(session) = self.lock().get_mut(map) {
-            // After a failure the journal stays: the next start resumes the mapping, unless it is cancelled.
+            // After a failure the journal stays: the next start resumes the mapping, unless it is
+            // cancelled.
             if stored.is_ok() {
                 self.remove_journal(map);
             }
@@ -200,8 +206,9 @@ impl MappingSessions {
         }
     }
 
-    /// Holds the walls until somebody accepts them with [`MappingSessions::finish`], or says why there are none. The journal
-    /// stays: after a restart the mapping resumes, and is finished once more.
+    /// Holds the walls until somebody accepts them with [`MappingSessions::finish`], or says why
+    /// there are none. The journal stays: after a restart the mapping resumes, and is finished once
+    /// more.
     pub fn hold(&self, map: &str, walls: Result<Walls, String>) {
         // Another mapping of the map may have begun after this one was cancelled.
         if let Some(session) = self.lock().get_mut(map).filter(|session| session.is_finishing()) {

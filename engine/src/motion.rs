@@ -1,9 +1,10 @@
-//! The motion of each robot. In: odometry, scans and fixes by landmarks. Out: its fused pose on the map. For pages, odometry
-//! alone is put on the map at the robot's first known pose. A new epoch of a robot resets its state; so does another map,
-//! unless the two maps are linked.
+//! The motion of each robot. In: odometry, scans and fixes by landmarks. Out: its fused pose on the
+//! map. For pages, odometry alone is put on the map at the robot's first known pose. A new epoch of
+//! a robot resets its state; so does another map, unless the two maps are linked.
 //!
-//! Capture times order one robot's own readings. They are never compared with this machine's wall clock, only with the time
-//! that passes between messages (`timebase.rs`). A stray stamp is refused, and a pose says how old it is.
+//! Capture times order one robot's own readings. They are never compared with this machine's wall
+//! clock, only with the time that passes between messages (`timebase.rs`). A stray stamp is
+//! refused, and a pose says how old it is.
 
 mod corrections;
 mod frames;
@@ -57,8 +58,8 @@ use std::{
 };
 use timebase::Stream;
 
-/// A fused pose is published, and used, only while the odometry or fix that supports it was captured no longer ago.
-/// Robots that send odometry once a second are within it.
+/// A fused pose is published, and used, only while the odometry or fix that supports it was
+/// captured no longer ago. Robots that send odometry once a second are within it.
 pub const MAX_POSE_AGE: Duration = Duration::from_secs(2);
 /// Word of the laser in counters.
 const LASER: &str = "laser";
@@ -139,8 +140,8 @@ impl MotionTracker {
         &self.epochs
     }
 
-    /// Takes odometry of a robot, with the time of receipt. Gives the pose to publish once the robot has one. A refusal is
-    /// counted.
+    /// Takes odometry of a robot, with the time of receipt. Gives the pose to publish once the
+    /// robot has one. A refusal is counted.
     pub fn odometry(&self, robot: &Name, message: Bytes, received: Instant) -> Option<v1::RobotPose> {
         let taken = self.checked_odometry(robot, message, received);
         self.observer.message(robot, Input::Odometry, taken.as_ref().err(), received);
@@ -175,8 +176,8 @@ impl MotionTracker {
         Ok((map, odometry, shared))
     }
 
-    /// Takes a laser scan, with the time of receipt: checks it, counts it, and queues it for [`MotionTracker::fix_by_scan`],
-    /// or for the mapping if the robot makes a map.
+    /// Takes a laser scan, with the time of receipt: checks it, counts it, and queues it for
+    /// [`MotionTracker::fix_by_scan`], or for the mapping if the robot makes a map.
     pub fn scan(&self, robot: &Name, message: Bytes, received: Instant) {
         let taken = self.checked_scan(robot, message, received);
         self.observer.message(robot, Input::Scan, taken.as_ref().err(), received);
@@ -227,8 +228,9 @@ impl MotionTracker {
         &self.mappings
     }
 
-    /// Matches a scan with the walls of its map, near the prior pose without it, and corrects that pose. Gives the pose to
-    /// publish if it was corrected. A scan never gives a first pose. Takes about 100 microseconds: for the laser thread.
+    /// Matches a scan with the walls of its map, near the prior pose without it, and corrects that
+    /// pose. Gives the pose to publish if it was corrected. A scan never gives a first pose. Takes
+    /// about 100 microseconds: for the laser thread.
     pub fn fix_by_scan(&self, robot: &Name, job: &ScanJob, now: Instant) -> Option<v1::RobotPose> {
         let map = self.snapshots.get(&job.map)?;
         let state = self.robot_state(robot, &job.map, job.epoch)?;
@@ -320,9 +322,9 @@ impl MotionTracker {
         lock_robot(&state).recording.take()
     }
 
-    /// The state of a robot that is on this map, for its live epoch; `None` for any other. A frame against another map says
-    /// nothing about the robot's pose and must not reset its fusion. Neither must a frame that was in work when another epoch
-    /// began.
+    /// The state of a robot that is on this map, for its live epoch; `None` for any other. A frame
+    /// against another map says nothing about the robot's pose and must not reset its fusion.
+    /// Neither must a frame that was in work when another epoch began.
     fn robot_state(&self, robot: &Name, map: &str, epoch: u64) -> Option<Arc<Mutex<RobotState>>> {
         let stands_on = self.snapshots.robot_map(robot.as_str())?;
         if stands_on != map || self.epochs.current(robot).is_some_and(|current| current != epoch) {

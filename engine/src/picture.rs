@@ -1,5 +1,5 @@
-//! Uploaded pictures. In: bytes of a file. Out: a picture, upright by the orientation that the file states. Also grey
-//! images to PNG, for pages. [`super::decode`] decodes and holds the limits.
+//! Uploaded pictures. In: bytes of a file. Out: a picture, upright by the orientation that the file
+//! states. Also grey images to PNG, for pages. [`super::decode`] decodes and holds the limits.
 
 use crate::frame::decode::{self, ImageLimits};
 use image::{

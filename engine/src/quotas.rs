@@ -1,6 +1,7 @@
-//! What one robot may send: messages of each kind a second, and bytes a second over all of them. In: robot, kind, size and
-//! time of receipt. Out: nothing, or a refusal that names the limit and how long to wait. Token buckets: a robot may send
-//! what it saved within [`BURST`]. Time is passed in.
+//! What one robot may send: messages of each kind a second, and bytes a second over all of them.
+//! In: robot, kind, size and time of receipt. Out: nothing, or a refusal that names the limit and
+//! how long to wait. Token buckets: a robot may send what it saved within [`BURST`]. Time is passed
+//! in.
 
 use crate::limits::MAX_ROBOTS;
 use protos::{Code, Name, Rejection};
@@ -61,8 +62,8 @@ impl Bucket {
         Self { level: rate_per_s * BURST.as_secs_f64(), filled: now }
     }
 
-    /// Fills it up to now, and says how long to wait until `amount` can be taken. More than the whole bucket can be taken
-    /// from a full one: the debt is waited for afterwards.
+    /// Fills it up to now, and says how long to wait until `amount` can be taken. More than the
+    /// whole bucket can be taken from a full one: the debt is waited for afterwards.
     pub fn wait(&mut self, amount: f64, rate_per_s: f64, now: Instant) -> Result<(), Duration> {
         let whole = rate_per_s * BURST.as_secs_f64();
         let passed = now.saturating_duration_since(self.filled);
@@ -99,7 +100,8 @@ impl Quotas {
         Self { rates: Some(rates), robots: Mutex::default() }
     }
 
-    /// Counts a message of a registered robot, or refuses it with [`Code::RateLimited`]; a refused one costs nothing.
+    /// Counts a message of a registered robot, or refuses it with [`Code::RateLimited`]; a refused
+    /// one costs nothing.
     pub fn take(&self, robot: &Name, kind: Kind, bytes: usize, now: Instant) -> Result<(), Rejection> {
         let Some(rates) = self.rates else { return Ok(()) };
         let of_kind = [rates.frames_per_s, rates.odometry_per_s, rates.scans_per_s].map(f64::from);
@@ -191,8 +193,8 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever a robot sends: in no window more is admitted than a full bucket and the rate, and who waits as long as
-        /// told is admitted.
+        /// Whatever a robot sends: in no window more is admitted than a full bucket and the rate,
+        /// and who waits as long as told is admitted.
         #[test]
         fn no_window_has_more_than_burst_and_rate(gaps_ms in prop::collection::vec(0_u64..300, 1..200)) {
             let (quotas, start, robot) = (Quotas::new(RATES), Instant::now(), name("r1"));

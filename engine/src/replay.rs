@@ -1,8 +1,9 @@
-//! A kept frame against two versions of a map: what a robot would be told otherwise. In: the frame and both versions. Out: the
-//! landmarks that are named by one of them alone, and how its pose differs.
+//! A kept frame against two versions of a map: what a robot would be told otherwise. In: the frame
+//! and both versions. Out: the landmarks that are named by one of them alone, and how its pose
+//! differs.
 //!
-//! Each version sees the frame as that of a robot whose pose is not known to the server: what motion and earlier frames added
-//! to an answer belongs to its time.
+//! Each version sees the frame as that of a robot whose pose is not known to the server: what
+//! motion and earlier frames added to an answer belongs to its time.
 
 use crate::{
     frame::{

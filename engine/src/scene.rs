@@ -45,7 +45,8 @@ impl Scene {
         Self { building, robot }
     }
 
-    /// The robot's readings at stops in front of the first two posters, with the poster's name; another seed gives other stops.
+    /// The robot's readings at stops in front of the first two posters, with the poster's name;
+    /// another seed gives other stops.
     pub fn stops(&mut self, seed: u64, views: usize) -> Vec<(String, SensorReadings)> {
         let near = LessonParams {
             seed,
@@ -69,7 +70,8 @@ impl Scene {
         *self.robot.camera().intrinsics()
     }
 
-    /// The first two posters, each learnt from warped views of one photograph, at their true places.
+    /// The first two posters, each learnt from warped views of one photograph, at their true
+    /// places.
     pub fn taught(&mut self) -> Arc<MapSnapshot> {
         let params = Arc::new(Params::default());
         let mut models = Vec::new();

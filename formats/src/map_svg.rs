@@ -1,5 +1,5 @@
-//! Drawing of a laser map, as SVG: scan points, walls, path, odometry alone, loop closures, and the truth if the
-//! log has it.
+//! Drawing of a laser map, as SVG: scan points, walls, path, odometry alone, loop closures, and the
+//! truth if the log has it.
 
 use crate::{
     scan_log::LogEntry,

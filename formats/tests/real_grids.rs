@@ -1,5 +1,6 @@
-//! Claim: walls explain at least nine tenths of the wall cells of every real and simulated grid map of the data sets,
-//! and lie where the grid has walls. Skipped, with the reason, where the maps are not.
+//! Claim: walls explain at least nine tenths of the wall cells of every real and simulated grid map
+//! of the data sets, and lie where the grid has walls. Skipped, with the reason, where the maps are
+//! not.
 
 use formats::walls::{self, ImportOptions, MIN_EXPLAINED};
 use std::{io::Write as _, path::PathBuf};

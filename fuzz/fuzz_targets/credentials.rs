@@ -1,5 +1,5 @@
-//! Any text as what says who asks: header `Authorization`, cookie, token, idempotency key. Each part lies in the text, and
-//! what is read keeps its bounds.
+//! Any text as what says who asks: header `Authorization`, cookie, token, idempotency key. Each
+//! part lies in the text, and what is read keeps its bounds.
 
 #![no_main]
 

@@ -1,7 +1,8 @@
-//! Any bytes as an image and parameters: `detect` must not panic, hang or grow, and what it returns must be sound.
+//! Any bytes as an image and parameters: `detect` must not panic, hang or grow, and what it returns
+//! must be sound.
 //!
-//! Seven bytes of header, then grey levels, repeated until the image is full. An enlarging factor lets a short input draw
-//! sides long enough to become segments.
+//! Seven bytes of header, then grey levels, repeated until the image is full. An enlarging factor
+//! lets a short input draw sides long enough to become segments.
 
 #![no_main]
 

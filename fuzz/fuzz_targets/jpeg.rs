@@ -1,6 +1,6 @@
-//! Any bytes as a JPEG image, of a frame and uploaded: decoding must not panic or grow, and an image that is accepted has
-//! the size of its header. The limit of pixels is lower than that of frames, for more executions; bombs against the real
-//! one are tests of `engine`.
+//! Any bytes as a JPEG image, of a frame and uploaded: decoding must not panic or grow, and an
+//! image that is accepted has the size of its header. The limit of pixels is lower than that of
+//! frames, for more executions; bombs against the real one are tests of `engine`.
 
 #![no_main]
 

@@ -1,5 +1,5 @@
-//! Any bytes as the JSON body of a request, with the checks that its numbers go through: what is accepted is finite and
-//! reads back as itself; what is refused names its field.
+//! Any bytes as the JSON body of a request, with the checks that its numbers go through: what is
+//! accepted is finite and reads back as itself; what is refused names its field.
 //!
 //! The first byte chooses the body.
 

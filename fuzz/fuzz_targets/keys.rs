@@ -1,5 +1,6 @@
-//! Any text as a key expression: it is parsed to the key that gives the same text, or refused. The fleet is the text's
-//! first line where that is a name. Each key comes back from its form on the wire.
+//! Any text as a key expression: it is parsed to the key that gives the same text, or refused. The
+//! fleet is the text's first line where that is a name. Each key comes back from its form on the
+//! wire.
 
 #![no_main]
 

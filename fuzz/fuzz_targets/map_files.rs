@@ -1,8 +1,8 @@
-//! Any bytes as a map or a scan log of another program: reading must not panic, hang or grow, and walls that are read are
-//! finite and within the bound.
+//! Any bytes as a map or a scan log of another program: reading must not panic, hang or grow, and
+//! walls that are read are finite and within the bound.
 //!
-//! The first byte chooses the kind of file. A grid's picture is given by the bytes after the first zero byte, or is a small
-//! one. Files lie in memory where there is `/dev/shm`.
+//! The first byte chooses the kind of file. A grid's picture is given by the bytes after the first
+//! zero byte, or is a small one. Files lie in memory where there is `/dev/shm`.
 
 #![no_main]
 

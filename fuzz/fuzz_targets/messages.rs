@@ -1,5 +1,6 @@
-//! Any bytes as a message of a robot, and any fields of one: what passes the checks is finite, within its bounds and
-//! readable again; what does not is refused with a code and a field of the message.
+//! Any bytes as a message of a robot, and any fields of one: what passes the checks is finite,
+//! within its bounds and readable again; what does not is refused with a code and a field of the
+//! message.
 //!
 //! The first byte chooses the message.
 
@@ -36,7 +37,8 @@ fuzz_target!(|data: &[u8]| {
     }
 });
 
-/// The checked message of these bytes, where they are one. A message comes back from its own bytes, and is judged as before.
+/// The checked message of these bytes, where they are one. A message comes back from its own bytes,
+/// and is judged as before.
 fn checked<M, C>(bytes: &[u8]) -> Option<Result<C, Rejection>>
 where
     M: Message + Default + Clone,

@@ -1,5 +1,5 @@
-//! Any bytes as a PNG image: decoding must not panic or grow. The signature is put in front and checksums of chunks are
-//! corrected, so that inputs reach what lies behind them.
+//! Any bytes as a PNG image: decoding must not panic or grow. The signature is put in front and
+//! checksums of chunks are corrected, so that inputs reach what lies behind them.
 
 #![no_main]
 

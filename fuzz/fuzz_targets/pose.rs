@@ -1,5 +1,5 @@
-//! Any numbers as corners, covariances, size and camera: no panic, and a pose is finite, in front of the camera, with a
-//! covariance that is symmetric and has no negative variance.
+//! Any numbers as corners, covariances, size and camera: no panic, and a pose is finite, in front
+//! of the camera, with a covariance that is symmetric and has no negative variance.
 
 #![no_main]
 

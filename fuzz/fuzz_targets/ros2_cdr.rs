@@ -1,5 +1,5 @@
-//! Any bytes as messages, keys, tokens and attachments of ROS 2: reading must not panic or grow, a fault lies inside of
-//! the payload, and what is read is written to bytes that mean the same.
+//! Any bytes as messages, keys, tokens and attachments of ROS 2: reading must not panic or grow, a
+//! fault lies inside of the payload, and what is read is written to bytes that mean the same.
 //!
 //! The first byte chooses the type of the message, the rest is its payload.
 

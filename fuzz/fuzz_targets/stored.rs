@@ -1,6 +1,7 @@
-//! Any bytes as a stored model and as a stored visibility area: no panic, and a model that is read is written to the same
-//! bytes. The digest at a model's end is corrected, so that inputs reach what lies behind it. Bundles are tested with the
-//! server (`any_bytes_as_a_bundle_are_refused_or_read`), which alone can read them.
+//! Any bytes as a stored model and as a stored visibility area: no panic, and a model that is read
+//! is written to the same bytes. The digest at a model's end is corrected, so that inputs reach
+//! what lies behind it. Bundles are tested with the server
+//! (`any_bytes_as_a_bundle_are_refused_or_read`), which alone can read them.
 
 #![no_main]
 

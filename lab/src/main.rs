@@ -15,7 +15,8 @@ use std::process::ExitCode;
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
-/// Experiments on labelled pictures and in simulated buildings, benchmarks beside peers, and training.
+/// Experiments on labelled pictures and in simulated buildings, benchmarks beside peers, and
+/// training.
 #[derive(Debug, Parser)]
 #[command(name = "waymark-lab", version, propagate_version = true)]
 struct Cli {
@@ -33,16 +34,18 @@ enum Command {
     Evaluate(evaluate::Command),
     /// Time of each stage of the pipeline on this machine.
     ///
-    /// Without a subcommand: a whole frame, recognition and poses included, on rendered frames of a corridor.
-    /// `waymark-lab bench detect`: from frame to quads beside OpenCV on the same pictures.
+    /// Without a subcommand: a whole frame, recognition and poses included, on rendered frames of a
+    /// corridor. `waymark-lab bench detect`: from frame to quads beside OpenCV on the same
+    /// pictures.
     Bench(bench::Args),
     /// Fit parameters of detector and confidence to labelled or rendered pictures.
     #[command(subcommand)]
     Train(train::Command),
     /// A picture of a stage of recognition, drawn from what the program itself works out there.
     ///
-    /// Without an option: the picture of its page in docs/method, the same bytes on every machine. The stages of the
-    /// detector are drawn by `waymark detect --draw`. For example, with a picture of your own on the wall:
+    /// Without an option: the picture of its page in docs/method, the same bytes on every machine.
+    /// The stages of the detector are drawn by `waymark detect --draw`. For example, with a picture
+    /// of your own on the wall:
     ///   waymark-lab plot icon --image painting.jpg --out icon.png
     #[command(verbatim_doc_comment)]
     Plot(plot::Args),

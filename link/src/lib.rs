@@ -1,8 +1,10 @@
-//! The encrypted end of a program that connects to a zenoh router. In: where the router listens, and certificates. Out: a
-//! socket of this process that zenoh connects to; what goes through it travels encrypted.
+//! The encrypted end of a program that connects to a zenoh router. In: where the router listens,
+//! and certificates. Out: a socket of this process that zenoh connects to; what goes through it
+//! travels encrypted.
 //!
-//! zenoh's own links of TLS read and write one stream from two threads at once, which can end the process under load
-//! (eclipse-zenoh/zenoh#2557). Here each connection is relayed by one task, through tokio-rustls.
+//! zenoh's own links of TLS read and write one stream from two threads at once, which can end the
+//! process under load (eclipse-zenoh/zenoh#2557). Here each connection is relayed by one task,
+//! through tokio-rustls.
 #![cfg(unix)]
 
 use rustls::{
@@ -51,8 +53,8 @@ impl std::fmt::Debug for Credentials {
     }
 }
 
-/// A socket of this process whose connections lead to a router. Dropped, it takes no further ones; those that are open end with
-/// zenoh's ends of them.
+/// A socket of this process whose connections lead to a router. Dropped, it takes no further ones;
+/// those that are open end with zenoh's ends of them.
 #[derive(Debug)]
 pub struct EncryptedLink {
     folder: TempDir,
@@ -73,8 +75,9 @@ struct Remote {
 }
 
 impl EncryptedLink {
-    /// Listens for zenoh, and connects to `address` (`host:port`) for each of its connections. Needs a runtime of tokio.
-    /// Errors: a name or PEM text that cannot be used, no folder for the socket.
+    /// Listens for zenoh, and connects to `address` (`host:port`) for each of its connections.
+    /// Needs a runtime of tokio. Errors: a name or PEM text that cannot be used, no folder for the
+    /// socket.
     pub fn open(address: &str, credentials: &Credentials) -> io::Result<Self> {
         let host = address.rsplit_once(':').map_or(address, |(host, _)| host);
         let host = host.trim_start_matches('[').trim_end_matches(']').to_owned();
@@ -95,8 +98,8 @@ impl EncryptedLink {
         format!("unixsock-stream/{}", self.folder.path().join(SOCKET).display())
     }
 
-    /// How the last connection that ended did: a router that does not believe the certificate says so in the error; one that
-    /// knows it and does not admit its holder closes in order.
+    /// How the last connection that ended did: a router that does not believe the certificate says
+    /// so in the error; one that knows it and does not admit its holder closes in order.
     pub fn last_end(&self) -> Option<Ended> {
         self.last_end.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }

@@ -1,5 +1,5 @@
-//! Checks of numbers that come from outside: finite, within a named range, covariances symmetric and positive
-//! semidefinite. An error names the field.
+//! Checks of numbers that come from outside: finite, within a named range, covariances symmetric
+//! and positive semidefinite. An error names the field.
 
 use nalgebra::SMatrix;
 

@@ -1,5 +1,5 @@
-//! Camera extrinsics: the camera's pose on the robot at the time of the image, pan and tilt included, with covariance
-//! (method 0.2, 13.5).
+//! Camera extrinsics: the camera's pose on the robot at the time of the image, pan and tilt
+//! included, with covariance (method 0.2, 13.5).
 
 use crate::check::{self, OutOfRange};
 use nalgebra::{Isometry3, Matrix3, Matrix6, Rotation3, Translation3, UnitQuaternion, Vector3, Vector6};
@@ -8,11 +8,12 @@ use std::f64::consts::PI;
 /// Largest accepted distance of a camera from the robot's origin, metres.
 pub const MAX_MOUNTING_M: f64 = 10.0;
 
-/// `robot_from_camera` with the covariance of its left perturbation (rotation vector, radians; translation, metres;
-/// robot frame).
+/// `robot_from_camera` with the covariance of its left perturbation (rotation vector, radians;
+/// translation, metres; robot frame).
 #[derive(Debug, Clone, PartialEq)]
 pub struct CameraExtrinsics {
-    /// Maps camera coordinates (x right, y down, z forward) to robot coordinates (x forward, y left, z up).
+    /// Maps camera coordinates (x right, y down, z forward) to robot coordinates (x forward, y
+    /// left, z up).
     pub robot_from_camera: Isometry3<f64>,
     /// Covariance over (rotation, translation): rad^2, rad m, m^2.
     pub covariance: Matrix6<f64>,

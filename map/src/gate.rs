@@ -14,8 +14,8 @@ pub(crate) const Z_999: f64 = 3.090_232;
 #[cfg(test)]
 pub(crate) const Z_99: f64 = 2.326_348;
 
-/// The quantile of chi2 with `dof` degrees of freedom whose standard normal quantile is `z` (Wilson-Hilferty; within
-/// 1 % for `dof` >= 3 and z in 1 to 3.1).
+/// The quantile of chi2 with `dof` degrees of freedom whose standard normal quantile is `z`
+/// (Wilson-Hilferty; within 1 % for `dof` >= 3 and z in 1 to 3.1).
 pub(crate) fn chi2_quantile(dof: usize, z: f64) -> f64 {
     let k = dof.max(1) as f64;
     let v = 2.0 / (9.0 * k);

@@ -1,9 +1,10 @@
-//! Gaze control: the landmark that is the most useful target from an uncertain pose, with the pan and tilt that
-//! centre it (method 14).
+//! Gaze control: the landmark that is the most useful target from an uncertain pose, with the pan
+//! and tilt that centre it (method 14).
 //!
-//! In: the robot's pose, candidates with their visibility areas, the pan-tilt unit. Out: the targets within the
-//! unit's range with their utility, best first, or the action to point ahead or sweep. [`GazeController`] keeps its
-//! target until another one is clearly better or observations fail.
+//! In: the robot's pose, candidates with their visibility areas, the pan-tilt unit. Out: the
+//! targets within the unit's range with their utility, best first, or the action to point ahead or
+//! sweep. [`GazeController`] keeps its target until another one is clearly better or observations
+//! fail.
 
 mod information;
 
@@ -40,7 +41,8 @@ pub struct GazeParams {
     pub criterion: Criterion,
     /// Candidates with a lower visibility probability are left out, 0 to 1.
     pub min_probability: f64,
-    /// Distance to the boundary of the visibility area beyond which the utility no longer rises, metres.
+    /// Distance to the boundary of the visibility area beyond which the utility no longer rises,
+    /// metres.
     pub full_margin_m: f64,
     /// Another target must exceed the present one's utility by this factor.
     pub switch_ratio: f64,
@@ -156,7 +158,8 @@ pub enum GazeAction {
     Sweep,
 }
 
-/// Candidates that are probably visible and within the range of the unit, by falling utility, then by number.
+/// Candidates that are probably visible and within the range of the unit, by falling utility, then
+/// by number.
 pub fn rank(
     pose: &Pose2Covariance,
     targets: &[GazeCandidate<'_>],

@@ -1,15 +1,18 @@
-//! Guided recognition, the metric side: predicts landmarks in an image from a known pose, assigns observations to
-//! them, and decides when the whole map must be searched as well.
+//! Guided recognition, the metric side: predicts landmarks in an image from a known pose, assigns
+//! observations to them, and decides when the whole map must be searched as well.
 //!
 //! Three stages, one file each:
 //!
-//! 1. [`expect()`]: prior pose, camera and landmarks -> [`Expectations`]: predicted corners with their covariance, what of
-//!    each landmark is in view, and a search gate for every corner.
-//! 2. [`associate()`]: expectations and observations -> [`Assignment`]: joint compatibility under one common error of pose,
-//!    extrinsics and intrinsics. Unique, ambiguous, or none, for each observation.
-//! 3. [`Schedule`]: frame reports -> when to search globally, how far the pose is trusted, when a pose is replaced.
+//! 1. [`expect()`]: prior pose, camera and landmarks -> [`Expectations`]: predicted corners with
+//!    their covariance, what of each landmark is in view, and a search gate for every corner.
+//! 2. [`associate()`]: expectations and observations -> [`Assignment`]: joint compatibility under
+//!    one common error of pose, extrinsics and intrinsics. Unique, ambiguous, or none, for each
+//!    observation.
+//! 3. [`Schedule`]: frame reports -> when to search globally, how far the pose is trusted, when a
+//!    pose is replaced.
 //!
-//! A guided observation corrects a pose. It never starts, supports or replaces one: see [`crate::fuse::FixRole`].
+//! A guided observation corrects a pose. It never starts, supports or replaces one: see
+//! [`crate::fuse::FixRole`].
 
 mod associate;
 mod error;

@@ -14,8 +14,8 @@ pub const MAX_RANGE_M: f64 = 1000.0;
 /// Widest fan of the rays that are used, radians: a turn, and what a step in 32 bits adds to it.
 const FULL_TURN_RAD: f64 = TAU + 1e-6;
 /// Widest accepted fan, radians. Lasers that turn give the first ray again after a turn (LDS-01 in
-/// Gazebo: 5 µrad over a turn), or as many rays as fit at a nominal step, a few per cent over a turn. Bearings in degrees
-/// are far over it.
+/// Gazebo: 5 µrad over a turn), or as many rays as fit at a nominal step, a few per cent over a
+/// turn. Bearings in degrees are far over it.
 pub const MAX_FAN_RAD: f64 = 1.05 * TAU;
 
 /// Why a scan cannot be used.
@@ -29,7 +29,8 @@ pub enum ScanError {
     Beams(usize),
 }
 
-/// One scan: beam i has bearing `first_bearing_rad + i * bearing_step_rad`, counter-clockwise from the laser's x.
+/// One scan: beam i has bearing `first_bearing_rad + i * bearing_step_rad`, counter-clockwise from
+/// the laser's x.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scan {
     robot_from_laser: Pose2,
@@ -40,9 +41,10 @@ pub struct Scan {
 }
 
 impl Scan {
-    /// Checks everything but single ranges: those that are NaN, infinite, not positive or at least `max_range_m` are
-    /// beams without a return. `bearing_step_rad` may be negative, not zero. The fan (`fan_rad`, step times beams less
-    /// one) is at most [`MAX_FAN_RAD`]; beams that are more than a turn after the first are left out.
+    /// Checks everything but single ranges: those that are NaN, infinite, not positive or at least
+    /// `max_range_m` are beams without a return. `bearing_step_rad` may be negative, not zero. The
+    /// fan (`fan_rad`, step times beams less one) is at most [`MAX_FAN_RAD`]; beams that are more
+    /// than a turn after the first are left out.
     pub fn new(
         robot_from_laser: Pose2,
         first_bearing_rad: f64,

@@ -1,6 +1,7 @@
-//! Localisation in a finished map of walls by one scan (method 17.4, 17.5, the map frozen). In: walls, a scan, a
-//! prior pose. Out: the pose with its covariance, large where the walls do not determine it (along a bare corridor),
-//! or a refusal. The prior only starts and gates the search; it is not part of the result, so both can be fused.
+//! Localisation in a finished map of walls by one scan (method 17.4, 17.5, the map frozen). In:
+//! walls, a scan, a prior pose. Out: the pose with its covariance, large where the walls do not
+//! determine it (along a bare corridor), or a refusal. The prior only starts and gates the search;
+//! it is not part of the result, so both can be fused.
 
 mod params;
 mod index;

@@ -1,7 +1,8 @@
-//! The metric side: laser segments, landmark placement, localisation and fusion (method 11, 13.6, 15, 17).
+//! The metric side: laser segments, landmark placement, localisation and fusion (method 11, 13.6,
+//! 15, 17).
 //!
-//! Pure: no async runtime, file, socket, clock or thread (`map/clippy.toml` enforces it). Map frame: x, y on the
-//! floor, z up, metres, radians. Modules are in reading order.
+//! Pure: no async runtime, file, socket, clock or thread (`map/clippy.toml` enforces it). Map
+//! frame: x, y on the floor, z up, metres, radians. Modules are in reading order.
 
 pub mod check;
 pub mod gate;

@@ -1,7 +1,8 @@
 //! Line extraction from a laser scan: break at jumps, split, merge, fit (method 17.1 to 17.3).
 //!
-//! In: a checked scan. Out: segments in the robot frame, each with the covariance of its line, free side on the left.
-//! Beams without a return break a run. Pieces that are not straight or too short are left out.
+//! In: a checked scan. Out: segments in the robot frame, each with the covariance of its line, free
+//! side on the left. Beams without a return break a run. Pieces that are not straight or too short
+//! are left out.
 
 use crate::{laser::Scan, pose2::Pose2Covariance, segments::LaserSegment};
 use nalgebra::{Matrix2, Matrix3, Point2, Vector2};
@@ -18,11 +19,13 @@ pub struct LineParams {
     pub range_sigma_m: f64,
     /// A jump in range of at least this breaks the run, metres.
     pub jump_m: f64,
-    /// Added to the jump, as a multiple of `range * bearing step`: a wall at a grazing angle is one run.
+    /// Added to the jump, as a multiple of `range * bearing step`: a wall at a grazing angle is one
+    /// run.
     pub jump_steps: f64,
     /// A point farther than this from the chord splits the run, metres.
     pub split_m: f64,
-    /// Neighbours whose lines differ by less than this chi2 are merged (2 degrees of freedom, 99 %).
+    /// Neighbours whose lines differ by less than this chi2 are merged (2 degrees of freedom, 99
+    /// %).
     pub merge_chi2: f64,
     /// Fewest points of a segment.
     pub min_points: usize,
@@ -44,7 +47,8 @@ impl Default for LineParams {
     }
 }
 
-/// Straight pieces of wall in the robot frame, in order of bearing; the longest [`MAX_SEGMENTS_PER_SCAN`] at most.
+/// Straight pieces of wall in the robot frame, in order of bearing; the longest
+/// [`MAX_SEGMENTS_PER_SCAN`] at most.
 pub fn segments(scan: &Scan, p: &LineParams) -> Vec<LaserSegment> {
     let mut found = Vec::new();
     for run in runs(scan, p) {
@@ -83,8 +87,8 @@ fn runs(scan: &Scan, p: &LineParams) -> Vec<Vec<Point2<f64>>> {
     runs
 }
 
-/// Inclusive index ranges of pieces whose points lie within `tolerance_m` of their chord. Neighbours share no point:
-/// the corner itself belongs to the earlier piece.
+/// Inclusive index ranges of pieces whose points lie within `tolerance_m` of their chord.
+/// Neighbours share no point: the corner itself belongs to the earlier piece.
 fn split(run: &[Point2<f64>], tolerance_m: f64) -> Vec<(usize, usize)> {
     let mut pieces = Vec::new();
     // An explicit stack: a scan decides how deep this goes.
@@ -130,7 +134,8 @@ fn is_one_line(a: &[Point2<f64>], b: &[Point2<f64>], joint: &[Point2<f64>], p: &
     else {
         return false;
     };
-    // In line coordinates of the joint fit, both lines are (angle, offset) with zero expectation of the difference.
+    // In line coordinates of the joint fit, both lines are (angle, offset) with zero expectation of
+    // the difference.
     let d = Vector2::new(half_turn(fa.alpha_rad - fb.alpha_rad), fa.offset(&fj) - fb.offset(&fj));
     let s = fa.local_covariance(&fj) + fb.local_covariance(&fj);
     let agree = s.cholesky().is_some_and(|c| d.dot(&c.solve(&d)) <= p.merge_chi2);
@@ -181,7 +186,8 @@ impl LineFit {
     }
 }
 
-/// Total least squares with the closed covariance of method 17.3; `None` for fewer than two distinct points.
+/// Total least squares with the closed covariance of method 17.3; `None` for fewer than two
+/// distinct points.
 pub(crate) fn fit(points: &[Point2<f64>], sigma_m: f64) -> Option<LineFit> {
     let n = points.len() as f64;
     let centre = Point2::from(points.iter().fold(Vector2::zeros(), |sum, p| sum + p.coords) / n);

@@ -1,9 +1,10 @@
-//! Localisation by landmarks: from landmarks of known place, observed by a camera of known extrinsics, to the robot's
-//! pose on the floor (method 13.6).
+//! Localisation by landmarks: from landmarks of known place, observed by a camera of known
+//! extrinsics, to the robot's pose on the floor (method 13.6).
 //!
-//! In: observations, extrinsics, an optional prior pose. Out: one pose with its covariance, several that cannot be
-//! told apart, or a refusal. The robot stands upright on the floor, so (x, y, theta) is fitted to all corners of all
-//! landmarks at once (method 13.6, variant b). A solution is chosen only if image, wall and prior decide.
+//! In: observations, extrinsics, an optional prior pose. Out: one pose with its covariance, several
+//! that cannot be told apart, or a refusal. The robot stands upright on the floor, so (x, y, theta)
+//! is fitted to all corners of all landmarks at once (method 13.6, variant b). A solution is chosen
+//! only if image, wall and prior decide.
 
 mod params;
 mod fix;

@@ -1,8 +1,9 @@
-//! Links between maps. Each map may name a parent map and its pose in it, so that a pose on one floor can be
-//! expressed in the frame of another.
+//! Links between maps. Each map may name a parent map and its pose in it, so that a pose on one
+//! floor can be expressed in the frame of another.
 //!
-//! In: one link for each map. Out: the transform between two maps with covariance, or why there is none. The path
-//! goes up to the nearest common ancestor and down again. Links above it are left out: they move both maps equally.
+//! In: one link for each map. Out: the transform between two maps with covariance, or why there is
+//! none. The path goes up to the nearest common ancestor and down again. Links above it are left
+//! out: they move both maps equally.
 
 use crate::{
     check::{self, OutOfRange},
@@ -127,7 +128,8 @@ mod tests {
         MapLink { parent, parent_from_map: Pose2Covariance { pose, covariance }, level_m }
     }
 
-    /// A site (0) with a house (1) of two floors (2, 3) and another house (4); a map (9) of its own.
+    /// A site (0) with a house (1) of two floors (2, 3) and another house (4); a map (9) of its
+    /// own.
     fn links() -> MapLinks<u32> {
         [
             (1, link(0, [100.0, 50.0, 0.6], 0.5, 0.0)),

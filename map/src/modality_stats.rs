@@ -1,8 +1,10 @@
-//! Statistics of modalities (method 15): which modality to trust in which part of a map, learnt from reference runs.
+//! Statistics of modalities (method 15): which modality to trust in which part of a map, learnt
+//! from reference runs.
 //!
-//! In: statistics of runs by pose cell, named areas, the fusion mode. Out: advice for a pose: the best modality, the
-//! modalities used, and the error model of each. A cell with too few measurements takes the statistics of its
-//! neighbours, then of its named area, then of the whole map.
+//! In: statistics of runs by pose cell, named areas, the fusion mode. Out: advice for a pose: the
+//! best modality, the modalities used, and the error model of each. A cell with too few
+//! measurements takes the statistics of its neighbours, then of its named area, then of the whole
+//! map.
 
 mod modality;
 mod named_area;

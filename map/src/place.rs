@@ -1,5 +1,5 @@
-//! The place of a landmark: a rectangle on a wall or under a ceiling, with the covariance of its pose and size
-//! (method 11).
+//! The place of a landmark: a rectangle on a wall or under a ceiling, with the covariance of its
+//! pose and size (method 11).
 
 use crate::check::{self, MAX_COORDINATE_M, OutOfRange};
 use nalgebra::{Isometry3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3, Vector6};
@@ -20,11 +20,13 @@ pub struct LandmarkPlace {
     pub y_m: f64,
     /// Height of the centre above the floor, metres.
     pub z_m: f64,
-    /// Direction of the outward normal on the floor, radians; under a ceiling, the direction of the landmark's top.
+    /// Direction of the outward normal on the floor, radians; under a ceiling, the direction of the
+    /// landmark's top.
     pub theta_rad: f64,
     /// Rotation about the outward normal, radians; 0 when the sides are vertical.
     pub roll_rad: f64,
-    /// Rotation of the outward normal from level downwards, radians: 0 on a wall, pi/2 under a ceiling.
+    /// Rotation of the outward normal from level downwards, radians: 0 on a wall, pi/2 under a
+    /// ceiling.
     pub tilt_rad: f64,
     /// Width and height, metres.
     pub size: LandmarkSize,
@@ -83,7 +85,8 @@ impl LandmarkPlace {
         check::covariance("covariance", &self.covariance)
     }
 
-    /// Angle between the outward normal and the direction from the landmark's centre to a camera, radians.
+    /// Angle between the outward normal and the direction from the landmark's centre to a camera,
+    /// radians.
     pub fn incidence_rad(&self, camera_m: &Point3<f64>) -> f64 {
         let from_landmark = self.map_from_landmark().inverse() * camera_m;
         from_landmark.coords.yz().norm().atan2(from_landmark.x)
@@ -106,7 +109,8 @@ mod tests {
 
     #[test]
     fn the_viewers_right_is_y() {
-        // On the north wall (normal to the south) a viewer who looks north has east, map +x, on the right.
+        // On the north wall (normal to the south) a viewer who looks north has east, map +x, on the
+        // right.
         let south = -std::f64::consts::FRAC_PI_2;
         let place =
             LandmarkPlace::by_hand(Vector3::new(2.0, 5.0, 1.5), south, SIZE, PlaceSigmas::default()).unwrap();
@@ -128,7 +132,8 @@ mod tests {
 
     #[test]
     fn a_ceiling_landmark_has_its_right_viewed_from_below() {
-        // The top points north; a viewer below who looks up with the feet to the south has east on the left.
+        // The top points north; a viewer below who looks up with the feet to the south has east on
+        // the left.
         let mut place =
             LandmarkPlace::by_hand(Vector3::new(0.0, 0.0, 2.5), FRAC_PI_2, SIZE, PlaceSigmas::default())
                 .unwrap();

@@ -1,8 +1,8 @@
-//! Placement: a landmark's place from posed views of it. Corner rays are intersected with a wall and an upright
-//! rectangle is fitted (method 11).
+//! Placement: a landmark's place from posed views of it. Corner rays are intersected with a wall
+//! and an upright rectangle is fitted (method 11).
 //!
-//! In: corners with covariance, the robot's pose at capture, extrinsics, walls. Out: place and size with covariance,
-//! or why the object does not hang on a wall. All views must be of one object.
+//! In: corners with covariance, the robot's pose at capture, extrinsics, walls. Out: place and size
+//! with covariance, or why the object does not hang on a wall. All views must be of one object.
 
 mod params;
 mod view;

@@ -1,4 +1,5 @@
-//! Poses on the floor, alone and with covariance: composition, inverse, propagation of the covariance.
+//! Poses on the floor, alone and with covariance: composition, inverse, propagation of the
+//! covariance.
 
 use crate::check::{self, MAX_COORDINATE_M, OutOfRange};
 use nalgebra::{Isometry3, Matrix3, Point2, Translation3, UnitQuaternion, Vector2, Vector3};
@@ -11,7 +12,8 @@ pub fn wrap_rad(angle_rad: f64) -> f64 {
     if a > PI { a - TAU } else { a }
 }
 
-/// Pose on the floor: `a_from_b` as position of b's origin in a (metres) and heading of b's x axis (radians).
+/// Pose on the floor: `a_from_b` as position of b's origin in a (metres) and heading of b's x axis
+/// (radians).
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Pose2 {
@@ -96,7 +98,8 @@ impl Pose2 {
     }
 }
 
-/// A pose and the covariance of its (x, y, theta), in the frame a of `a_from_b` (m^2, m rad, rad^2).
+/// A pose and the covariance of its (x, y, theta), in the frame a of `a_from_b` (m^2, m rad,
+/// rad^2).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pose2Covariance {
     /// Mean pose.
@@ -139,7 +142,8 @@ impl Pose2Covariance {
         Self { pose: inverse, covariance: j * self.covariance * j.transpose() }
     }
 
-    /// Squared Mahalanobis distance of `other` under the sum of both covariances; `None` when that is singular.
+    /// Squared Mahalanobis distance of `other` under the sum of both covariances; `None` when that
+    /// is singular.
     pub fn distance2(&self, other: &Self) -> Option<f64> {
         let d = self.pose.minus(&other.pose);
         let s = (self.covariance + other.covariance).cholesky()?;

@@ -1,5 +1,5 @@
-//! A laser segment: a piece of wall as the laser measures it, with the covariance of its supporting line and its two
-//! ends.
+//! A laser segment: a piece of wall as the laser measures it, with the covariance of its supporting
+//! line and its two ends.
 
 use crate::{
     check::{self, MAX_COORDINATE_M, OutOfRange},
@@ -13,8 +13,9 @@ pub const MIN_SEGMENT_M: f64 = 0.01;
 /// Standard deviation of each end of a wall given by hand, across it, metres.
 const BY_HAND_SIGMA_M: f64 = 0.01;
 
-/// A straight piece of wall. `a` to `b` runs so that the free side, from which it was measured, is on the left: the
-/// two faces of a wall are two segments. The ends lie on the line `cos(alpha) x + sin(alpha) y = rho`, rho >= 0.
+/// A straight piece of wall. `a` to `b` runs so that the free side, from which it was measured, is
+/// on the left: the two faces of a wall are two segments. The ends lie on the line
+/// `cos(alpha) x + sin(alpha) y = rho`, rho >= 0.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LaserSegment {
     /// First end, metres, map or robot frame.
@@ -32,8 +33,8 @@ pub struct LaserSegment {
 }
 
 impl LaserSegment {
-    /// From its ends and the covariance of its line. Ends within [`MAX_COORDINATE_M`], at least [`MIN_SEGMENT_M`]
-    /// apart.
+    /// From its ends and the covariance of its line. Ends within [`MAX_COORDINATE_M`], at least
+    /// [`MIN_SEGMENT_M`] apart.
     pub fn from_ends(a: Point2<f64>, b: Point2<f64>, covariance: Matrix2<f64>) -> Result<Self, OutOfRange> {
         for (field, value) in [("a.x_m", a.x), ("a.y_m", a.y), ("b.x_m", b.x), ("b.y_m", b.y)] {
             check::within(field, value, -MAX_COORDINATE_M, MAX_COORDINATE_M)?;
@@ -48,8 +49,9 @@ impl LaserSegment {
         Ok(Self { a, b, alpha_rad: normal.y.atan2(normal.x), rho_m, covariance, hits: 1 })
     }
 
-    /// From its ends and the covariance of its direction and its offset to the free side, about its middle: rad^2,
-    /// rad m, m^2. That form does not depend on the map's origin. Bounds as those of [`Self::from_ends`].
+    /// From its ends and the covariance of its direction and its offset to the free side, about its
+    /// middle: rad^2, rad m, m^2. That form does not depend on the map's origin. Bounds as those of
+    /// [`Self::from_ends`].
     pub fn about_middle(
         a: Point2<f64>,
         b: Point2<f64>,
@@ -66,7 +68,8 @@ impl LaserSegment {
         Ok(Self { covariance, ..plain })
     }
 
-    /// Covariance of its direction and its offset to the free side, about its middle: rad^2, rad m, m^2.
+    /// Covariance of its direction and its offset to the free side, about its middle: rad^2, rad m,
+    /// m^2.
     pub fn covariance_about_middle(&self) -> Matrix2<f64> {
         let (sign, along_m) = self.line_by_middle();
         let j = Matrix2::new(1.0, 0.0, -along_m, sign);
@@ -74,8 +77,8 @@ impl LaserSegment {
         0.5 * (covariance + covariance.transpose())
     }
 
-    /// Whether rho grows to the free side (1, or -1), and how far the middle lies along the wall from the foot of the
-    /// origin, metres.
+    /// Whether rho grows to the free side (1, or -1), and how far the middle lies along the wall
+    /// from the foot of the origin, metres.
     fn line_by_middle(&self) -> (f64, f64) {
         let n = self.facing();
         let is_same = n.dot(&Vector2::new(self.alpha_rad.cos(), self.alpha_rad.sin())) >= 0.0;
@@ -83,18 +86,20 @@ impl LaserSegment {
         (if is_same { 1.0 } else { -1.0 }, Vector2::new(-n.y, n.x).dot(&middle.coords))
     }
 
-    /// From ends `[ax, ay, bx, by]` (metres) measured by hand, each known to 1 cm across the wall, independently.
+    /// From ends `[ax, ay, bx, by]` (metres) measured by hand, each known to 1 cm across the wall,
+    /// independently.
     pub fn by_hand(&[ax, ay, bx, by]: &[f64; 4]) -> Result<Self, OutOfRange> {
         let (a, b) = (Point2::new(ax, ay), Point2::new(bx, by));
         let length = (b - a).norm().max(MIN_SEGMENT_M);
         let variance = BY_HAND_SIGMA_M * BY_HAND_SIGMA_M;
-        // Offset of the middle: half the sum of those of the ends; direction: their difference by the length. The two are
-        // uncorrelated about the middle, and about no other point.
+        // Offset of the middle: half the sum of those of the ends; direction: their difference by
+        // the length. The two are uncorrelated about the middle, and about no other point.
         let covariance = Matrix2::new(2.0 * variance / (length * length), 0.0, 0.0, 0.5 * variance);
         Self::about_middle(a, b, &covariance)
     }
 
-    /// From a line and two points that are projected on it, `a` to `b` with the free side on the left.
+    /// From a line and two points that are projected on it, `a` to `b` with the free side on the
+    /// left.
     pub(crate) fn on_line(
         (alpha_rad, rho_m): (f64, f64),
         (a, b): (Point2<f64>, Point2<f64>),
@@ -103,8 +108,9 @@ impl LaserSegment {
     ) -> Self {
         let n = Vector2::new(alpha_rad.cos(), alpha_rad.sin());
         let foot = |p: Point2<f64>| p - n * (n.dot(&p.coords) - rho_m);
-        // The line's sign is a convention, not a change of side: (alpha, rho) and (alpha + pi, -rho) are one line,
-        // and so are their covariances but for the sign of the off-diagonal term's rho.
+        // The line's sign is a convention, not a change of side: (alpha, rho) and (alpha +
+        // pi, -rho) are one line, and so are their covariances but for the sign of the off-diagonal
+        // term's rho.
         let (alpha_rad, rho_m, covariance) = if rho_m < 0.0 {
             let flip = Matrix2::new(1.0, 0.0, 0.0, -1.0);
             (wrap_rad(alpha_rad + PI), -rho_m, flip * covariance * flip)
@@ -130,7 +136,8 @@ impl LaserSegment {
         Vector2::new(-d.y, d.x)
     }
 
-    /// The segment in the frame a, given `a_from_b` with its covariance and the segment in b (errors independent).
+    /// The segment in the frame a, given `a_from_b` with its covariance and the segment in b
+    /// (errors independent).
     #[must_use]
     pub fn transformed(&self, a_from_b: &Pose2Covariance) -> Self {
         let Pose2 { x_m, y_m, theta_rad } = a_from_b.pose;
@@ -170,7 +177,8 @@ mod tests {
         assert!((back.rho_m - w.rho_m).abs() < 1e-12);
     }
 
-    /// Variance of a point of the wall's line across it, by (alpha, rho) alone, m^2. `along` runs from 0 at `a` to 1 at `b`.
+    /// Variance of a point of the wall's line across it, by (alpha, rho) alone, m^2. `along` runs
+    /// from 0 at `a` to 1 at `b`.
     fn variance_across(wall: &LaserSegment, along: f64) -> f64 {
         let p = wall.a + (wall.b - wall.a) * along;
         let (s, c) = wall.alpha_rad.sin_cos();
@@ -280,7 +288,8 @@ mod tests {
 
     #[test]
     fn the_covariance_about_the_middle_is_that_of_the_wall_in_every_frame() {
-        // Oracle: a wall drawn by its covariance about the middle, and the line that goes through it.
+        // Oracle: a wall drawn by its covariance about the middle, and the line that goes through
+        // it.
         let about = Matrix2::new(4e-6, -1.2e-5, -1.2e-5, 1e-4);
         for (a, b) in [([40.0, -1.0], [43.0, 1.0]), ([43.0, 1.0], [40.0, -1.0]), ([-2.0, 0.0], [4.0, 0.0])] {
             let wall = LaserSegment::about_middle(Point2::from(a), Point2::from(b), &about).unwrap();

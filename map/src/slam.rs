@@ -1,11 +1,14 @@
-//! SLAM: the laser map from scans and odometry. Every scan is matched to those before it, loop closures join
-//! revisited places, and all keyframes are fitted together (method 17; 17.6's global optimisation).
+//! SLAM: the laser map from scans and odometry. Every scan is matched to those before it, loop
+//! closures join revisited places, and all keyframes are fitted together (method 17; 17.6's global
+//! optimisation).
 //!
-//! In: scans with odometry, in order. Out: the trajectory, the walls with covariance, the loop closures. The first
-//! pose is the origin of the map. Uncertain loop closures are refused and counted, since a false one folds the map.
+//! In: scans with odometry, in order. Out: the trajectory, the walls with covariance, the loop
+//! closures. The first pose is the origin of the map. Uncertain loop closures are refused and
+//! counted, since a false one folds the map.
 //!
-//! Departs from method 17.6, an EKF over robot and lines: it stores keyframes and scans instead of lines. A wrong
-//! association of a line can then be corrected, curved walls contribute, and the cost of loops stays bounded.
+//! Departs from method 17.6, an EKF over robot and lines: it stores keyframes and scans instead of
+//! lines. A wrong association of a line can then be corrected, curved walls contribute, and the
+//! cost of loops stays bounded.
 
 pub mod cloud;
 pub(crate) mod surface_index;

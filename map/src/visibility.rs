@@ -1,13 +1,13 @@
-//! Visibility: the area from which a landmark is visible, in closed form (method 12), for a landmark of any tilt: on
-//! a wall, under a ceiling, on the floor, or leaning.
+//! Visibility: the area from which a landmark is visible, in closed form (method 12), for a
+//! landmark of any tilt: on a wall, under a ceiling, on the floor, or leaning.
 //!
-//! In: the landmark's place, walls and other obstacles, the camera. Out: a multipolygon on the floor with area and
-//! centroid, and tests of points and uncertain poses.
+//! In: the landmark's place, walls and other obstacles, the camera. Out: a multipolygon on the
+//! floor with area and centroid, and tests of points and uncertain poses.
 //!
-//! About the landmark's centre the area is a range of distances in every direction: whatever is visible from a
-//! point is visible from everywhere between it and the landmark, except if it is too near. Penumbrae and limits are
-//! therefore bounds over direction (`envelope`), a quarter of all directions at a time, and no polygons are
-//! intersected.
+//! About the landmark's centre the area is a range of distances in every direction: whatever is
+//! visible from a point is visible from everywhere between it and the landmark, except if it is too
+//! near. Penumbrae and limits are therefore bounds over direction (`envelope`), a quarter of all
+//! directions at a time, and no polygons are intersected.
 
 mod settings;
 mod obstacle;

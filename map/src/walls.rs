@@ -1,7 +1,8 @@
-//! The map of walls for poses that are known: segments are associated and merged (method 17.4, 17.5).
+//! The map of walls for poses that are known: segments are associated and merged (method 17.4,
+//! 17.5).
 //!
-//! In: segments of a scan with the robot's pose and covariance. Out: the walls observed often enough. It corrects no
-//! pose; [`crate::slam`] does.
+//! In: segments of a scan with the robot's pose and covariance. Out: the walls observed often
+//! enough. It corrects no pose; [`crate::slam`] does.
 
 use crate::{
     check::OutOfRange,
@@ -61,8 +62,8 @@ impl Walls {
         &self.segments
     }
 
-    /// Adds the segments (robot frame) of one scan taken at `map_from_robot`. At [`MAX_WALLS`] the oldest of the
-    /// candidates with fewest observations is dropped.
+    /// Adds the segments (robot frame) of one scan taken at `map_from_robot`. At [`MAX_WALLS`] the
+    /// oldest of the candidates with fewest observations is dropped.
     pub fn add(
         &mut self,
         map_from_robot: &Pose2Covariance,
@@ -103,8 +104,8 @@ impl Walls {
         }
     }
 
-    /// Squared Mahalanobis distance of the lines if both are one wall's: same face, near enough along it, in the
-    /// gate.
+    /// Squared Mahalanobis distance of the lines if both are one wall's: same face, near enough
+    /// along it, in the gate.
     fn distance2(&self, wall: &LaserSegment, segment: &LaserSegment) -> Option<f64> {
         let p = &self.params;
         let (d, s) = difference(wall, segment);
@@ -117,19 +118,22 @@ impl Walls {
     }
 }
 
-/// Both lines as (angle, offset) around the middle of both segments: `b - a`, and the sum of their covariances there.
+/// Both lines as (angle, offset) around the middle of both segments: `b - a`, and the sum of their
+/// covariances there.
 fn difference(a: &LaserSegment, b: &LaserSegment) -> (Vector2<f64>, Matrix2<f64>) {
     let middle = Point2::from((a.a.coords + a.b.coords + b.a.coords + b.b.coords) * 0.25);
     let ((la, ca), (lb, cb)) = (local(a, &middle), local(b, &middle));
     (Vector2::new(wrap_rad(lb.x - la.x), lb.y - la.y), ca + cb)
 }
 
-/// The line as (direction of its facing normal, signed distance from `origin` along it), with covariance.
+/// The line as (direction of its facing normal, signed distance from `origin` along it), with
+/// covariance.
 pub(crate) fn local(s: &LaserSegment, origin: &Point2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
     let n = s.facing();
     let angle = n.y.atan2(n.x);
     let offset = n.dot(&(s.a - origin));
-    // (alpha, rho) belongs to +n or -n; the angle's error is the same, the offset's changes its sign.
+    // (alpha, rho) belongs to +n or -n; the angle's error is the same, the offset's changes its
+    // sign.
     let sign = if n.dot(&Vector2::new(s.alpha_rad.cos(), s.alpha_rad.sin())) < 0.0 { -1.0 } else { 1.0 };
     let t = Vector2::new(-n.y, n.x);
     // offset = sign * rho - n(angle) . origin
@@ -152,8 +156,9 @@ fn fused(a: &LaserSegment, b: &LaserSegment) -> LaserSegment {
     let d = Vector2::new(wrap_rad(lb.x - la.x), lb.y - la.y);
     let (Some(ia), Some(ib)) = (ca.try_inverse(), cb.try_inverse()) else { return a.clone() };
     // Departs from method 17.6, a filter over robot and lines, which knows what they share.
-    // Covariance intersection, weighted by hits: observations share the robot's pose error by an unknown amount,
-    // so their number must not shrink the covariance (method 11.5 solves the same by inflation).
+    // Covariance intersection, weighted by hits: observations share the robot's pose error by an
+    // unknown amount, so their number must not shrink the covariance (method 11.5 solves the same
+    // by inflation).
     let share = f64::from(a.hits) / (f64::from(a.hits) + f64::from(b.hits));
     let Some(covariance) = (ia * share + ib * (1.0 - share)).try_inverse() else { return a.clone() };
     let line = la + covariance * ib * (1.0 - share) * d;

@@ -1,5 +1,6 @@
-//! The texts that say who asks over HTTP, and which request is a repeat. In: headers, as text. Out: their parts, or nothing.
-//! Nothing is compared or stored here: the server does that. Total: any text gives a value or `None`.
+//! The texts that say who asks over HTTP, and which request is a repeat. In: headers, as text. Out:
+//! their parts, or nothing. Nothing is compared or stored here: the server does that. Total: any
+//! text gives a value or `None`.
 
 /// Begins every token, so that people and scanners of leaked secrets know one.
 pub const TOKEN_PREFIX: &str = "wmk_";
@@ -19,8 +20,8 @@ pub enum TokenOf {
     Stored(i64),
 }
 
-/// The number of a token and the text of its secret, which is not decoded: `wmk_{number}_{secret}`, of a local token
-/// `wmk_local-{port}_{secret}`.
+/// The number of a token and the text of its secret, which is not decoded: `wmk_{number}_{secret}`,
+/// of a local token `wmk_local-{port}_{secret}`.
 pub fn token(text: &str) -> Option<(TokenOf, &str)> {
     let rest = (text.len() <= MAX_TOKEN_BYTES).then(|| text.strip_prefix(TOKEN_PREFIX)).flatten()?;
     // The alphabet of secrets has the underscore, too.

@@ -1,9 +1,11 @@
-//! Enumerations of the wire as lower-case words in JSON (`"matched"`, `"three_sided"`), as in the HTTP API.
+//! Enumerations of the wire as lower-case words in JSON (`"matched"`, `"three_sided"`), as in the
+//! HTTP API.
 
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// One module per enumeration, for `#[serde(with = ...)]`; the prefix is what Protocol Buffers puts before a value.
+/// One module per enumeration, for `#[serde(with = ...)]`; the prefix is what Protocol Buffers puts
+/// before a value.
 macro_rules! word {
     ($module:ident, $type:path, $prefix:literal, $doc:literal) => {
         #[doc = $doc]

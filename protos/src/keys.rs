@@ -1,8 +1,10 @@
-//! Keys under `waymark/1/{fleet}/`, built from checked names and parsed back into them. The transport does not tell a
-//! handler who sent a message, so the robot's name is in every key that a robot writes.
+//! Keys under `waymark/1/{fleet}/`, built from checked names and parsed back into them. The
+//! transport does not tell a handler who sent a message, so the robot's name is in every key that a
+//! robot writes.
 //!
-//! On the wire every key of a robot is one of a fixed list: access control names each, and needs no wildcard, which would
-//! let keys of any length pass. So the camera is not in the key expression: it is the attachment of the message.
+//! On the wire every key of a robot is one of a fixed list: access control names each, and needs no
+//! wildcard, which would let keys of any length pass. So the camera is not in the key expression:
+//! it is the attachment of the message.
 
 use std::fmt;
 
@@ -26,7 +28,8 @@ pub enum NameError {
     Character(usize),
 }
 
-/// The name of a fleet, robot, camera, map or landmark: `[a-z0-9_-]{1,64}`. Safe in keys, addresses and file names.
+/// The name of a fleet, robot, camera, map or landmark: `[a-z0-9_-]{1,64}`. Safe in keys, addresses
+/// and file names.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct Name(String);
@@ -91,7 +94,8 @@ impl From<Name> for String {
 /// What a key says, without the fleet.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Key {
-    /// `robot/{robot}/frame/{camera}`: robot to server, `Frame`. On the wire `robot/{robot}/frame`, the camera attached.
+    /// `robot/{robot}/frame/{camera}`: robot to server, `Frame`. On the wire `robot/{robot}/frame`,
+    /// the camera attached.
     Frame(Name, Name),
     /// `robot/{robot}/quads/{camera}`: robot to server, `Quads`. The camera is attached.
     Quads(Name, Name),
@@ -103,14 +107,15 @@ pub enum Key {
     Scan(Name),
     /// `robot/{robot}/pose`: server to robot, `RobotPose`.
     Pose(Name),
-    /// `robot/{robot}/alive/{slot}`: liveliness token of a start of a robot's software; [`alive_slot`] of its epoch, in
-    /// decimal digits.
+    /// `robot/{robot}/alive/{slot}`: liveliness token of a start of a robot's software;
+    /// [`alive_slot`] of its epoch, in decimal digits.
     Alive(Name, u8),
     /// `robot/{robot}/rpc/gaze`: a query of the robot, `GazeRequest` in, `GazeAdvice` out.
     Gaze(Name),
     /// `robot/{robot}/rpc/hello`: a query of the robot, answered with nothing: its messages arrive.
     Hello(Name),
-    /// `robot/{robot}/rpc/localise`: a query of the robot, `LocaliseRequest` in, `LocaliseReply` out.
+    /// `robot/{robot}/rpc/localise`: a query of the robot, `LocaliseRequest` in, `LocaliseReply`
+    /// out.
     Localise(Name),
     /// `map/{map}/changed`: server to all, `MapChanged`.
     MapChanged(Name),
@@ -187,7 +192,8 @@ impl Keys {
         self.parse(&format!("{expression}/{}", String::from_utf8_lossy(camera)))
     }
 
-    /// The full key. Frames, quads and answers have their camera in it: so they are called in recordings.
+    /// The full key. Frames, quads and answers have their camera in it: so they are called in
+    /// recordings.
     pub fn build(&self, key: &Key) -> String {
         let p = &self.prefix;
         match key {

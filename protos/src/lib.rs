@@ -1,8 +1,9 @@
 //! The wire: messages, key expressions and checked conversions.
 //!
-//! Comes in: Protocol Buffers from robots. Goes out: values that every later stage may rely on (finite, in range,
-//! bounded), or a [`Rejection`] with a stable code and the field at fault. [`api`] has the bodies of the HTTP interface.
-//! Knows no transport: zenoh lives in `client` and in the server's `bus`. README.md lists keys, units, limits and codes.
+//! Comes in: Protocol Buffers from robots. Goes out: values that every later stage may rely on
+//! (finite, in range, bounded), or a [`Rejection`] with a stable code and the field at fault.
+//! [`api`] has the bodies of the HTTP interface. Knows no transport: zenoh lives in `client` and in
+//! the server's `bus`. README.md lists keys, units, limits and codes.
 
 pub mod api;
 pub mod credentials;
@@ -23,7 +24,8 @@ pub mod v1 {
     pub use crate::generated::*;
 }
 
-/// The definition of the messages as a `FileDescriptorSet`, for programs that read recordings without the .proto.
+/// The definition of the messages as a `FileDescriptorSet`, for programs that read recordings
+/// without the .proto.
 pub const FILE_DESCRIPTOR_SET: &[u8] = include_bytes!("descriptors.binpb");
 
 pub use convert::CheckedFrame;

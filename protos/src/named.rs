@@ -1,5 +1,5 @@
-//! The landmarks that an answer names, and whether each was recognised globally or guided. In: an answer. Out: one
-//! item for each named quad.
+//! The landmarks that an answer names, and whether each was recognised globally or guided. In: an
+//! answer. Out: one item for each named quad.
 
 use crate::v1::{Answer, QuadAnswer, Sighting, Verdict};
 use vision::geometry::Corners;
@@ -9,8 +9,8 @@ use vision::geometry::Corners;
 pub struct NamedLandmark<'a> {
     /// Name of the landmark.
     pub name: &'a str,
-    /// [`Sighting::Global`]: named by the picture alone; it may start a pose. [`Sighting::Guided`]: named with the
-    /// prior pose; it may correct that pose, and means nothing without it.
+    /// [`Sighting::Global`]: named by the picture alone; it may start a pose. [`Sighting::Guided`]:
+    /// named with the prior pose; it may correct that pose, and means nothing without it.
     pub sighting: Sighting,
     /// Position in the image, and pose.
     pub quad: &'a QuadAnswer,
@@ -25,8 +25,8 @@ impl NamedLandmark<'_> {
 
 /// The landmark of a quad, and how it was named; `None` for a quad without a name.
 ///
-/// A server without guided recognition does not state the kind: its names are global. A name of an unknown kind is
-/// ignored.
+/// A server without guided recognition does not state the kind: its names are global. A name of an
+/// unknown kind is ignored.
 pub fn named(quad: &QuadAnswer) -> Option<NamedLandmark<'_>> {
     let sighting = Sighting::try_from(quad.sighting).ok()?;
     let (name, sighting) = match sighting {
@@ -42,8 +42,8 @@ pub fn named_landmarks(answer: &Answer) -> impl Iterator<Item = NamedLandmark<'_
     answer.quads.iter().filter_map(named)
 }
 
-/// Corners of a quad of an answer (px of the frame sent, clockwise from the top left); `None` if they form no
-/// convex quad.
+/// Corners of a quad of an answer (px of the frame sent, clockwise from the top left); `None` if
+/// they form no convex quad.
 pub fn quad_corners(quad: &QuadAnswer) -> Option<Corners> {
     let points: Vec<[f64; 2]> = quad.corners.iter().map(|p| [p.u_px, p.v_px]).collect();
     Corners::try_from(<[[f64; 2]; 4]>::try_from(points).ok()?).ok()

@@ -1,5 +1,6 @@
-//! The map that a message names, without the rest of it; of a camera image its numbers, too. In: bytes. Out: the text of its
-//! field `map`; empty where it names none, and of bytes that are no message, which the receiver refuses.
+//! The map that a message names, without the rest of it; of a camera image its numbers, too. In:
+//! bytes. Out: the text of its field `map`; empty where it names none, and of bytes that are no
+//! message, which the receiver refuses.
 
 use prost::Message;
 

@@ -1,5 +1,5 @@
-//! Why a message was refused: a stable code for programs, the field at fault, and a sentence for a person. The codes
-//! are part of the wire: none is renamed, new ones are added.
+//! Why a message was refused: a stable code for programs, the field at fault, and a sentence for a
+//! person. The codes are part of the wire: none is renamed, new ones are added.
 
 use crate::v1;
 
@@ -46,7 +46,8 @@ pub enum Code {
     Expired,
     /// More cameras, robots, elements or questions at a time than the server serves.
     TooMany,
-    /// More messages or bytes a second than one robot may send; the detail names the limit and how long to wait.
+    /// More messages or bytes a second than one robot may send; the detail names the limit and how
+    /// long to wait.
     RateLimited,
     /// The frames of all robots that wait take more memory than the server gives them.
     Overloaded,

@@ -1,5 +1,5 @@
-//! The committed Rust and descriptors of the messages are what `waymark.proto` gives. After a change of the .proto run
-//! `WAYMARK_REFRESH=1 cargo test -p protos --test generated`.
+//! The committed Rust and descriptors of the messages are what `waymark.proto` gives. After a
+//! change of the .proto run `WAYMARK_REFRESH=1 cargo test -p protos --test generated`.
 
 use prost::Message as _;
 use std::{fs, path::Path};
@@ -28,7 +28,8 @@ const JSON: [&str; 20] = [
     "Scan",
 ];
 
-/// Of these, what has no schema: the bodies of the HTTP interface that have them have other forms or types.
+/// Of these, what has no schema: the bodies of the HTTP interface that have them have other forms
+/// or types.
 const WITHOUT_SCHEMA: [&str; 4] = ["RobotPose", "MapChanged", "Odometry", "Scan"];
 /// Enumerations that are words in these messages.
 const WORDS: [&str; 5] = ["QuadKind", "Verdict", "Sighting", "FixQuantity", "PartAgreement"];
@@ -88,7 +89,8 @@ fn committed_rust_matches_the_proto() {
     is_committed("src/descriptors.binpb", &described.encode_to_vec());
 }
 
-/// Checks a committed file of the crate against its fresh content; writes it first where that is asked for.
+/// Checks a committed file of the crate against its fresh content; writes it first where that is
+/// asked for.
 fn is_committed(name: &str, fresh: &[u8]) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(name);
     if std::env::var_os("WAYMARK_REFRESH").is_some() {

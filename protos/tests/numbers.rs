@@ -1,5 +1,6 @@
-//! Numbers that are none, too large, too small or too precise, in every numeric field of every message that a robot sends,
-//! as the descriptors list them: each message is accepted, or refused with the field at fault or one around it.
+//! Numbers that are none, too large, too small or too precise, in every numeric field of every
+//! message that a robot sends, as the descriptors list them: each message is accepted, or refused
+//! with the field at fault or one around it.
 
 use prost_reflect::{
     DescriptorPool, DynamicMessage, FieldDescriptor, Kind, MessageDescriptor, ReflectMessage as _, Value,
@@ -25,7 +26,8 @@ const REALS: [f64; 10] = [
 ];
 const WHOLE: [i64; 6] = [0, -1, i64::MIN, i64::MAX, 9_007_199_254_740_993, 2_147_483_647];
 
-/// Refused with another field than the one that was changed: sizes, encodings and bytes are compared with the pixels.
+/// Refused with another field than the one that was changed: sizes, encodings and bytes are
+/// compared with the pixels.
 const COMPARED: [&str; 4] = ["width_px", "height_px", "encoding", "withheld_bytes"];
 
 /// Parts of a question where a robot is that have no meaning in it, and are not looked at.
@@ -127,7 +129,8 @@ fn attacks(kind: &Kind) -> Vec<Value> {
 /// Gets a changed message, the path of what was changed, and its value.
 type Send<'a> = dyn FnMut(DynamicMessage, &[String], Option<&Value>) + 'a;
 
-/// Changes every number below `path`; `send` gets the changed part and gives what the whole is refused with.
+/// Changes every number below `path`; `send` gets the changed part and gives what the whole is
+/// refused with.
 fn walk(part: &DynamicMessage, path: &[String], send: &mut Send<'_>) {
     for field in part.descriptor().fields() {
         let below: Vec<String> = path.iter().cloned().chain([field.name().to_owned()]).collect();
@@ -175,7 +178,8 @@ fn inside(
     });
 }
 
-/// Whether the field of a refusal is the one at `path`, one around it or one inside of the same message.
+/// Whether the field of a refusal is the one at `path`, one around it or one inside of the same
+/// message.
 fn names(field: &str, path: &[String]) -> bool {
     let first = field.split(['.', '[']).next().unwrap_or_default();
     first == path[0] || path.iter().any(|part| COMPARED.contains(&part.as_str()))

@@ -1,5 +1,5 @@
-//! A robot of a ROS 2 bag. In: messages of a bag (CDR), and which topics and frames are the robot's. Out: messages of the
-//! wire, and why others were not used.
+//! A robot of a ROS 2 bag. In: messages of a bag (CDR), and which topics and frames are the
+//! robot's. Out: messages of the wire, and why others were not used.
 
 use crate::{
     message::{Body, Recorded},
@@ -39,7 +39,8 @@ pub struct BagRobot {
 }
 
 impl BagRobot {
-    /// A robot with this name on the wire. The settings must name its cameras; [`cameras`] finds them.
+    /// A robot with this name on the wire. The settings must name its cameras; [`cameras`] finds
+    /// them.
     pub fn new(robot: Name, settings: RobotSettings) -> Result<Self, SettingsError> {
         let adapter = RobotAdapter::new(settings, BAG_EPOCH)?;
         Ok(Self { robot, adapter, used: 0, problems: BTreeMap::new() })
@@ -101,13 +102,15 @@ pub fn is_bag<'a>(channels: impl IntoIterator<Item = &'a ChannelInfo>) -> bool {
     channels.into_iter().any(|channel| channel.encoding == "cdr")
 }
 
-/// Words of topics whose images are not of what a camera sees: distances, and what is computed of images.
+/// Words of topics whose images are not of what a camera sees: distances, and what is computed of
+/// images.
 const NO_PICTURES: [&str; 8] =
     ["depth", "disparity", "confidence", "segmentation", "mask", "label", "/theora", "/ffmpeg"];
 
-/// The cameras of a bag by their topics of images, compressed ones before raw ones of the same camera. Of more than
-/// [`MAX_CAMERAS`] those come first that have a calibration in the bag, then by their names; depth images are none. A
-/// camera is called after its topic: `/camera/front/image_raw` is `camera-front`.
+/// The cameras of a bag by their topics of images, compressed ones before raw ones of the same
+/// camera. Of more than [`MAX_CAMERAS`] those come first that have a calibration in the bag, then
+/// by their names; depth images are none. A camera is called after its topic:
+/// `/camera/front/image_raw` is `camera-front`.
 pub fn cameras<'a>(channels: impl IntoIterator<Item = &'a ChannelInfo>) -> Vec<CameraSettings> {
     let channels: Vec<&ChannelInfo> = channels.into_iter().collect();
     let mut found: Vec<CameraSettings> = Vec::new();
@@ -171,7 +174,8 @@ fn name(words: &str) -> Option<Name> {
         .and_then(|n| Name::new(n).ok())
 }
 
-/// The camera of a topic of images, with the calibration beside it; `None` for a topic that gives no name.
+/// The camera of a topic of images, with the calibration beside it; `None` for a topic that gives
+/// no name.
 pub fn camera(topic: &str, form: ImageForm) -> Option<CameraSettings> {
     let base = base(topic).unwrap_or_else(|| topic.rsplit_once('/').map_or("", |(base, _)| base));
     let mut camera = CameraSettings::conventional(name(base)?, base, form);

@@ -1,5 +1,5 @@
-//! Compares the answers to the same frames of two plays: of two builds, or against two versions of a map. In: answers
-//! and the frames they are for. Out: what became of each frame, and the counts.
+//! Compares the answers to the same frames of two plays: of two builds, or against two versions of
+//! a map. In: answers and the frames they are for. Out: what became of each frame, and the counts.
 
 use map::pose2::Pose2Covariance;
 use protos::{
@@ -15,7 +15,8 @@ use std::collections::{BTreeMap, BTreeSet};
 pub const MAX_FRAMES: usize = 1_000_000;
 /// Poses further apart than this, in standard deviations of the earlier one, differ.
 pub const POSE_SIGMAS: f64 = 1.0;
-/// Added to the covariance of a pose, so that one that claims to be exact can be compared: 0.1 mm, 0.1 mrad.
+/// Added to the covariance of a pose, so that one that claims to be exact can be compared: 0.1 mm,
+/// 0.1 mrad.
 const ROUNDING: f64 = 1e-8;
 
 /// The frame that an answer is for.
@@ -43,7 +44,8 @@ pub struct Outcome {
 }
 
 impl Outcome {
-    /// `None` for a frame that was not looked at: refused, expired, or by a server that is not ready.
+    /// `None` for a frame that was not looked at: refused, expired, or by a server that is not
+    /// ready.
     pub fn of(answer: &Answer) -> Option<Self> {
         if !matches!(answer.status(), Status::Matched | Status::Ambiguous | Status::NoMatch) {
             return None;
@@ -101,7 +103,8 @@ impl Change {
         }
     }
 
-    /// Whether the plays differ by it. A frame that was not answered before has nothing to differ from.
+    /// Whether the plays differ by it. A frame that was not answered before has nothing to differ
+    /// from.
     pub fn is_difference(self) -> bool {
         !matches!(self, Self::Same | Self::NotAnsweredBefore)
     }
@@ -119,7 +122,8 @@ pub struct FrameChange {
     pub before: BTreeSet<String>,
     /// The names now.
     pub after: BTreeSet<String>,
-    /// Distance of the poses in standard deviations of the earlier one; absent unless there are two.
+    /// Distance of the poses in standard deviations of the earlier one; absent unless there are
+    /// two.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pose_sigmas: Option<f64>,
     /// Distance of the positions, metres; absent unless there are two.
@@ -154,7 +158,8 @@ pub struct Play {
 }
 
 impl Play {
-    /// Adds an answer; false if it is not compared: it says nothing, or there are [`MAX_FRAMES`] already.
+    /// Adds an answer; false if it is not compared: it says nothing, or there are [`MAX_FRAMES`]
+    /// already.
     pub fn add(&mut self, robot: &Name, camera: &Name, answer: &Answer) -> bool {
         let id =
             FrameId { robot: robot.clone(), camera: camera.clone(), epoch: answer.epoch, seq: answer.seq };

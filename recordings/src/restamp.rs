@@ -1,8 +1,9 @@
-//! The clock of a drive that is played again. In: capture times of the recording and the present time. Out: capture
-//! times as if the robot drove now.
+//! The clock of a drive that is played again. In: capture times of the recording and the present
+//! time. Out: capture times as if the robot drove now.
 //!
-//! The newest capture time of the recording is now; those before are interpolated between the moments at which their
-//! neighbours were now. So order and interpolation among the robot's messages stay what they were, at any speed.
+//! The newest capture time of the recording is now; those before are interpolated between the
+//! moments at which their neighbours were now. So order and interpolation among the robot's
+//! messages stay what they were, at any speed.
 
 use std::collections::VecDeque;
 
@@ -34,7 +35,8 @@ impl Restamp {
         self.between(recorded_ns)
     }
 
-    /// The recorded time of a present one that [`Self::stamp`] gave, or of one between; `None` before anything was stamped.
+    /// The recorded time of a present one that [`Self::stamp`] gave, or of one between; `None`
+    /// before anything was stamped.
     pub fn recorded(&self, now_ns: i64) -> Option<i64> {
         let after = self.moments.partition_point(|[_, now]| *now < now_ns);
         let Some(&[b, b_now]) = self.moments.get(after) else {

@@ -1,4 +1,5 @@
-//! Names of the channels for viewers, and of their coordinate frames. Our own messages have their keys as topics.
+//! Names of the channels for viewers, and of their coordinate frames. Our own messages have their
+//! keys as topics.
 
 use protos::Name;
 

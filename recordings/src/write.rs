@@ -1,7 +1,8 @@
 //! Writes a recording. In: messages in the order of their receipt, and maps. Out: an MCAP file.
 //!
-//! A chunk is written whole, after at most [`CHUNK_BYTES`] or [`CHUNK_NS`], so a file whose writer was killed lacks the
-//! last chunk and is read up to there. Memory: one chunk, and its place in the index for each chunk before.
+//! A chunk is written whole, after at most [`CHUNK_BYTES`] or [`CHUNK_NS`], so a file whose writer
+//! was killed lacks the last chunk and is read up to there. Memory: one chunk, and its place in the
+//! index for each chunk before.
 
 use crate::{
     foxglove,
@@ -67,7 +68,8 @@ impl<W: Write + Seek> DriveWriter<W> {
         let options = WriteOptions::library(WriteOptions::new().profile(PROFILE), program)
             .compression(None)
             .chunk_size(Some(CHUNK_BYTES))
-            // A chunk is written when it is whole; otherwise its length would be corrected afterwards.
+            // A chunk is written when it is whole; otherwise its length would be corrected
+            // afterwards.
             .disable_seeking(true);
         let mut mcap = options.create(file)?;
         let metadata = [("fleet", fleet.to_string()), ("program", program.to_owned())];
@@ -96,7 +98,8 @@ impl<W: Write + Seek> DriveWriter<W> {
         Ok(())
     }
 
-    /// Adds walls and landmarks of a map, for viewers; they replace those of the map that were added before.
+    /// Adds walls and landmarks of a map, for viewers; they replace those of the map that were
+    /// added before.
     pub fn write_map(&mut self, content: &MapContent<'_>, log_time_ns: u64) -> Result<(), WriteError> {
         self.show(&View::of_map(content, log_time_ns), log_time_ns, 0)
     }

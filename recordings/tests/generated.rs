@@ -1,5 +1,5 @@
-//! The committed Rust and descriptors of Foxglove's messages are what `foxglove.proto` gives. After a change of the
-//! .proto run `WAYMARK_REFRESH=1 cargo test -p recordings --test generated`.
+//! The committed Rust and descriptors of Foxglove's messages are what `foxglove.proto` gives. After
+//! a change of the .proto run `WAYMARK_REFRESH=1 cargo test -p recordings --test generated`.
 
 #![allow(clippy::disallowed_methods, reason = "the crate opens no files; this test writes some")]
 
@@ -22,7 +22,8 @@ fn committed_rust_matches_the_proto() {
     is_committed("src/foxglove/descriptors.binpb", &described.encode_to_vec());
 }
 
-/// Checks a committed file of the crate against its fresh content; writes it first where that is asked for.
+/// Checks a committed file of the crate against its fresh content; writes it first where that is
+/// asked for.
 fn is_committed(name: &str, fresh: &[u8]) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(name);
     if std::env::var_os("WAYMARK_REFRESH").is_some() {

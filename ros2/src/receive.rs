@@ -1,8 +1,9 @@
-//! One sample of a subscriber of `rmw_zenoh` topics: from key, payload and attachment to a message, or why not.
+//! One sample of a subscriber of `rmw_zenoh` topics: from key, payload and attachment to a message,
+//! or why not.
 //!
-//! A refusal costs a look at the key and at the fields before the fault; no count is believed before it has been
-//! compared with the length of the payload. Samples of zenoh-bridge-ros2dds name no type: for those,
-//! [`MessageKind::decode`] with the type from the bridge's token.
+//! A refusal costs a look at the key and at the fields before the fault; no count is believed
+//! before it has been compared with the length of the payload. Samples of zenoh-bridge-ros2dds name
+//! no type: for those, [`MessageKind::decode`] with the type from the bridge's token.
 
 use crate::{
     cdr::CdrError,
@@ -48,8 +49,8 @@ pub enum Refusal {
     Payload(#[from] CdrError),
 }
 
-/// The kind of message that comes with a key, before its payload is looked at. A key without a hash, of Humble, is
-/// taken as the known definition.
+/// The kind of message that comes with a key, before its payload is looked at. A key without a
+/// hash, of Humble, is taken as the known definition.
 pub fn kind_of(key: &DataKey<'_>) -> Result<MessageKind, Refusal> {
     let unknown = || Refusal::UnknownType(key.type_name.to_string());
     let kind = MessageKind::of(key.type_name).ok_or_else(unknown)?;

@@ -1,7 +1,8 @@
-//! Names of message types: `sensor_msgs/msg/Image` in ROS, `sensor_msgs::msg::dds_::Image_` in DDS and in keys.
+//! Names of message types: `sensor_msgs/msg/Image` in ROS, `sensor_msgs::msg::dds_::Image_` in DDS
+//! and in keys.
 //!
-//! Source: `ros2/rmw_zenoh rmw_zenoh_cpp/src/detail/type_support_common.cpp` (`_create_type_name`); `ros2/design
-//! articles/140_topic_and_service_name_mapping.md`.
+//! Source: `ros2/rmw_zenoh rmw_zenoh_cpp/src/detail/type_support_common.cpp` (`_create_type_name`);
+//! `ros2/design articles/140_topic_and_service_name_mapping.md`.
 
 use std::fmt;
 
@@ -34,7 +35,8 @@ impl<'a> TypeName<'a> {
         Self::checked(text, parts)
     }
 
-    /// From the form of DDS, `sensor_msgs::msg::dds_::Image_`. Types of services and actions are refused.
+    /// From the form of DDS, `sensor_msgs::msg::dds_::Image_`. Types of services and actions are
+    /// refused.
     pub fn from_dds(text: &'a str) -> Result<Self, TypeNameError> {
         let parts = text.split_once("::msg::dds_::");
         Self::checked(text, parts.and_then(|(package, name)| Some((package, name.strip_suffix('_')?))))

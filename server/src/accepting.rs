@@ -1,4 +1,5 @@
-//! The accept loop of every listener of the server: connections are bounded, and each address has its part of them.
+//! The accept loop of every listener of the server: connections are bounded, and each address has
+//! its part of them.
 
 use std::{
     collections::BTreeMap,
@@ -14,7 +15,8 @@ use tokio::{
 /// Pause after a failed accept: usually too many open files.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 
-/// How many are held by each key. A key that holds none is forgotten, so there are no more of them than holders.
+/// How many are held by each key. A key that holds none is forgotten, so there are no more of them
+/// than holders.
 #[derive(Debug)]
 pub(crate) struct Shares<K>(Mutex<BTreeMap<K, usize>>);
 
@@ -98,7 +100,8 @@ async fn accept(
     listener: &TcpListener,
     places: &Arc<Semaphore>,
 ) -> Option<(TcpStream, SocketAddr, OwnedSemaphorePermit)> {
-    // Place first: beyond the bound, connections wait in the system's queue and cost no memory here.
+    // Place first: beyond the bound, connections wait in the system's queue and cost no memory
+    // here.
     let place = places.clone().acquire_owned().await.ok()?;
     match listener.accept().await {
         Ok((stream, peer)) => {

@@ -1,5 +1,5 @@
-//! The audit log in a file, without asking a server. In: a data directory, of a server that may run, or a backup. Out: whether
-//! its chain is whole.
+//! The audit log in a file, without asking a server. In: a data directory, of a server that may
+//! run, or a backup. Out: whether its chain is whole.
 
 use crate::store::{StoreError, audit, copies, open::FILE};
 use protos::api::{AuditCheck, AuditHead};
@@ -24,7 +24,8 @@ pub enum AuditFileError {
     BadDigest,
 }
 
-/// Computes the digest of every entry anew. An entry that was `noted` elsewhere has to have its digest still.
+/// Computes the digest of every entry anew. An entry that was `noted` elsewhere has to have its
+/// digest still.
 pub async fn check(path: &Path, noted: Option<&AuditHead>) -> Result<AuditCheck, AuditFileError> {
     let is_data = path.is_dir();
     let file = if is_data { path.join(FILE) } else { path.to_owned() };

@@ -1,5 +1,5 @@
-//! Camera calibration from views of one landmark, for the command line and HTTP. In: corners (px) or pictures, and
-//! constraints. Out: a report. `vision::camera_calibration` computes.
+//! Camera calibration from views of one landmark, for the command line and HTTP. In: corners (px)
+//! or pictures, and constraints. Out: a report. `vision::camera_calibration` computes.
 
 use protos::{
     api::{CalibrationConstraintsBody, CalibrationReport, CalibrationViewReport},
@@ -17,7 +17,8 @@ use vision::{
 
 /// Standard deviation of a corner per coordinate, where nobody says.
 pub const CORNER_SIGMA_PX: f64 = 0.5;
-/// What is known of any camera's principal point: standard deviation from the image's centre, as a share of its width.
+/// What is known of any camera's principal point: standard deviation from the image's centre, as a
+/// share of its width.
 const CENTRE_SIGMA: f64 = 0.1;
 /// A camera is doubtful from so much chi2 a degree of freedom,
 const DOUBTFUL_CHI2: f64 = 10.0;
@@ -33,11 +34,13 @@ const HEIGHT_SIGMA_M: f64 = 0.02;
 /// Constraints of a calibration beside the views.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CalibrationConstraints {
-    /// Radial coefficients (k1, k2) that may be fitted, 0 to 2; only those are that the views ask for.
+    /// Radial coefficients (k1, k2) that may be fitted, 0 to 2; only those are that the views ask
+    /// for.
     pub radial: u8,
     /// The camera does not roll (C2).
     pub zero_roll: bool,
-    /// The camera is this high over the landmark's centre in all views, metres; negative below (C3).
+    /// The camera is this high over the landmark's centre in all views, metres; negative below
+    /// (C3).
     pub height_m: Option<f64>,
     /// The ratio of the landmark's sides is not what its size says, and is found with the camera.
     pub unknown_aspect: bool,
@@ -111,13 +114,16 @@ pub fn calibrated(
 pub struct CalibratedPictures {
     /// As from corners.
     pub report: CalibrationReport,
-    /// For each picture: windows of the object's texture that it shows; `None` where it was not used.
+    /// For each picture: windows of the object's texture that it shows; `None` where it was not
+    /// used.
     pub points: Vec<Option<usize>>,
-    /// Lines along the object's sides that agree on two directions at right angles, and all that were found.
+    /// Lines along the object's sides that agree on two directions at right angles, and all that
+    /// were found.
     pub lines: [usize; 2],
 }
 
-/// Calibrates a camera from pictures of one flat, textured object of about `size`. Slow: not for an async thread.
+/// Calibrates a camera from pictures of one flat, textured object of about `size`. Slow: not for an
+/// async thread.
 pub fn calibrated_from_pictures(
     pictures: &[GrayImage],
     size: LandmarkSize,
@@ -161,8 +167,8 @@ fn report(c: &CameraCalibration, used: &[usize], count: usize, image_px: [usize;
     }
 }
 
-/// The camera with its standard deviations (the larger one of the centre's), at most those that frames may carry; without
-/// them where they are not finite.
+/// The camera with its standard deviations (the larger one of the centre's), at most those that
+/// frames may carry; without them where they are not finite.
 fn with_sigmas(camera: &Intrinsics, [fx, cx, cy]: [f64; 3]) -> Intrinsics {
     let most = IntrinsicsSigmas::MAX_SHARE * camera.fx_px;
     let sigmas = IntrinsicsSigmas { focal_px: fx.min(most), center_px: cx.max(cy).min(most) };

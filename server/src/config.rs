@@ -1,8 +1,8 @@
-//! Settings. In: a file, the environment and the command line ([`RawConfig`]). Out: checked settings ([`Config`]). Everything
-//! has a default: the server starts without a file.
+//! Settings. In: a file, the environment and the command line ([`RawConfig`]). Out: checked
+//! settings ([`Config`]). Everything has a default: the server starts without a file.
 //!
-//! Precedence, weakest first: defaults, TOML file, `WAYMARK_...` variables (`WAYMARK_LIMITS__FRAME_BYTES=100000`),
-//! command line.
+//! Precedence, weakest first: defaults, TOML file, `WAYMARK_...` variables
+//! (`WAYMARK_LIMITS__FRAME_BYTES=100000`), command line.
 
 mod addresses;
 mod backup;
@@ -59,19 +59,21 @@ pub struct RawConfig {
     pub data: PathBuf,
     /// Address and port of the HTTP interface; port 0 takes a free one.
     pub http: String,
-    /// Where the zenoh router listens, as zenoh writes it; port 0 takes a free one. Empty: `tcp/127.0.0.1:7447`, or
-    /// `tls/127.0.0.1:7447` with encryption.
+    /// Where the zenoh router listens, as zenoh writes it; port 0 takes a free one. Empty:
+    /// `tcp/127.0.0.1:7447`, or `tls/127.0.0.1:7447` with encryption.
     pub zenoh: String,
-    /// Address and port of a listener for metrics alone, which asks for no token; empty: none. Port 0 takes a free one.
+    /// Address and port of a listener for metrics alone, which asks for no token; empty: none. Port
+    /// 0 takes a free one.
     pub metrics: String,
     /// Name in every key: `waymark/1/{fleet}/...`.
     pub fleet: String,
-    /// Name of the server among those of a router. Empty: one is made once and stays in the data directory.
+    /// Name of the server among those of a router. Empty: one is made once and stays in the data
+    /// directory.
     pub server_name: String,
     /// Vision threads; 0 takes one per core.
     pub workers: usize,
-    /// When frames are searched for all landmarks of their map. The others are answered by the expected landmarks alone and
-    /// say so (`Answer.only_expected`).
+    /// When frames are searched for all landmarks of their map. The others are answered by the
+    /// expected landmarks alone and say so (`Answer.only_expected`).
     pub search_frames: FrameSearch,
     /// Allows plain-text listeners beyond loopback.
     pub insecure: bool,
@@ -112,8 +114,8 @@ impl Default for RawConfig {
 }
 
 impl RawConfig {
-    /// Defaults, then the file (which must exist if named), then the environment; of that what is no setting is left out
-    /// ([`Self::unknown_variables`]).
+    /// Defaults, then the file (which must exist if named), then the environment; of that what is
+    /// no setting is left out ([`Self::unknown_variables`]).
     pub fn read(file: Option<&Path>) -> Result<Self, ConfigError> {
         // Defaults are left to serde.
         let mut figment = Figment::new();
@@ -187,7 +189,8 @@ impl Config {
         None
     }
 
-    /// The listeners that other machines can reach, by setting, with their addresses: they are not encrypted.
+    /// The listeners that other machines can reach, by setting, with their addresses: they are not
+    /// encrypted.
     pub fn plain_text_beyond_loopback(&self) -> Vec<(&'static str, String)> {
         let is_plain = |(is_tls, address): &(bool, SocketAddr)| !is_tls && !is_loopback(address.ip());
         let own = self.router.is_none().then(|| zenoh_address("zenoh", &self.zenoh_endpoint).ok());

@@ -1,5 +1,5 @@
-//! Failed quality gates in words. In: the gates that a model failed, as learning gives or the store holds them. Out: one
-//! sentence and one advice for each reason, each reason once.
+//! Failed quality gates in words. In: the gates that a model failed, as learning gives or the store
+//! holds them. Out: one sentence and one advice for each reason, each reason once.
 
 use protos::api::{FailedGate, GateBody, LookAlikeBody};
 use serde::{Deserialize, Serialize};
@@ -7,7 +7,8 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use vision::model::{Gate, GateFailure, LandmarkId, ThresholdError};
 
-/// A look-alike as it is stored. Its name is that of the time of learning; the number is what holds.
+/// A look-alike as it is stored. Its name is that of the time of learning; the number is what
+/// holds.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct StoredLookAlike {
     id: u64,
@@ -27,8 +28,9 @@ impl StoredLookAlike {
     }
 }
 
-/// A stored text with the numbers that landmarks have in another map: of a refusal, or of facts that name look-alikes. A
-/// landmark that is not among them is gone there: it gets 0, which is the number of none.
+/// A stored text with the numbers that landmarks have in another map: of a refusal, or of facts
+/// that name look-alikes. A landmark that is not among them is gone there: it gets 0, which is the
+/// number of none.
 pub(crate) fn renumbered(text: &str, numbers: &BTreeMap<LandmarkId, LandmarkId>) -> String {
     let Ok(mut value) = serde_json::from_str::<Value>(text) else { return text.to_owned() };
     let mut changed = false;

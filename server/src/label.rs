@@ -1,9 +1,10 @@
-//! Labels: text of one line that people type and others read, such as a floor, the name of an area, the reason of a change.
-//! In: text. Out: whether it reads as it is written.
+//! Labels: text of one line that people type and others read, such as a floor, the name of an area,
+//! the reason of a change. In: text. Out: whether it reads as it is written.
 //!
-//! Format characters that nobody sees make one label look like another, or turn the order of what stands beside it
-//! (Unicode technical reports 36 and 39). They are refused. The joiners U+200C and U+200D and variation selectors stay:
-//! words of Persian and Hindi, and pictograms, are spelt with them.
+//! Format characters that nobody sees make one label look like another, or turn the order of what
+//! stands beside it (Unicode technical reports 36 and 39). They are refused. The joiners U+200C and
+//! U+200D and variation selectors stay: words of Persian and Hindi, and pictograms, are spelt with
+//! them.
 
 use std::ops::RangeInclusive;
 

@@ -1,7 +1,8 @@
 //! The Waymark server: store, bus, engine and HTTP face around the pure crates `vision` and `map`.
 //!
-//! The way of a frame: `bus -> engine -> vision -> map -> bus`; that of a lesson: `http -> store -> jobs -> store -> engine`.
-//! zenoh appears only in `bus` and `ros2`, sqlx only in `store`, axum only in `http`.
+//! The way of a frame: `bus -> engine -> vision -> map -> bus`; that of a lesson:
+//! `http -> store -> jobs -> store -> engine`. zenoh appears only in `bus` and `ros2`, sqlx only in
+//! `store`, axum only in `http`.
 
 pub mod config;
 mod accepting;

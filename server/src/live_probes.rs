@@ -1,6 +1,6 @@
-//! Probes of parts that could stand still while they seem to run: the writer, the outbox and the router. In: the parts. Out:
-//! a beat of the part's heart for each probe that went through ([`engine::heartbeats`]). Workers need none: they beat by
-//! their work.
+//! Probes of parts that could stand still while they seem to run: the writer, the outbox and the
+//! router. In: the parts. Out: a beat of the part's heart for each probe that went through
+//! ([`engine::heartbeats`]). Workers need none: they beat by their work.
 
 use crate::{
     bus::{Outbox, Pinger},

@@ -1,8 +1,10 @@
-//! Files and folders of the data directory: readable by their owner alone, whatever the umask. In: paths. Out: files made with
-//! mode 0600 and folders with 0700, and those of an earlier program closed to others.
+//! Files and folders of the data directory: readable by their owner alone, whatever the umask. In:
+//! paths. Out: files made with mode 0600 and folders with 0700, and those of an earlier program
+//! closed to others.
 //!
-//! Each is closed where it is made, so that it holds for a server inside another program, whose umask is that program's.
-//! `waymark serve` owns its process and sets the umask besides, for what libraries make.
+//! Each is closed where it is made, so that it holds for a server inside another program, whose
+//! umask is that program's. `waymark serve` owns its process and sets the umask besides, for what
+//! libraries make.
 
 use std::{
     fs::{self, File, OpenOptions},
@@ -10,8 +12,8 @@ use std::{
     path::Path,
 };
 
-/// What may be in a data directory, files and folders: whole names, or how they begin. Nothing else is touched: the directory
-/// may be a folder with files of other programs.
+/// What may be in a data directory, files and folders: whole names, or how they begin. Nothing else
+/// is touched: the directory may be a folder with files of other programs.
 #[cfg(unix)]
 const OWN: [&str; 9] = [
     "waymark.sqlite",
@@ -91,8 +93,8 @@ pub(crate) struct OpenToOthers {
     pub(crate) left: u64,
 }
 
-/// Makes a data directory if it is not there, and closes what an earlier program, a copy or an unpacked archive has left open
-/// in it. Links are not followed.
+/// Makes a data directory if it is not there, and closes what an earlier program, a copy or an
+/// unpacked archive has left open in it. Links are not followed.
 pub(crate) fn data_directory(data: &Path) -> io::Result<OpenToOthers> {
     let mut found = OpenToOthers::default();
     if !data.exists() {

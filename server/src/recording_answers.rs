@@ -1,5 +1,6 @@
-//! From the queue of answers that are worth storing to the database. In: records of the workers. Out: rows, a batch at a time,
-//! so that robots cost the writer at most one short transaction in [`PERIOD`].
+//! From the queue of answers that are worth storing to the database. In: records of the workers.
+//! Out: rows, a batch at a time, so that robots cost the writer at most one short transaction in
+//! [`PERIOD`].
 
 use crate::{publication::Catalogue, store::stored_answers};
 use engine::{answer_records::AnswerRecord, vitals::Pulse};

@@ -1,4 +1,5 @@
-//! A server that runs: where it is, whether its parts run, and its stop in the opposite order of the start.
+//! A server that runs: where it is, whether its parts run, and its stop in the opposite order of
+//! the start.
 
 use crate::{
     bus::Bus,
@@ -80,14 +81,15 @@ impl RunningServer {
         self.local_token.path()
     }
 
-    /// A link that opens the page as an administrator, once, within ten minutes. It is a secret. `None` if the system has
-    /// no randomness for it.
+    /// A link that opens the page as an administrator, once, within ten minutes. It is a secret.
+    /// `None` if the system has no randomness for it.
     pub fn page_link(&self) -> Option<String> {
         let code = self.sessions.code(TokenId::Local, Instant::now()).ok()?;
         Some(format!("{}/open?code={code}", self.local_url()))
     }
 
-    /// Address of the pages and of the HTTP interface for other machines; for this one where no other can reach it.
+    /// Address of the pages and of the HTTP interface for other machines; for this one where no
+    /// other can reach it.
     pub fn url(&self) -> String {
         let Some(name) = &self.tls_name else { return self.local_url() };
         let name = if name.parse::<Ipv6Addr>().is_ok() { format!("[{name}]") } else { name.clone() };
@@ -104,7 +106,8 @@ impl RunningServer {
         format!("{}://{at}", if is_plain { "http" } else { "https" })
     }
 
-    /// Returns when a part of the server has ended untold, with its name and the reason: stop, and start again from disk.
+    /// Returns when a part of the server has ended untold, with its name and the reason: stop, and
+    /// start again from disk.
     pub async fn failed(&self) -> Failure {
         self.vitals.failed().await
     }

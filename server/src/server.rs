@@ -135,7 +135,8 @@ struct Robots {
 }
 
 impl Robots {
-    /// Robots are heard and answered from now on. There are none of ROS 2 where the server joins a router.
+    /// Robots are heard and answered from now on. There are none of ROS 2 where the server joins a
+    /// router.
     async fn connect(
         config: &Config,
         engine: &Engine,
@@ -186,8 +187,8 @@ fn checks(store: &Catalogue, stopping: &watch::Receiver<bool>) -> [JoinHandle<()
     [tokio::spawn(pictures), tokio::spawn(database)]
 }
 
-/// Looks at the disk: while it is nearly full, journals of mappings get no more scans; when there is room again, what had none
-/// at the start is made.
+/// Looks at the disk: while it is nearly full, journals of mappings get no more scans; when there
+/// is room again, what had none at the start is made.
 fn watch_disk(
     store: &Catalogue,
     token: &Arc<LocalToken>,

@@ -1,4 +1,5 @@
-//! The listeners of HTTP and of metrics, what is served there, and what looks after the parts of the server meanwhile.
+//! The listeners of HTTP and of metrics, what is served there, and what looks after the parts of
+//! the server meanwhile.
 
 use crate::{
     bus::{Outbox, Pinger},
@@ -32,7 +33,8 @@ pub(crate) struct Listeners {
 }
 
 impl Listeners {
-    /// Takes the ports of the settings. They are taken before all else: one that another program has is told at once.
+    /// Takes the ports of the settings. They are taken before all else: one that another program
+    /// has is told at once.
     pub(crate) async fn open(config: &Config) -> Result<Self, StartError> {
         crate::metrics::process::started();
         let (http, http_addr) = bind("--http", config.http_addr).await?;

@@ -1,6 +1,6 @@
 //! Detection of the landmarks of a drive by `vision`, against exact truth:
-//! `cargo run -p sim --example detection -- [SEED] [FRAMES] [DIRECTORY]`. With a directory, writes the five frames
-//! with the largest corner error.
+//! `cargo run -p sim --example detection -- [SEED] [FRAMES] [DIRECTORY]`. With a directory, writes
+//! the five frames with the largest corner error.
 
 use std::sync::Arc;
 

@@ -37,7 +37,8 @@ impl Builder {
         Self { height_m, surfaces: vec![], walls: vec![], landmarks: vec![], lamps: vec![] }
     }
 
-    /// Adds a wall over the whole height; the room is on the left of a to b. The texture repeats every `texture_m`.
+    /// Adds a wall over the whole height; the room is on the left of a to b. The texture repeats
+    /// every `texture_m`.
     pub(crate) fn wall(
         &mut self,
         a_m: [f64; 2],
@@ -155,7 +156,8 @@ impl Builder {
     }
 }
 
-/// Frame of a horizontal surface: z (the picture's up) along map x; y along -map y on a floor, +map y on a ceiling.
+/// Frame of a horizontal surface: z (the picture's up) along map x; y along -map y on a floor, +map
+/// y on a ceiling.
 fn lying(centre_m: Vector3<f64>, up: bool) -> Isometry3<f64> {
     let x = Vector3::new(0.0, 0.0, if up { 1.0 } else { -1.0 });
     let z = Vector3::x();
@@ -163,10 +165,12 @@ fn lying(centre_m: Vector3<f64>, up: bool) -> Isometry3<f64> {
     Isometry3::from_parts(centre_m.into(), UnitQuaternion::from_rotation_matrix(&rotation))
 }
 
-/// Mean light over the surfaces that are no lamps, after normalisation: keeps white plaster below saturation.
+/// Mean light over the surfaces that are no lamps, after normalisation: keeps white plaster below
+/// saturation.
 const MEAN_LIGHT: f32 = 0.9;
 
-/// Scales all light so that its mean over the area of lit surfaces is [`MEAN_LIGHT`]. Without lamps all stays 1.
+/// Scales all light so that its mean over the area of lit surfaces is [`MEAN_LIGHT`]. Without lamps
+/// all stays 1.
 pub(crate) fn normalise(surfaces: &mut [Surface]) {
     let lit = |s: &&Surface| !s.glows && s.light.light.len() > 1;
     let (mut sum, mut area) = (0.0, 0.0);
@@ -191,7 +195,8 @@ pub(crate) mod tests {
     use crate::texture::Edge;
     use nalgebra::{Point2, Point3, Vector2};
 
-    /// One rectangle `width_m` x `height_m` of a texture in the plane x = 0, lit evenly, facing +x, centre at z = 1.
+    /// One rectangle `width_m` x `height_m` of a texture in the plane x = 0, lit evenly, facing +x,
+    /// centre at z = 1.
     pub(crate) fn one_rectangle(width_m: f64, height_m: f64, texture: Texture) -> Building {
         let mut builder = Builder::new(4.0);
         let wall = WallSegment { a_m: Point2::new(0.0, 5.0), b_m: Point2::new(0.0, -5.0) };

@@ -1,5 +1,5 @@
-//! A building: flat textured rectangles in the map frame, walls as lines for the laser, and the exact truth about its
-//! landmarks. Read only; `builder` makes it, `corridor` lays it out.
+//! A building: flat textured rectangles in the map frame, walls as lines for the laser, and the
+//! exact truth about its landmarks. Read only; `builder` makes it, `corridor` lays it out.
 
 pub use crate::wall::WallSegment;
 
@@ -38,7 +38,8 @@ pub struct LandmarkTruth {
     pub name: String,
     /// Kind of the landmark.
     pub kind: LandmarkKind,
-    /// Landmark frame: origin at the centre, x outward (towards the viewer), y the viewer's right, z up.
+    /// Landmark frame: origin at the centre, x outward (towards the viewer), y the viewer's right,
+    /// z up.
     pub map_from_landmark: Isometry3<f64>,
     /// Extent along y, metres.
     pub width_m: f64,
@@ -72,7 +73,8 @@ pub struct Surface {
     pub height_m: f64,
     /// Reflectance, 0 to 255.
     pub texture: Arc<Texture>,
-    /// Width and height of one repetition of the texture, metres; the surface's size when it does not repeat.
+    /// Width and height of one repetition of the texture, metres; the surface's size when it does
+    /// not repeat.
     pub texture_m: [f64; 2],
     /// Index into [`Building::landmarks`] if it is one.
     pub landmark: Option<usize>,

@@ -1,5 +1,5 @@
-//! A simulated camera: intrinsics and image size, with a table of the undistorted pinhole's pixel for each pixel, and
-//! tiles of pixels for quick rejection.
+//! A simulated camera: intrinsics and image size, with a table of the undistorted pinhole's pixel
+//! for each pixel, and tiles of pixels for quick rejection.
 
 use std::ops::Range;
 

@@ -1,6 +1,6 @@
-//! Drawing for the texture generators: flat fills, discs, polygons, noise and block letters on a grey canvas.
-//! Units are canvas widths (x 0 to 1, y 0 to height/width), so that a drawing does not depend on its resolution;
-//! greys run from 0 to 1. It has what the posters need.
+//! Drawing for the texture generators: flat fills, discs, polygons, noise and block letters on a
+//! grey canvas. Units are canvas widths (x 0 to 1, y 0 to height/width), so that a drawing does not
+//! depend on its resolution; greys run from 0 to 1. It has what the posters need.
 
 use crate::font;
 use crate::texture::{Edge, Texture};
@@ -157,13 +157,15 @@ impl Canvas {
         });
     }
 
-    /// Clouds: `octaves` of value noise, `cells` lattice cells per canvas width at the coarsest, blended over the
-    /// canvas with `strength` (0 to 1). Repeats with the canvas when that is square.
+    /// Clouds: `octaves` of value noise, `cells` lattice cells per canvas width at the coarsest,
+    /// blended over the canvas with `strength` (0 to 1). Repeats with the canvas when that is
+    /// square.
     pub(crate) fn clouds(&mut self, area: Area, noise: &Noise, strength: f32) {
         self.paint(area, |x, y, under| under + strength * (noise.at(x, y) - 0.5));
     }
 
-    /// Block letters, `height` tall, top left corner at (x, y); unknown letters are blank. Returns the width.
+    /// Block letters, `height` tall, top left corner at (x, y); unknown letters are blank. Returns
+    /// the width.
     pub(crate) fn text(&mut self, [x, y]: [f32; 2], height: f32, text: &str, grey: f32) -> f32 {
         let dot = height / font::ROWS as f32;
         for (i, letter) in text.chars().enumerate() {
@@ -180,7 +182,8 @@ impl Canvas {
     }
 }
 
-/// Value noise on lattices that repeat: `cells` a canvas width at the coarsest octave, twice as many at each next.
+/// Value noise on lattices that repeat: `cells` a canvas width at the coarsest octave, twice as
+/// many at each next.
 #[derive(Debug, Clone)]
 pub(crate) struct Noise {
     octaves: Vec<Lattice>,
@@ -224,7 +227,8 @@ impl Lattice {
         upper + b * (lower - upper)
     }
 
-    /// The two lattice points around a position that is not negative, and a smooth step from the first to the second.
+    /// The two lattice points around a position that is not negative, and a smooth step from the
+    /// first to the second.
     fn around(&self, x: f32) -> (usize, usize, f32) {
         let x = (x * self.cells as f32).max(0.0);
         let i = x as usize;

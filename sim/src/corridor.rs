@@ -1,5 +1,6 @@
-//! The corridor of the paper: 25 m long, with doors, windows, lamps, a column and posters on both sides and at the
-//! ends (method 18, E10). Everything that is not a parameter follows from the seed.
+//! The corridor of the paper: 25 m long, with doors, windows, lamps, a column and posters on both
+//! sides and at the ends (method 18, E10). Everything that is not a parameter follows from the
+//! seed.
 
 use std::sync::Arc;
 
@@ -29,7 +30,8 @@ pub struct CorridorParams {
     pub width_m: f64,
     /// Height of the ceiling, 2.3 to 6 m.
     pub height_m: f64,
-    /// Posters, at most [`MAX_POSTERS`]: alternately left and right, the last two on the far and the near end wall.
+    /// Posters, at most [`MAX_POSTERS`]: alternately left and right, the last two on the far and
+    /// the near end wall.
     pub posters: usize,
     /// Height of the posters' centres.
     pub poster_centre_z_m: f64,
@@ -37,7 +39,8 @@ pub struct CorridorParams {
     pub poster_size_m: [f64; 2],
     /// First poster's picture; landmark `poster-i` shows poster `first_poster + i`.
     pub first_poster: u64,
-    /// Number of different pictures: poster `i` shows the picture of poster `i - pictures`; 0: all differ.
+    /// Number of different pictures: poster `i` shows the picture of poster `i - pictures`; 0: all
+    /// differ.
     pub pictures: usize,
     /// Number of last posters that show a picture of their own in any case.
     pub unique_posters: usize,
@@ -233,7 +236,8 @@ impl<'a> Site<'a> {
         }
     }
 
-    /// Hangs an object with its centre at `x_m` if the place is free; with `must` at the nearest free place.
+    /// Hangs an object with its centre at `x_m` if the place is free; with `must` at the nearest
+    /// free place.
     fn put(&mut self, side: usize, x_m: f64, object: &WallObject, must: bool) -> bool {
         let Side { wall: Some(wall), left, taken } = &mut self.sides[side] else { return false };
         let half = 0.5 * object.size_m[0] + 0.2;

@@ -1,5 +1,5 @@
-//! A robot drives up and down a corridor: true pose, odometry and camera direction, step by step. It follows its true
-//! path; [`crate::robot`] adds what camera and laser measure.
+//! A robot drives up and down a corridor: true pose, odometry and camera direction, step by step.
+//! It follows its true path; [`crate::robot`] adds what camera and laser measure.
 
 use std::sync::Arc;
 
@@ -112,7 +112,8 @@ pub struct Drive {
 }
 
 impl Drive {
-    /// A drive along the middle of the building's longer side. Parameters are clamped to their ranges.
+    /// A drive along the middle of the building's longer side. Parameters are clamped to their
+    /// ranges.
     pub fn new(building: Arc<Building>, params: &DriveParams) -> Self {
         let p = clamped(params);
         let path = middle(&building, p.end_gap_m);
@@ -146,7 +147,8 @@ impl Drive {
         let d = self.path[1] - self.path[0];
         let length = d.norm().max(1e-9);
         let d = d / length;
-        // The swerve fades out towards the ends, so that turning on the spot starts from the middle.
+        // The swerve fades out towards the ends, so that turning on the spot starts from the
+        // middle.
         let fade = |s: f64| (s / 1.5).clamp(0.0, 1.0).powi(2) * (3.0 - 2.0 * (s / 1.5).clamp(0.0, 1.0));
         let side = |s: f64| {
             let wave = (std::f64::consts::TAU * s / self.p.weave_length_m + self.weave_phase).sin();

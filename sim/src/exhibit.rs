@@ -1,6 +1,6 @@
-//! One picture on a plastered wall, rendered under conditions that are set one by one, for experiments that vary a
-//! single condition (method 18). In: conditions and a seed. Out: an image and the exact corners; equal input gives
-//! equal bytes.
+//! One picture on a plastered wall, rendered under conditions that are set one by one, for
+//! experiments that vary a single condition (method 18). In: conditions and a seed. Out: an image
+//! and the exact corners; equal input gives equal bytes.
 
 mod conditions;
 
@@ -36,7 +36,8 @@ const EDGE_SAMPLES: usize = 3;
 pub enum Extent {
     /// The whole image.
     Whole,
-    /// The picture with a third of its larger side around it: enough for recognition by given corners, and faster.
+    /// The picture with a third of its larger side around it: enough for recognition by given
+    /// corners, and faster.
     Around,
 }
 
@@ -49,8 +50,9 @@ pub struct Exhibit {
     pub corners: Corners,
 }
 
-/// The picture on the wall (a texture that repeats, such as [`crate::surfaces::plaster`]) under `conditions`; noise
-/// follows from `draw`. `None` if the picture does not lie within the camera's image, or is no quad there.
+/// The picture on the wall (a texture that repeats, such as [`crate::surfaces::plaster`]) under
+/// `conditions`; noise follows from `draw`. `None` if the picture does not lie within the camera's
+/// image, or is no quad there.
 pub fn exhibit(
     picture: &Texture,
     wall: &Texture,
@@ -153,7 +155,8 @@ impl<'a> Stage<'a> {
         let (right, down) = (self.unit(u + 1.0, v), self.unit(u, v + 1.0));
         let [du, dv] = [right, down].map(|p| [p[0] - here[0], p[1] - here[1]]);
         let reach = [0, 1].map(|i| 0.5 * (du[i].abs() + dv[i].abs()));
-        // Distances to the picture's border and to the cover's edge, in units of the pixel's extent.
+        // Distances to the picture's border and to the cover's edge, in units of the pixel's
+        // extent.
         let crosses = |half: f64| {
             let off = [0, 1].map(|i| ((here[i] - 0.5).abs() - half) / reach[i].max(1e-12));
             off[0].max(off[1]).abs() < 1.0

@@ -1,5 +1,5 @@
-//! The evaluation format (`truth.json`) as plain values, with camera poses besides, and pictures as PGM bytes.
-//! Writes no files: the caller does.
+//! The evaluation format (`truth.json`) as plain values, with camera poses besides, and pictures as
+//! PGM bytes. Writes no files: the caller does.
 
 use std::collections::BTreeMap;
 
@@ -129,7 +129,8 @@ pub struct Labels<'a> {
     pub taught: &'a [String],
     /// Quads with a shorter side are left out.
     pub min_side_px: f64,
-    /// Whether the list holds every quad. Floor tiles, ceiling panels and whole walls are never listed.
+    /// Whether the list holds every quad. Floor tiles, ceiling panels and whole walls are never
+    /// listed.
     pub complete: bool,
 }
 

@@ -59,7 +59,8 @@ const SIGNS: [(char, [u8; ROWS]); 12] = [
     ('>', [0x08, 0x04, 0x02, 0x01, 0x02, 0x04, 0x08]),
 ];
 
-/// The rows of a letter, top first, most significant of five bits at the left. Unknown characters are blank.
+/// The rows of a letter, top first, most significant of five bits at the left. Unknown characters
+/// are blank.
 pub fn glyph(letter: char) -> [u8; ROWS] {
     match letter {
         'A'..='Z' => GLYPHS[letter as usize - 'A' as usize],

@@ -1,5 +1,5 @@
-//! A landmark of a building in, the same with a frame around its picture and with the shadow that it casts on its wall
-//! out. The place and the outer size of the landmark stay.
+//! A landmark of a building in, the same with a frame around its picture and with the shadow that
+//! it casts on its wall out. The place and the outer size of the landmark stay.
 
 use std::sync::Arc;
 
@@ -11,7 +11,8 @@ use crate::texture::{Edge, Footprint, Texture};
 
 /// Size of a texel of a shadow, metres.
 const SHADOW_TEXEL_M: f64 = 0.002;
-/// Distance of the shadow's layer from the landmark's face, metres: less than any landmark's from its wall.
+/// Distance of the shadow's layer from the landmark's face, metres: less than any landmark's from
+/// its wall.
 const BEHIND_M: f64 = 0.003;
 /// Farthest wall behind a landmark, metres.
 const WALL_WITHIN_M: f64 = 0.05;
@@ -32,8 +33,8 @@ pub struct Framing {
 }
 
 impl Building {
-    /// The building with this frame and shadow around the landmark `name`. Without such a landmark, or a wall within 5 cm
-    /// behind it, it is the same.
+    /// The building with this frame and shadow around the landmark `name`. Without such a landmark,
+    /// or a wall within 5 cm behind it, it is the same.
     #[must_use]
     pub fn framed(mut self, name: &str, framing: &Framing) -> Self {
         let Some(index) = self.surfaces.iter().position(|s| s.landmark.is_some() && s.name == name) else {
@@ -46,7 +47,8 @@ impl Building {
         self
     }
 
-    /// The wall behind a landmark as a layer of its own, darker where the shadow is. Its light is in its texture.
+    /// The wall behind a landmark as a layer of its own, darker where the shadow is. Its light is
+    /// in its texture.
     fn shadow(&self, landmark: &Surface, framing: &Framing) -> Option<Surface> {
         let reach = framing.shadow_m.map(f64::abs);
         let margin = reach[0].max(reach[1]) + framing.penumbra_m;
@@ -145,7 +147,8 @@ mod tests {
         };
         let ratio =
             |look: &mut dyn FnMut(&Building, [f64; 2]) -> f64, at| look(&framed, at) / look(&plain, at);
-        // The poster is 0.60 x 0.84 m: the frame, the shadow on the right and below, the wall on the left and above.
+        // The poster is 0.60 x 0.84 m: the frame, the shadow on the right and below, the wall on
+        // the left and above.
         assert!(look(&framed, [-0.28, 0.0]) < 0.3 * 255.0);
         assert!((ratio(&mut look, [0.31, 0.0]) - 0.5).abs() < 0.05);
         assert!((ratio(&mut look, [0.0, -0.435]) - 0.5).abs() < 0.05);

@@ -1,5 +1,5 @@
-//! Ideal gaze controller on ground-truth poses; not `map::gaze`. The camera is aimed at the poster with the best
-//! view, at the speed of the pan-tilt unit, otherwise ahead.
+//! Ideal gaze controller on ground-truth poses; not `map::gaze`. The camera is aimed at the poster
+//! with the best view, at the speed of the pan-tilt unit, otherwise ahead.
 
 use map::extrinsics::pan_tilt;
 use map::pose2::{Pose2, wrap_rad};
@@ -89,7 +89,8 @@ impl Gaze {
         self.target.clone()
     }
 
-    /// Quality of the view of a poster; `None` without a view. The present target gets a bonus against flicker.
+    /// Quality of the view of a poster; `None` without a view. The present target gets a bonus
+    /// against flicker.
     fn score(&self, building: &Building, map_from_robot: &Pose2, l: &LandmarkTruth) -> Option<f64> {
         if !self.p.look_at_posters {
             return None;

@@ -21,7 +21,8 @@ pub struct LaserParams {
     pub robot_from_laser: Pose2,
     /// Beams over the field of view, 2 to [`MAX_BEAMS`].
     pub beams: usize,
-    /// Angle from the first beam (right) to the last (left), 0.01 to one turn; centred on the laser's x axis.
+    /// Angle from the first beam (right) to the last (left), 0.01 to one turn; centred on the
+    /// laser's x axis.
     pub field_rad: f64,
     /// Range beyond which there is no return, 0.5 to 200 m.
     pub max_range_m: f64,

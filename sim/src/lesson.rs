@@ -1,5 +1,5 @@
-//! Stops of a robot that learns landmarks: in front of every poster, and on request every door and window, at several
-//! distances and angles, camera aimed at it.
+//! Stops of a robot that learns landmarks: in front of every poster, and on request every door and
+//! window, at several distances and angles, camera aimed at it.
 
 use map::pose2::Pose2;
 use nalgebra::{Point2, Point3};
@@ -59,12 +59,13 @@ impl Default for LessonParams {
 pub struct Stop {
     /// Name of the landmark.
     pub landmark: String,
-    /// The step of the robot at the stop: odometry equals truth, as for a robot that a laser localises.
+    /// The step of the robot at the stop: odometry equals truth, as for a robot that a laser
+    /// localises.
     pub step: Step,
 }
 
-/// Stops before all posters (and doors and windows), in the building's order; fewer if there is no room. Views go
-/// from one side to the other, one per equal share of the angles.
+/// Stops before all posters (and doors and windows), in the building's order; fewer if there is no
+/// room. Views go from one side to the other, one per equal share of the angles.
 pub fn stops(building: &Building, params: &LessonParams) -> Vec<Stop> {
     let mut all = vec![];
     let learnt = building.landmarks().iter().filter(|l| match l.kind {
@@ -93,7 +94,8 @@ pub fn stops(building: &Building, params: &LessonParams) -> Vec<Stop> {
     all
 }
 
-/// The point of the floor at a share (0 to 1) of the angles and of the distances; `None` if the robot does not fit.
+/// The point of the floor at a share (0 to 1) of the angles and of the distances; `None` if the
+/// robot does not fit.
 fn viewpoint(
     building: &Building,
     l: &LandmarkTruth,

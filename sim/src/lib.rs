@@ -1,5 +1,6 @@
-//! A rendered building with robots and exact truth: what a camera, a laser and wheel encoders would measure in a
-//! corridor with posters, and where everything really was. For the demo, the tests and the evaluation.
+//! A rendered building with robots and exact truth: what a camera, a laser and wheel encoders would
+//! measure in a corridor with posters, and where everything really was. For the demo, the tests and
+//! the evaluation.
 //!
 //! Pure: no file, clock, socket or thread. The same seeds give the same bytes.
 //!
@@ -26,9 +27,9 @@
 //! }
 //! ```
 //!
-//! Coordinate frames and corner order are those of method 0.2; surfaces and landmarks have x outward, y the
-//! viewer's right, z up. Modules are in reading order: textures, building, camera and rendering, other sensors,
-//! robots, sets.
+//! Coordinate frames and corner order are those of method 0.2; surfaces and landmarks have x
+//! outward, y the viewer's right, z up. Modules are in reading order: textures, building, camera
+//! and rendering, other sensors, robots, sets.
 
 pub(crate) mod seed;
 pub mod font;

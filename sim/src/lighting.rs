@@ -1,5 +1,5 @@
-//! Light: lamps under the ceiling, falling off with the square of the distance, and the diffuse rest. Baked once per
-//! surface into a coarse grid; no shadows.
+//! Light: lamps under the ceiling, falling off with the square of the distance, and the diffuse
+//! rest. Baked once per surface into a coarse grid; no shadows.
 
 use nalgebra::{Isometry3, Point3};
 

@@ -1,5 +1,5 @@
-//! Look-alikes: pairs of pictures that are nearly equal, such as two editions of a poster, two doors of a corridor,
-//! a mirror image. In: a picture and a kind of change. Out: the pair.
+//! Look-alikes: pairs of pictures that are nearly equal, such as two editions of a poster, two
+//! doors of a corridor, a mirror image. In: a picture and a kind of change. Out: the pair.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -51,8 +51,8 @@ impl LookAlikeKind {
     }
 }
 
-/// Two pictures that differ by `change`: `picture` (for doors a door; for text with a line of letters) and its
-/// look-alike.
+/// Two pictures that differ by `change`: `picture` (for doors a door; for text with a line of
+/// letters) and its look-alike.
 pub fn lookalikes(picture: &Texture, change: LookAlikeKind, draw: u64) -> [Texture; 2] {
     let mut rng = seed::stream(draw, 0x6c6f_6f6b);
     match change {
@@ -130,14 +130,15 @@ fn mapped_from(picture: &Texture, from: impl Fn(usize, usize) -> (usize, usize))
     Texture::new(width, height, (0..width * height).map(texel).collect(), Edge::Clamp)
 }
 
-/// A picture made of the left half of one and the right half of another: what a quad over two neighbours shows.
+/// A picture made of the left half of one and the right half of another: what a quad over two
+/// neighbours shows.
 pub fn halves(left: &Texture, right: &Texture) -> Texture {
     let other = Canvas::of(right);
     mapped(left, |s, t, grey| if s < 0.5 { grey } else { other.grey_at(s, t) })
 }
 
-/// The rectangle that covers a picture less its outer part, as a share of its sides: as for a quad detected too far
-/// inside.
+/// The rectangle that covers a picture less its outer part, as a share of its sides: as for a quad
+/// detected too far inside.
 pub fn part(picture: &Texture, [left, top, right, bottom]: [f32; 4]) -> Texture {
     let canvas = Canvas::of(picture);
     let area =

@@ -7,14 +7,15 @@ use serde::{Deserialize, Serialize};
 
 use crate::seed;
 
-/// Errors of odometry. By default it drifts by more than a metre in 25 m: without landmarks the robot would hit the
-/// left wall (method 18, E10).
+/// Errors of odometry. By default it drifts by more than a metre in 25 m: without landmarks the
+/// robot would hit the left wall (method 18, E10).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct OdometryParams {
     /// Measured length / true length - 1.
     pub scale_error: f64,
-    /// Measured turn without a true one, rad per metre; negative: a robot that corrects it turns left.
+    /// Measured turn without a true one, rad per metre; negative: a robot that corrects it turns
+    /// left.
     pub heading_bias_rad_per_m: f64,
     /// Standard deviation of the length after one metre.
     pub length_sigma_m: f64,

@@ -1,5 +1,5 @@
-//! The office of the guides: a room with four posters, where each photograph in it was taken, and what else the guides
-//! name: a laser log and floor plans. Everything follows from fixed seeds.
+//! The office of the guides: a room with four posters, where each photograph in it was taken, and
+//! what else the guides name: a laser log and floor plans. Everything follows from fixed seeds.
 
 use std::fmt::Write as _;
 
@@ -121,8 +121,8 @@ pub fn laser_log(building: &Building) -> String {
     log
 }
 
-/// The walls of the office for other programs, by file name: a grid of `map_server`, GeoJSON, and an SVG floor plan
-/// (1 px = 1 cm).
+/// The walls of the office for other programs, by file name: a grid of `map_server`, GeoJSON, and
+/// an SVG floor plan (1 px = 1 cm).
 pub fn floor_plans(building: &Building) -> Vec<(&'static str, Vec<u8>)> {
     const CELL_M: f64 = 0.05;
     let (origin, width, height) = ([-1.0, -4.0], 240_usize, 160_usize);

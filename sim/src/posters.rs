@@ -1,5 +1,6 @@
-//! Posters: a different picture for every seed, with a ground, two or three motifs, block letters, and a border or
-//! none. The picture fills the quad, frame included. `corridor` hangs them; `surfaces` draws the building itself.
+//! Posters: a different picture for every seed, with a ground, two or three motifs, block letters,
+//! and a border or none. The picture fills the quad, frame included. `corridor` hangs them;
+//! `surfaces` draws the building itself.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -18,7 +19,8 @@ pub fn poster(seed: u64) -> Texture {
     poster_of_size(seed, POSTER_WIDTH_TEXELS, 1.4)
 }
 
-/// The poster of a seed at another resolution (8 to 2048 texels wide, clamped) and height/width (0.25 to 4, clamped).
+/// The poster of a seed at another resolution (8 to 2048 texels wide, clamped) and height/width
+/// (0.25 to 4, clamped).
 pub fn poster_of_size(seed: u64, width_texels: usize, aspect: f32) -> Texture {
     let width = width_texels.clamp(8, MAX_POSTER_WIDTH_TEXELS);
     let aspect = if aspect.is_finite() { aspect.clamp(0.25, 4.0) } else { 1.0 };

@@ -1,5 +1,6 @@
-//! Rasterisation: the surfaces visible in each pixel and their shares. A depth buffer for pixels inside one
-//! surface, 64 samples for those on an edge; edges are accurate to about a hundredth of a pixel. `render` shades.
+//! Rasterisation: the surfaces visible in each pixel and their shares. A depth buffer for pixels
+//! inside one surface, 64 samples for those on an edge; edges are accurate to about a hundredth of
+//! a pixel. `render` shades.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -10,7 +11,8 @@ use crate::camera::{Camera, TILE_PX};
 pub(crate) const NOTHING: u16 = u16::MAX;
 /// End of a pixel's list of fragments.
 const END: u32 = u32::MAX;
-/// Samples per pixel on an edge; a Hammersley set, so that each row and each column of the pixel has 64 steps.
+/// Samples per pixel on an edge; a Hammersley set, so that each row and each column of the pixel
+/// has 64 steps.
 pub(crate) const SAMPLES: usize = 64;
 
 /// A surface in one camera's view: linear functions of the undistorted pixel (u, v, 1).
@@ -18,8 +20,8 @@ pub(crate) const SAMPLES: usize = 64;
 pub(crate) struct View {
     /// Index of the surface.
     pub(crate) index: u16,
-    /// Numerators of the relative position s (right) and t (down), 0 to 1 over the surface, and the denominator,
-    /// which is the inverse depth in 1/m.
+    /// Numerators of the relative position s (right) and t (down), 0 to 1 over the surface, and the
+    /// denominator, which is the inverse depth in 1/m.
     pub(crate) s: [f32; 3],
     pub(crate) t: [f32; 3],
     pub(crate) w: [f32; 3],
@@ -189,7 +191,8 @@ impl Raster {
         mask
     }
 
-    /// Calls `f(view number, share)` for every view visible in a pixel. Shares sum to 1 if the pixel is covered.
+    /// Calls `f(view number, share)` for every view visible in a pixel. Shares sum to 1 if the
+    /// pixel is covered.
     pub(crate) fn resolve(&mut self, pixel: usize, camera: &Camera, mut f: impl FnMut(usize, f32)) {
         let owner = self.owner[pixel];
         if self.first[pixel] == END {

@@ -1,5 +1,6 @@
-//! The camera's view of a building: visibility, textures filtered over each pixel's footprint, light, sensor; and
-//! the exact truth of the picture. Same building, camera, pose, parameters and seed: same bytes.
+//! The camera's view of a building: visibility, textures filtered over each pixel's footprint,
+//! light, sensor; and the exact truth of the picture. Same building, camera, pose, parameters and
+//! seed: same bytes.
 
 use nalgebra::Isometry3;
 use vision::frame::GrayImage;
@@ -40,7 +41,8 @@ impl Renderer {
         &self.camera
     }
 
-    /// The picture from a pose (camera frame: x right, y down, z forward). `seed` is for the noise alone.
+    /// The picture from a pose (camera frame: x right, y down, z forward). `seed` is for the noise
+    /// alone.
     pub fn render(
         &mut self,
         building: &Building,

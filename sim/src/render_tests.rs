@@ -1,5 +1,5 @@
-//! The renderer against independent computations: projection by hand, an edge fitted in the picture, rays cast at
-//! single pixels, a frontal texture.
+//! The renderer against independent computations: projection by hand, an edge fitted in the
+//! picture, rays cast at single pixels, a frontal texture.
 
 use nalgebra::{Isometry3, Matrix3, Point2, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use vision::frame::{Distortion, GrayImage, Intrinsics};
@@ -65,8 +65,8 @@ fn the_golden_frontal_view() {
     assert_eq!([column(141), column(142), column(143)], [0, 100, 200]);
 }
 
-/// Where the picture crosses half of `white` along a line of 13 samples through `p` in direction `n` (outwards): by
-/// the area under the profile, which is exact for any symmetric blur.
+/// Where the picture crosses half of `white` along a line of 13 samples through `p` in direction
+/// `n` (outwards): by the area under the profile, which is exact for any symmetric blur.
 fn crossing(image: &GrayImage, p: Point2<f64>, n: nalgebra::Vector2<f64>, white: f64) -> f64 {
     let steps = 600;
     let reach = 6.0;
@@ -315,7 +315,8 @@ fn a_mirrored_world_gives_a_mirrored_picture() {
     );
     for (v, u) in (0..120).flat_map(|v| (0..160).map(move |u| (v, u))) {
         let (a, b) = (left.image.at(u, v), right.image.at(159 - u, v));
-        // The samples within an edge pixel are not symmetric: an edge may differ by a few parts in 64.
+        // The samples within an edge pixel are not symmetric: an edge may differ by a few parts
+        // in 64.
         assert!(a.abs_diff(b) <= 6, "({u}, {v}): {a} {b}");
     }
 }

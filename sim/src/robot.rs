@@ -1,5 +1,5 @@
-//! A robot in a building: its drive with the readings of camera and laser at every step. Noise depends on the
-//! robot's seed and the step, not on the order of calls.
+//! A robot in a building: its drive with the readings of camera and laser at every step. Noise
+//! depends on the robot's seed and the step, not on the order of calls.
 
 use std::sync::Arc;
 
@@ -87,7 +87,8 @@ impl Robot {
         &mut self.drive
     }
 
-    /// The readings at a step, its own or any other. Noise follows from the robot's seed and the step's index.
+    /// The readings at a step, its own or any other. Noise follows from the robot's seed and the
+    /// step's index.
     pub fn look(&mut self, step: &Step) -> SensorReadings {
         let seed = seed::mix(self.seed ^ seed::mix(step.index));
         let blur_px = self.exposure_s * step.sweep_radps * self.camera().intrinsics().fx_px;

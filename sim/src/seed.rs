@@ -1,5 +1,5 @@
-//! One seed in, many independent streams out: every consumer names its own stream, so that a change in one never
-//! shifts the random numbers of another.
+//! One seed in, many independent streams out: every consumer names its own stream, so that a change
+//! in one never shifts the random numbers of another.
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

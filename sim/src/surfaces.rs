@@ -1,5 +1,5 @@
-//! Textures of the building itself: plaster, floor tiles, ceiling, baseboard, doors, windows, lamps, concrete.
-//! Everything is drawn from a seed; sizes in metres belong to `building`.
+//! Textures of the building itself: plaster, floor tiles, ceiling, baseboard, doors, windows,
+//! lamps, concrete. Everything is drawn from a seed; sizes in metres belong to `building`.
 
 use rand::RngExt;
 

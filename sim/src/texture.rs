@@ -1,6 +1,6 @@
-//! A grey picture for rendering from any distance and angle: a pyramid of halved levels, sampled over the area that
-//! a pixel covers on the surface (trilinear, several taps along the longer axis of that area). Coordinates run from
-//! 0 to 1 across the picture, s right and t down.
+//! A grey picture for rendering from any distance and angle: a pyramid of halved levels, sampled
+//! over the area that a pixel covers on the surface (trilinear, several taps along the longer axis
+//! of that area). Coordinates run from 0 to 1 across the picture, s right and t down.
 
 /// What lies beyond the border of a texture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -13,7 +13,8 @@ pub enum Edge {
 
 /// Most taps along the longer axis of a pixel's footprint.
 const MAX_TAPS: f32 = 16.0;
-/// A footprint less elongated than this counts as round and takes one tap: its axis would depend on rounding.
+/// A footprint less elongated than this counts as round and takes one tap: its axis would depend on
+/// rounding.
 const ROUND: f32 = 1.15;
 /// From sqrt(2) texels on, the next level is the nearer one.
 const NEXT_LEVEL: f32 = 0.414;
@@ -25,7 +26,8 @@ struct Level {
     data: Vec<u8>,
 }
 
-/// A grey texture with its pyramid; level 0 is the full picture, each next one half as wide and high.
+/// A grey texture with its pyramid; level 0 is the full picture, each next one half as wide and
+/// high.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Texture {
     levels: Vec<Level>,
@@ -43,8 +45,8 @@ pub struct Footprint {
 }
 
 impl Texture {
-    /// Builds the pyramid of a row-major picture of `width * height` bytes. Missing bytes are black, surplus ones
-    /// are dropped, an empty side becomes one texel: for generated pictures.
+    /// Builds the pyramid of a row-major picture of `width * height` bytes. Missing bytes are
+    /// black, surplus ones are dropped, an empty side becomes one texel: for generated pictures.
     pub fn new(width: usize, height: usize, mut data: Vec<u8>, edge: Edge) -> Self {
         let (width, height) = (width.max(1), height.max(1));
         data.resize(width * height, 0);
@@ -61,8 +63,8 @@ impl Texture {
         Self { parts, ..self }
     }
 
-    /// Rectangles drawn in it (frames, panes, panels, patches), left, top, right, bottom from 0 to 1: real quads
-    /// within the picture. Later shapes may cover one.
+    /// Rectangles drawn in it (frames, panes, panels, patches), left, top, right, bottom from 0 to
+    /// 1: real quads within the picture. Later shapes may cover one.
     pub fn parts(&self) -> &[[f32; 4]] {
         &self.parts
     }
@@ -161,7 +163,8 @@ fn mix(texels: [u8; 4], a: f32, b: f32) -> f32 {
     upper + b * (lower - upper)
 }
 
-/// `x` minus the next lower integer; quicker than `floor` where the processor has no instruction for it.
+/// `x` minus the next lower integer; quicker than `floor` where the processor has no instruction
+/// for it.
 fn fraction_of(x: f32) -> f32 {
     let rest = x - x as i32 as f32;
     if rest < 0.0 { rest + 1.0 } else { rest }
@@ -183,8 +186,8 @@ fn neighbours(x: f32, size: usize, edge: Edge) -> (usize, usize, f32) {
     (first, second, x - first as f32)
 }
 
-/// Pyramid level of a footprint of `texels` (at least 1): the exponent, and the mantissa as a linear stand-in for the
-/// fraction of the logarithm.
+/// Pyramid level of a footprint of `texels` (at least 1): the exponent, and the mantissa as a
+/// linear stand-in for the fraction of the logarithm.
 fn lod(texels: f32) -> (usize, f32) {
     let texels = texels.clamp(1.0, 1e6);
     let exponent = (texels.to_bits() >> 23) - 127;

@@ -1,5 +1,5 @@
-//! Ground truth of an image: corners, visible share and angle of each landmark. Corners are projected; the shares
-//! come from the depth buffer.
+//! Ground truth of an image: corners, visible share and angle of each landmark. Corners are
+//! projected; the shares come from the depth buffer.
 
 use nalgebra::{Isometry3, Point2, Point3};
 use vision::geometry::{Corners, polygon};
@@ -54,9 +54,10 @@ impl LandmarkView {
         self.sides_px.iter().copied().fold(f64::INFINITY, f64::min)
     }
 
-    /// Intersection over union of its outline and a quad, 0 to 1. If the border of an image of `size_px` (width, height)
-    /// cuts it, the parts inside count: the quad then ends near the border. What of the quad lies outside is taken to
-    /// overlap there, so the overlap inside is never overestimated.
+    /// Intersection over union of its outline and a quad, 0 to 1. If the border of an image of
+    /// `size_px` (width, height) cuts it, the parts inside count: the quad then ends near the
+    /// border. What of the quad lies outside is taken to overlap there, so the overlap inside is
+    /// never overestimated.
     pub fn visible_iou(&self, quad: &Corners, size_px: [usize; 2]) -> f64 {
         let (found, real) = (quad.points(), self.corners_px.points());
         let whole = polygon::iou(found, real);
@@ -77,8 +78,8 @@ impl LandmarkView {
 pub struct FrameTruth {
     /// Pose of the camera.
     pub map_from_camera: Isometry3<f64>,
-    /// Landmarks of which a part is visible and whose corners all lie in front of the camera, in the building's
-    /// order.
+    /// Landmarks of which a part is visible and whose corners all lie in front of the camera, in
+    /// the building's order.
     pub landmarks: Vec<LandmarkView>,
 }
 

@@ -1,6 +1,6 @@
-//! The rendered set for detection: corridors of all proportions by hand-held cameras, with exact truth. In: a seed.
-//! Out: images with their entries; the same parameters give the same bytes. The entries mark which quads count.
-//! Writes no files.
+//! The rendered set for detection: corridors of all proportions by hand-held cameras, with exact
+//! truth. In: a seed. Out: images with their entries; the same parameters give the same bytes. The
+//! entries mark which quads count. Writes no files.
 
 use std::f64::consts::TAU;
 
@@ -147,7 +147,8 @@ fn building(seed: u64, number: usize) -> Building {
     Building::corridor_with(&params, rng.random())
 }
 
-/// A camera that has a poster, door or window wholly in view, large enough and not too oblique to count.
+/// A camera that has a poster, door or window wholly in view, large enough and not too oblique to
+/// count.
 fn pose(building: &Building, camera: &Camera, p: &ViewsParams, rng: &mut ChaCha8Rng) -> Isometry3<f64> {
     let kind = match rng.random_range(0..10) {
         0..5 => LandmarkKind::Poster,
@@ -199,7 +200,8 @@ fn stand(
     Some(Isometry3::from_parts(Translation3::from(place.coords), rotation))
 }
 
-/// Three pictures of five from a decent camera in good light, one in poor light, one out of focus or moving.
+/// Three pictures of five from a decent camera in good light, one in poor light, one out of focus
+/// or moving.
 fn sensor(number: usize, rng: &mut ChaCha8Rng) -> (&'static str, SensorParams) {
     let usual = SensorParams {
         exposure: rng.random_range(0.75..1.1),
@@ -225,8 +227,9 @@ fn counts(quad: &QuadEntry, p: &ViewsParams) -> bool {
         && quad.view_angle_rad <= p.max_view_angle_rad
 }
 
-/// Walls, levels, baseboards as a whole, and the rectangles drawn on doors, windows, lamps and posters, if all
-/// corners lie in front of the camera. Floor tiles and ceiling panels are not listed: a pattern is no object.
+/// Walls, levels, baseboards as a whole, and the rectangles drawn on doors, windows, lamps and
+/// posters, if all corners lie in front of the camera. Floor tiles and ceiling panels are not
+/// listed: a pattern is no object.
 fn others(building: &Building, camera: &Camera, map_from_camera: &Isometry3<f64>) -> Vec<Corners> {
     let mut found = vec![];
     for surface in building.surfaces() {

@@ -30,7 +30,8 @@ impl WallSegment {
     }
 }
 
-/// Distance along a unit direction to the nearest wall within `max_m`, from either side of it, metres.
+/// Distance along a unit direction to the nearest wall within `max_m`, from either side of it,
+/// metres.
 pub(crate) fn range(
     walls: &[WallSegment],
     from_m: &Point2<f64>,

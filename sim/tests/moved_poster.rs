@@ -1,6 +1,6 @@
-//! Claim: a poster that was moved by a metre is flagged and quarantined, no other landmark is, and the pose stays
-//! good. Corners are the exact truth with noise, motion is drifting odometry; a frame is processed as in the
-//! server.
+//! Claim: a poster that was moved by a metre is flagged and quarantined, no other landmark is, and
+//! the pose stays good. Corners are the exact truth with noise, motion is drifting odometry; a
+//! frame is processed as in the server.
 
 use std::{collections::BTreeMap, sync::Arc};
 
@@ -40,7 +40,8 @@ struct DriveFigures {
     quarantined: bool,
     wrongly_flagged: usize,
     worst_error_m: f64,
-    /// 95 % quantile of the position error, and its maximum once two landmarks have corrected the pose.
+    /// 95 % quantile of the position error, and its maximum once two landmarks have corrected the
+    /// pose.
     p95_error_m: f64,
     settled_error_m: f64,
     with_two_others: bool,
@@ -163,8 +164,8 @@ impl Robot {
     }
 }
 
-/// Drives three times through a corridor with four posters; the map has one of them a metre off along its wall.
-/// With `hidden` that one is never visible.
+/// Drives three times through a corridor with four posters; the map has one of them a metre off
+/// along its wall. With `hidden` that one is never visible.
 fn drive(seed: u64, length_m: f64, moved: usize, hidden: bool) -> DriveFigures {
     let params = CorridorParams { length_m, posters: 4, ..CorridorParams::default() };
     let building = Arc::new(Building::corridor_with(&params, seed));
@@ -243,7 +244,8 @@ fn a_moved_poster_is_quarantined_and_the_pose_stays_good() {
         for moved in [1, 2] {
             let run = drive(seed, 12.0, moved, false);
             println!("{seed} {moved} {run:?}");
-            // Until two others are observed it may be any of them; it is flagged once the third agrees.
+            // Until two others are observed it may be any of them; it is flagged once the third
+            // agrees.
             assert!(run.fixes_until_flagged.expect("flagged") <= 5, "{seed} {moved}: {run:?}");
             assert!(run.quarantined, "{seed} {moved}: {run:?}");
             assert_eq!(run.wrongly_flagged, 0, "{seed} {moved}: {run:?}");

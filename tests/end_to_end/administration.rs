@@ -1,5 +1,6 @@
-//! Claim: the commands against a running server teach, show and change its maps, say what to do next, ask before they
-//! destroy, and end with an exit status for each class of failure. What is refused leaves nothing behind.
+//! Claim: the commands against a running server teach, show and change its maps, say what to do
+//! next, ask before they destroy, and end with an exit status for each class of failure. What is
+//! refused leaves nothing behind.
 
 use client::api::{LandmarkStatus, WallBody};
 use serde_json::Value;
@@ -48,7 +49,8 @@ impl Desk {
         run.stdout
     }
 
-    /// Runs one that must fail with this status, with and without --json. Gives the sentence for people.
+    /// Runs one that must fail with this status, with and without --json. Gives the sentence for
+    /// people.
     fn failed(&self, line: &str, status: i32, code: &str) -> String {
         let run = self.run(line);
         assert_eq!((run.status, run.stdout.as_str()), (status, ""), "`{line}`: {run:?}");

@@ -1,4 +1,5 @@
-//! Claim: a request that two programs may read differently is refused over a real connection, with what to send instead.
+//! Claim: a request that two programs may read differently is refused over a real connection, with
+//! what to send instead.
 
 use client::api::NewMap;
 use server::config::Limits;

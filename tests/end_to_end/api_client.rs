@@ -1,5 +1,5 @@
-//! Claim: the client covers the HTTP interface: each operation of the OpenAPI document has a method, and the
-//! methods of each resource work against a real server.
+//! Claim: the client covers the HTTP interface: each operation of the OpenAPI document has a
+//! method, and the methods of each resource work against a real server.
 
 use client::{
     Capture, ClientError, LandmarkRegion, MapClient, NewView,

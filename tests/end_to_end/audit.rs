@@ -1,5 +1,5 @@
-//! Claim: every change over HTTP is in the audit log with who made it, whatever the operation; a kill leaves the log whole;
-//! the command finds a log that is not what was noted.
+//! Claim: every change over HTTP is in the audit log with who made it, whatever the operation; a
+//! kill leaves the log whole; the command finds a log that is not what was noted.
 
 use client::{
     LandmarkRegion,

@@ -1,5 +1,5 @@
-//! Claim: a backup of a running server is a state that existed, and restores to it; a changed byte is refused and named; a
-//! running server is not replaced, and what is replaced stays.
+//! Claim: a backup of a running server is a state that existed, and restores to it; a changed byte
+//! is refused and named; a running server is not replaced, and what is replaced stays.
 
 use client::{
     ClientError, LandmarkRegion, MapClient,
@@ -28,7 +28,8 @@ fn text(path: &Path) -> &str {
     path.to_str().expect("text")
 }
 
-/// Makes landmarks `l00000`, `l00001` ... until the server is gone. Gives the map's version after each.
+/// Makes landmarks `l00000`, `l00001` ... until the server is gone. Gives the map's version after
+/// each.
 async fn make_landmarks(maps: MapClient) -> Vec<u64> {
     let mut versions = Vec::new();
     for number in 0.. {

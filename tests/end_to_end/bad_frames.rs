@@ -1,5 +1,5 @@
-//! Claim: an invalid frame gets a `rejected` answer with a stable code and the field at fault; the server answers
-//! the next good frame, and every frame is counted.
+//! Claim: an invalid frame gets a `rejected` answer with a stable code and the field at fault; the
+//! server answers the next good frame, and every frame is counted.
 
 use client::{
     Delivery, RobotClient, RobotOptions,

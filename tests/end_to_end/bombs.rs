@@ -1,4 +1,5 @@
-//! Claim: hostile images, sent as photographs and as frames, are refused with the right code and cost the server little memory.
+//! Claim: hostile images, sent as photographs and as frames, are refused with the right code and
+//! cost the server little memory.
 
 use client::{
     Delivery, RobotClient, RobotOptions,

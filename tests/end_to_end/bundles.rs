@@ -1,4 +1,5 @@
-//! Claim: a map that is saved and loaded into an empty server gives the same answers, and is saved as the same bytes again.
+//! Claim: a map that is saved and loaded into an empty server gives the same answers, and is saved
+//! as the same bytes again.
 
 use client::{
     MapClient,

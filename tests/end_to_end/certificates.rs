@@ -1,5 +1,6 @@
-//! Claim: on an encrypted endpoint a robot reaches its own keys alone, key by key; without a valid certificate nobody reaches
-//! anything; a revoked certificate gives nothing any more, at once; and private keys are nobody else's.
+//! Claim: on an encrypted endpoint a robot reaches its own keys alone, key by key; without a valid
+//! certificate nobody reaches anything; a revoked certificate gives nothing any more, at once; and
+//! private keys are nobody else's.
 
 mod keys;
 mod lifetimes;
@@ -13,7 +14,8 @@ use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 use tests::{Inside, SOON, command::waymark};
 
-/// A server with an encrypted endpoint, robots `r1` on map `hall` and `r2` on `yard`, and their folders.
+/// A server with an encrypted endpoint, robots `r1` on map `hall` and `r2` on `yard`, and their
+/// folders.
 struct Fleet {
     inside: Inside,
     /// A plain endpoint of the server's own router: who speaks there hears and says everything.

@@ -1,5 +1,6 @@
-//! Claim: when the server's clock jumps, before or during a run, nothing is lost, frames keep their order, tokens follow the
-//! clock, and no timer fires again and again. By libfaketime, which changes the time of day and leaves the monotonic clock.
+//! Claim: when the server's clock jumps, before or during a run, nothing is lost, frames keep their
+//! order, tokens follow the clock, and no timer fires again and again. By libfaketime, which
+//! changes the time of day and leaves the monotonic clock.
 
 use client::{
     Capture, LandmarkRegion,
@@ -15,7 +16,8 @@ use tests::{Child, SOON, eventually, pictures, robots::connect, skipped};
 use vision::frame::GrayImage;
 
 const MAP: &str = "hall";
-/// How far the clock is off, one after the other: half of them while the server runs, half over a restart.
+/// How far the clock is off, one after the other: half of them while the server runs, half over a
+/// restart.
 const JUMPS: [&str; 6] = ["+3600s", "-1d", "+10y", "+0s", "-1d", "+3600s"];
 /// Backups are due every hour, so that a jump makes one due.
 const EVERY_HOURS: &str = "1";
@@ -111,7 +113,8 @@ async fn jumps_of_the_servers_clock_lose_nothing_and_tokens_follow_it() {
             set(&clock, jump);
             server = start(&data.path().join("data"), &clock, &library);
         }
-        // Two hours are the token's: an hour ahead and a day back it is valid, in ten years it is not.
+        // Two hours are the token's: an hour ahead and a day back it is valid, in ten years it is
+        // not.
         let is_valid = server.maps().with_token(&token).maps().await.is_ok();
         assert_eq!(is_valid, jump != "+10y", "{jump}");
         teach(&server, taught).await;

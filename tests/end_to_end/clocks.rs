@@ -1,5 +1,6 @@
-//! Claim: a stray stamp has no influence on the fused pose, whatever message it is in; the pose continues with the
-//! next message. A pose has its age, and a robot that falls silent soon has no pose.
+//! Claim: a stray stamp has no influence on the fused pose, whatever message it is in; the pose
+//! continues with the next message. A pose has its age, and a robot that falls silent soon has no
+//! pose.
 
 use client::{RobotClient, api::NewMap, v1};
 use engine::motion::MAX_POSE_AGE;

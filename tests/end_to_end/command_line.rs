@@ -1,5 +1,5 @@
-//! Claim: every command explains its options and has a completion and a manual page; an option that does not exist is
-//! refused; commands in documents exist.
+//! Claim: every command explains its options and has a completion and a manual page; an option that
+//! does not exist is refused; commands in documents exist.
 
 use std::{collections::BTreeSet, fs, time::Duration};
 use tempfile::TempDir;

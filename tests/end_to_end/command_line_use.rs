@@ -1,5 +1,6 @@
-//! Claim: options stand before a command or behind it; a start that fails says which option or file is at fault, with its own
-//! exit status, and nothing of the machine that built the program; a variable of no setting is left out and told.
+//! Claim: options stand before a command or behind it; a start that fails says which option or file
+//! is at fault, with its own exit status, and nothing of the machine that built the program; a
+//! variable of no setting is left out and told.
 
 use std::process::{Command, Stdio};
 use tempfile::TempDir;

@@ -1,5 +1,5 @@
-//! Claim: an index that is not as it was written is found after the start, and told with the command that restores a backup;
-//! that command mends it. Robots are served meanwhile.
+//! Claim: an index that is not as it was written is found after the start, and told with the
+//! command that restores a backup; that command mends it. Robots are served meanwhile.
 
 use client::{
     MapClient,

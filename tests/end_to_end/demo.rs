@@ -1,5 +1,5 @@
-//! Claim: the demo runs without preparation: no landmark is named wrongly, and its robot is localised better than
-//! by odometry alone. Its drive is recorded on demand.
+//! Claim: the demo runs without preparation: no landmark is named wrongly, and its robot is
+//! localised better than by odometry alone. Its drive is recorded on demand.
 
 use recordings::{Body, DriveReader};
 use serde_json::Value;

@@ -1,4 +1,5 @@
-//! Claim: `waymark detect` prints one JSON line for every picture it can read and one error line for every other.
+//! Claim: `waymark detect` prints one JSON line for every picture it can read and one error line
+//! for every other.
 
 use image::{DynamicImage, ExtendedColorType, ImageFormat, Luma, RgbImage, codecs::jpeg::JpegEncoder};
 use serde_json::Value;

@@ -1,6 +1,7 @@
-//! Claim: an error of the disk in a commit ends the program with an error and a cause in its log, and the next start has all
-//! that was acknowledged. The disk's error is the system's: a file that may not grow any more (EFBIG). Errors of each kind of
-//! call are planted below SQLite (`server/src/store/io_errors.rs`).
+//! Claim: an error of the disk in a commit ends the program with an error and a cause in its log,
+//! and the next start has all that was acknowledged. The disk's error is the system's: a file that
+//! may not grow any more (EFBIG). Errors of each kind of call are planted below SQLite
+//! (`server/src/store/io_errors.rs`).
 
 use client::api::NewMap;
 use std::{collections::BTreeSet, fs, io::Read as _, path::Path, process::Command, process::Stdio};
@@ -12,7 +13,8 @@ const ROOM_BYTES: u64 = 1 << 20;
 /// More landmarks than fit into that.
 const MOST: usize = 2_000;
 
-/// The same program, whose files end at `bytes`: a write beyond is an error, and not the signal that would kill it.
+/// The same program, whose files end at `bytes`: a write beyond is an error, and not the signal
+/// that would kill it.
 fn limited(command: &Command, bytes: u64) -> Command {
     let mut limited = Command::new("sh");
     // `ulimit -f` counts 512 bytes; 25 is SIGXFSZ.

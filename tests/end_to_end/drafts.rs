@@ -1,5 +1,5 @@
-//! Claim: a draft is edited beside a map in use, and no robot sees it; what it would change for a robot is known before it is
-//! published, and is what happens then.
+//! Claim: a draft is edited beside a map in use, and no robot sees it; what it would change for a
+//! robot is known before it is published, and is what happens then.
 
 use client::{
     RobotClient,

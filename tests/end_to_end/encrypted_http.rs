@@ -1,5 +1,6 @@
-//! Claim: with TLS a client believes the server by its authority and its name, and nothing else; who is on the server's
-//! machine needs no certificate; a session's cookie stays encrypted; a certificate that is renewed is taken at once.
+//! Claim: with TLS a client believes the server by its authority and its name, and nothing else;
+//! who is on the server's machine needs no certificate; a session's cookie stays encrypted; a
+//! certificate that is renewed is taken at once.
 
 use client::{
     ClientError, MapClient,

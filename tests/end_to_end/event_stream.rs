@@ -1,4 +1,5 @@
-//! Claim: whoever follows the server's events misses none when the connection is lost, and is told when its token ends.
+//! Claim: whoever follows the server's events misses none when the connection is lost, and is told
+//! when its token ends.
 
 use client::{
     ClientError, MapClient,

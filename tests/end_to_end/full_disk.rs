@@ -1,6 +1,6 @@
-//! Claim: on a full disk nothing more is learnt, robots are served, and learning goes on when there is room again, without a
-//! restart. A start on a full disk or a read-only one serves robots, too. The disks are small file systems in memory, in a
-//! mount namespace of the test's own.
+//! Claim: on a full disk nothing more is learnt, robots are served, and learning goes on when there
+//! is room again, without a restart. A start on a full disk or a read-only one serves robots, too.
+//! The disks are small file systems in memory, in a mount namespace of the test's own.
 
 use client::{
     Capture, ClientError, Delivery, LandmarkRegion, MapClient, RobotClient, RobotOptions,
@@ -174,7 +174,8 @@ async fn nearly_full() {
 const NO_GUARD: [(&str, &str); 2] =
     [("WAYMARK_LIMITS__DISK_PERCENT", "100"), ("WAYMARK_LIMITS__DISK_FREE_BYTES", "0")];
 
-/// Adds landmarks with pictures until the disk is full; returns the refusal. The log may have some room inside.
+/// Adds landmarks with pictures until the disk is full; returns the refusal. The log may have some
+/// room inside.
 async fn taught_to_the_end(maps: &MapClient, prefix: &str) -> (u16, String) {
     for number in 0..10_000 {
         let name = format!("{prefix}{number:05}");

@@ -1,6 +1,7 @@
-//! Claim: a robot gathers views of untaught posters that it passes; a person accepts their tracks over HTTP; from
-//! then on they are recognised and placed, never one as another, about as often as posters taught by a photograph
-//! each. Views of a known landmark are added only if it was recognised, and only on request.
+//! Claim: a robot gathers views of untaught posters that it passes; a person accepts their tracks
+//! over HTTP; from then on they are recognised and placed, never one as another, about as often as
+//! posters taught by a photograph each. Views of a known landmark are added only if it was
+//! recognised, and only on request.
 
 mod figures;
 
@@ -248,7 +249,8 @@ async fn begun(inside: &Inside, body: Value) -> String {
     format!("{path}/{}", gathering["id"])
 }
 
-/// Tracks of a drive on which every landmark is known: each view in the track of its landmark, none as new.
+/// Tracks of a drive on which every landmark is known: each view in the track of its landmark, none
+/// as new.
 async fn known_landmarks_keep_their_names(inside: &Inside, building: &Building, path: &str) {
     let (_, stopped) = call(inside, Method::POST, &format!("{path}/stop"), None).await;
     let (_, waiting) = call(inside, Method::GET, &format!("{path}/tracks"), None).await;

@@ -1,6 +1,6 @@
-//! Claim: a robot with a known pose is corrected by posters with one picture: each is named by guided recognition,
-//! and marked as guided. Guided names never give a pose to a robot without one, and the API shows which fixes were
-//! guided.
+//! Claim: a robot with a known pose is corrected by posters with one picture: each is named by
+//! guided recognition, and marked as guided. Guided names never give a pose to a robot without one,
+//! and the API shows which fixes were guided.
 
 use client::{api::NewMap, v1};
 use map::pose2::Pose2Covariance;

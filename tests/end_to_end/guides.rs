@@ -28,14 +28,15 @@ fn run_compared(name: &str) {
     guides::run_compared(&guide.expect("a guide"), folder.path(), &mut |_, _| ());
 }
 
-/// Runs the program in the folder of a guide against its server, with `--json`: exit status, and what it said.
+/// Runs the program in the folder of a guide against its server, with `--json`: exit status, and
+/// what it said.
 type Waymark<'a> = &'a dyn Fn(&[&str]) -> (Option<i32>, String);
 
 /// How a guide is run.
 type Run = fn(&Path, &Path, &mut dyn FnMut(&str, &guides::Guide));
 
-/// Runs `first-pose.md` with photographs in a folder; `also` does more after each command. Gives the focal length that it found, px, and the answer to the
-/// photograph `here.jpg`.
+/// Runs `first-pose.md` with photographs in a folder; `also` does more after each command. Gives
+/// the focal length that it found, px, and the answer to the photograph `here.jpg`.
 fn first_pose(folder: &Path, run: Run, also: &mut dyn FnMut(&str, Waymark<'_>)) -> (f64, Value) {
     let guide = markdown("docs/guides").into_iter().find(|g| g.ends_with("first-pose.md")).expect("a guide");
     let mut answer = None;
@@ -65,7 +66,8 @@ fn first_pose(folder: &Path, run: Run, also: &mut dyn FnMut(&str, Waymark<'_>)) 
     (focal_px, answer.expect("the guide asks where a photograph was taken"))
 }
 
-/// How far the answer's pose is from the truth of `here.jpg`, in metres, and at most in standard deviations of an axis.
+/// How far the answer's pose is from the truth of `here.jpg`, in metres, and at most in standard
+/// deviations of an axis.
 fn error_of(answer: &Value) -> (f64, f64) {
     let pose = &answer["camera_pose"]["map_from_camera"];
     let truth = guide_files::map_from_camera("here.jpg").translation;
@@ -272,7 +274,8 @@ fn the_commands_of_evaluate_on_your_photographs_work() {
     run("evaluate-on-your-photographs");
 }
 
-/// The words that a file of code gives on the wire: the codes of errors of HTTP and, `with_arms`, those of `=> "word"`.
+/// The words that a file of code gives on the wire: the codes of errors of HTTP and, `with_arms`,
+/// those of `=> "word"`.
 fn words(file: &str, with_arms: bool) -> Vec<String> {
     let text = std::fs::read_to_string(tests::documents::root().join(file)).expect("a file of code");
     let text: String = text.split_whitespace().collect::<Vec<_>>().join(" ");

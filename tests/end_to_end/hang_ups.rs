@@ -1,5 +1,5 @@
-//! Claim: an accepted request is completed although its client disconnects at once, and one that was not accepted
-//! blocks nothing.
+//! Claim: an accepted request is completed although its client disconnects at once, and one that
+//! was not accepted blocks nothing.
 
 use client::{
     LandmarkRegion,
@@ -28,7 +28,8 @@ async fn no_job_stays_open_when_clients_disconnect() {
             "POST {path} HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer {token}\r\nContent-Length: 0\r\n\r\n"
         );
         stream.write_all(head.as_bytes()).await.expect("sent");
-        // Disconnects at once, then ever later: at some delay the job is committed but not yet answered.
+        // Disconnects at once, then ever later: at some delay the job is committed but not yet
+        // answered.
         tokio::time::sleep(std::time::Duration::from_micros(250 * i)).await;
         drop(stream);
     }

@@ -1,5 +1,6 @@
-//! Claim: a wrong view that was taught is undone: after a roll back every landmark has the thresholds that it had, and every
-//! photograph the answer that it had. A deleted landmark comes back. The history says who did what, and why.
+//! Claim: a wrong view that was taught is undone: after a roll back every landmark has the
+//! thresholds that it had, and every photograph the answer that it had. A deleted landmark comes
+//! back. The history says who did what, and why.
 
 use client::{
     ClientError, LandmarkRegion, MapClient,

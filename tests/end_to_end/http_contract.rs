@@ -1,5 +1,5 @@
-//! Claim: bad input over HTTP gets a status, a stable code and the field at fault; no stored data changes; limits
-//! accept their bound and refuse more.
+//! Claim: bad input over HTTP gets a status, a stable code and the field at fault; no stored data
+//! changes; limits accept their bound and refuse more.
 
 use client::{LandmarkRegion, api::NewMap};
 use reqwest::{

@@ -1,7 +1,8 @@
 //! Claim: imports go one way. No file of a crate imports, over any number of others, itself.
 //!
-//! Read from the sources: `use` statements and paths that begin with `crate` or `super`, without tests. A module
-//! and the modules inside it count as one: a parent may re-export its children, and children may use its types.
+//! Read from the sources: `use` statements and paths that begin with `crate` or `super`, without
+//! tests. A module and the modules inside it count as one: a parent may re-export its children, and
+//! children may use its types.
 
 use std::{
     collections::{BTreeMap, BTreeSet},

@@ -1,7 +1,7 @@
-//! Claim: a robot with odometry, a laser and a single landmark is localised on a map with walls: across a corridor
-//! within centimetres over any distance, in a room in all directions. Scans alone give no first pose; the first
-//! frames with a unique landmark do; every correction can be read. From a reference run the server learns modality
-//! statistics.
+//! Claim: a robot with odometry, a laser and a single landmark is localised on a map with walls:
+//! across a corridor within centimetres over any distance, in a room in all directions. Scans alone
+//! give no first pose; the first frames with a unique landmark do; every correction can be read.
+//! From a reference run the server learns modality statistics.
 
 use client::{Capture, Delivery, RobotClient, RobotOptions, api::NewMap, v1};
 use map::pose2::Pose2;
@@ -117,7 +117,8 @@ fn errors(pose: &v1::RobotPose, truth: &Pose2) -> [f64; 3] {
     [e.x, e.y, e.z]
 }
 
-/// Drives; sends a scan at each step, and a frame if the camera is aimed at the landmark. Errors after the first fix.
+/// Drives; sends a scan at each step, and a frame if the camera is aimed at the landmark. Errors
+/// after the first fix.
 async fn drive(run: &mut Run, every: usize) -> Vec<[f64; 3]> {
     let mut steps = Vec::new();
     while let Some(step) = run.robot.drive_mut().next() {

@@ -1,5 +1,5 @@
-//! Claim: lists are read by filter, order and page through the SDK, several landmarks are made and deleted together or not at
-//! all, and jobs are listed, also by the command line.
+//! Claim: lists are read by filter, order and page through the SDK, several landmarks are made and
+//! deleted together or not at all, and jobs are listed, also by the command line.
 
 use client::{
     ClientError, LandmarkRegion,

@@ -1,5 +1,6 @@
-//! Claim: a driving robot that sends scans over zenoh makes the walls of a map, the same as `waymark map build`
-//! from a scan log of them; they are stored when the mapping is finished, not before.
+//! Claim: a driving robot that sends scans over zenoh makes the walls of a map, the same as
+//! `waymark map build` from a scan log of them; they are stored when the mapping is finished, not
+//! before.
 
 use client::{
     Delivery, RobotClient, RobotOptions,

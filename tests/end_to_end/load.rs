@@ -1,6 +1,7 @@
-//! Claim: under load and under overload every frame that arrives ends in exactly one way, no work begins on a frame beyond its
-//! deadline, at most one frame of a camera waits, a robot that sends too much takes nothing from the others, and the
-//! server answers as before once the load ends. Speed is measured by `waymark-lab bench load`, not here.
+//! Claim: under load and under overload every frame that arrives ends in exactly one way, no work
+//! begins on a frame beyond its deadline, at most one frame of a camera waits, a robot that sends
+//! too much takes nothing from the others, and the server answers as before once the load ends.
+//! Speed is measured by `waymark-lab bench load`, not here.
 
 use client::{
     Capture, Delivery, RobotClient, RobotOptions,

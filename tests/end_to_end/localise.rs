@@ -1,4 +1,5 @@
-//! Claim: a robot learns where it is by a frame, a scan or both, over zenoh as over HTTP: one code, one result.
+//! Claim: a robot learns where it is by a frame, a scan or both, over zenoh as over HTTP: one code,
+//! one result.
 
 use client::{
     Capture, LocaliseQuery,

@@ -1,5 +1,5 @@
-//! Claim: `docs/guides/log-events.md` lists every event that a server logs, with its levels; and a log in JSON is one object
-//! a line, in which requests and frames have their ids.
+//! Claim: `docs/guides/log-events.md` lists every event that a server logs, with its levels; and a
+//! log in JSON is one object a line, in which requests and frames have their ids.
 
 use client::{Capture, RobotClient, RobotOptions};
 use serde_json::Value;

@@ -1,5 +1,6 @@
-//! Claim: a robot with an unknown start pose that observes only look-alikes gets several pose hypotheses and no
-//! pose until one is left; then it has that pose, and guided recognition names the landmarks.
+//! Claim: a robot with an unknown start pose that observes only look-alikes gets several pose
+//! hypotheses and no pose until one is left; then it has that pose, and guided recognition names
+//! the landmarks.
 
 use client::{Capture, Delivery, RobotClient, RobotOptions, api::NewMap, named_landmarks, v1};
 use map::pose2::{Pose2, wrap_rad};
@@ -92,7 +93,8 @@ async fn twelve_equal_doors_give_no_wrong_pose() {
         };
         several += usize::from(answer.hypotheses.len() >= 2 && answer.hypotheses.iter().any(true_one));
         if let Ok(pose) = poses.try_recv() {
-            // The doors are nearly evenly spaced; a pose, if any, comes at the end of the row, and is right.
+            // The doors are nearly evenly spaced; a pose, if any, comes at the end of the row, and
+            // is right.
             let (m, rad) = off(pose.map_from_robot.as_ref().expect("a pose"), &step.map_from_robot);
             assert!(m < 0.8 && rad < 0.3, "{m} m, {rad} rad off");
             break;

@@ -1,5 +1,5 @@
-//! Claim: of two editors of the same thing the second is told that somebody was faster, and overwrites nothing: by the SDK,
-//! and by the command line where it reads before it changes.
+//! Claim: of two editors of the same thing the second is told that somebody was faster, and
+//! overwrites nothing: by the SDK, and by the command line where it reads before it changes.
 
 use client::{
     ClientError, MapClient,
@@ -99,7 +99,8 @@ async fn the_client_asks_for_a_revision_where_the_document_does() {
     inside.server.stop().await;
 }
 
-/// A relay to the server: before it passes on the first request that begins with `word`, it sends this change itself.
+/// A relay to the server: before it passes on the first request that begins with `word`, it sends
+/// this change itself.
 async fn relay(server: SocketAddr, word: &'static str, maps: MapClient, change: LandmarkPatch) -> String {
     let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port");
     let at = listener.local_addr().expect("its address");

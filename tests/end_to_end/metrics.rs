@@ -1,4 +1,5 @@
-//! Claim: metrics are well-formed, add up, and have every name that the alerts, the dashboard and the guide use.
+//! Claim: metrics are well-formed, add up, and have every name that the alerts, the dashboard and
+//! the guide use.
 
 use client::{Capture, Delivery, RobotClient, RobotOptions};
 use reqwest::StatusCode;

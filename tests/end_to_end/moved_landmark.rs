@@ -1,6 +1,6 @@
-//! Claim: a poster that was moved is flagged within five observations, then quarantined; no other landmark is
-//! flagged, and it corrects no pose until a person decides. The map has visibility areas of its landmarks and gives
-//! gaze advice.
+//! Claim: a poster that was moved is flagged within five observations, then quarantined; no other
+//! landmark is flagged, and it corrects no pose until a person decides. The map has visibility
+//! areas of its landmarks and gives gaze advice.
 
 use client::{
     Capture, Delivery, LandmarkRegion, RobotClient, RobotOptions,
@@ -127,7 +127,8 @@ async fn a_moved_poster_is_quarantined_and_gaze_advice_is_given() {
             .quads
             .iter()
             .any(|q| q.verdict() == Verdict::Unique && q.landmark == MOVED && q.pose.is_some());
-        // With one other landmark either could have moved: counted from when two others support the pose.
+        // With one other landmark either could have moved: counted from when two others support the
+        // pose.
         observations += u32::from(named && flagged_after.is_none() && others.len() >= 2);
         others.extend(answer.pose_landmarks.iter().filter(|l| *l != MOVED).cloned());
         if flagged_after.is_none() && health(&inside).await != "sound" {

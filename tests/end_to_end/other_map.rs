@@ -1,5 +1,5 @@
-//! Claim: a frame may name any map and is answered; but only frames against the robot's own map affect its fused
-//! pose and that map's landmarks.
+//! Claim: a frame may name any map and is answered; but only frames against the robot's own map
+//! affect its fused pose and that map's landmarks.
 
 use client::{RobotClient, api::NewMap, v1};
 use reqwest::Method;
@@ -27,7 +27,8 @@ async fn fixes(inside: &Inside, robot: &str) -> Value {
     call(inside, Method::GET, &format!("/robots/{robot}/corrections"), None).await.1
 }
 
-/// The second robot must get no fused pose on another map than its own, and the first must keep its pose.
+/// The second robot must get no fused pose on another map than its own, and the first must keep its
+/// pose.
 #[tokio::test(flavor = "multi_thread")]
 async fn a_frame_against_another_map_is_answered_and_changes_nothing() {
     let inside = Inside::start(Limits::default()).await;
@@ -55,7 +56,8 @@ async fn a_frame_against_another_map_is_answered_and_changes_nothing() {
     assert_eq!((pose.map.as_str(), pose.corrections), (MAP, 1));
     assert_eq!(fixes(&inside, "r1").await, before);
 
-    // The other robot recognises the poster in a map that is not its own: a pose in the answer, and no other effect.
+    // The other robot recognises the poster in a map that is not its own: a pose in the answer, and
+    // no other effect.
     let r2 = connect(&inside.server.zenoh_endpoint, "r2").await;
     let mut poses = r2.poses();
     let version = maps.map(MAP).await.expect("the map").version;

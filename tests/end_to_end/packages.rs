@@ -1,5 +1,5 @@
-//! Claim: what `packaging` holds fits the program: the container file's stages and paths, the unit, the Debian package's
-//! files. No container is built here.
+//! Claim: what `packaging` holds fits the program: the container file's stages and paths, the unit,
+//! the Debian package's files. No container is built here.
 
 use std::{
     fs,
@@ -148,7 +148,8 @@ fn the_debian_package_names_files_that_exist() {
     let sources: Vec<_> =
         section.lines().filter_map(|line| line.trim().strip_prefix("[\"")?.split('"').next()).collect();
     assert!(sources.len() >= 5, "{sources:?}");
-    // Below the crate, but for `target/release`, which cargo-deb knows; `packaging/deb` makes `target/packaging`.
+    // Below the crate, but for `target/release`, which cargo-deb knows; `packaging/deb` makes
+    // `target/packaging`.
     let is_made =
         |source: &&&str| **source == "target/release/waymark" || source.starts_with("../target/packaging/");
     for source in sources.iter().filter(|source| !is_made(source)) {

@@ -1,5 +1,5 @@
-//! Claim: every planted fault (`tests/planted`) still applies to the code, and names the test that must find it. That it is
-//! found is shown by `tests/planted/run.sh`, which builds each of them.
+//! Claim: every planted fault (`tests/planted`) still applies to the code, and names the test that
+//! must find it. That it is found is shown by `tests/planted/run.sh`, which builds each of them.
 
 use std::{fs, process::Command};
 use tests::{documents::root, skipped};

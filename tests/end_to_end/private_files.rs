@@ -1,5 +1,5 @@
-//! Claim: whatever the umask, nobody but the server's user can read the data directory, of a program or of a server inside
-//! one, after a restore, and where an earlier program left it open.
+//! Claim: whatever the umask, nobody but the server's user can read the data directory, of a
+//! program or of a server inside one, after a restore, and where an earlier program left it open.
 
 use client::{
     LandmarkRegion, MapClient,

@@ -1,5 +1,5 @@
-//! Claim: a drive is recorded, played into another server as a robot and compared frame by frame; a bag of ROS 2 that
-//! rosbags wrote gives the same answers as the same data by our own messages.
+//! Claim: a drive is recorded, played into another server as a robot and compared frame by frame; a
+//! bag of ROS 2 that rosbags wrote gives the same answers as the same data by our own messages.
 
 mod bags;
 mod files;
@@ -37,7 +37,8 @@ async fn taught(building: &Arc<Building>) -> Inside {
     inside
 }
 
-/// Readings in front of the posters, with odometry that says where the robot is, as steps of one drive.
+/// Readings in front of the posters, with odometry that says where the robot is, as steps of one
+/// drive.
 fn in_front_of_posters(building: &Arc<Building>) -> Vec<Reading> {
     let mut robot = Robot::new(building.clone(), &RobotParams::default());
     let stops = stops(building, &LessonParams { seed: 5, views: 3, ..LessonParams::default() });

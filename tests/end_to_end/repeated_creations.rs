@@ -1,5 +1,5 @@
-//! Claim: a creation that is repeated with its key has one effect, through a connection that is cut before the answer, and
-//! through a kill of the server between the commit and the answer.
+//! Claim: a creation that is repeated with its key has one effect, through a connection that is cut
+//! before the answer, and through a kill of the server between the commit and the answer.
 
 use client::{
     ClientError, LandmarkRegion, MapClient, NewView,
@@ -17,8 +17,8 @@ use tokio::{
     net::{TcpListener, TcpStream},
 };
 
-/// A relay to the server that cuts every connection whose first answer is the first to this path: the request arrives, its
-/// answer does not.
+/// A relay to the server that cuts every connection whose first answer is the first to this path:
+/// the request arrives, its answer does not.
 async fn cutting_relay(server: SocketAddr, path: &'static str) -> SocketAddr {
     let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port");
     let at = listener.local_addr().expect("its address");

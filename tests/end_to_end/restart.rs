@@ -1,6 +1,7 @@
-//! Claim: killing and restarting the server at any time, also during a backup and while the write-ahead log is moved into the
-//! file, loses no acknowledged change, makes none that nobody asked for, and makes none twice under its key. The database
-//! stays whole (the server checks it at each start), the audit log's chain holds, and robots are answered soon.
+//! Claim: killing and restarting the server at any time, also during a backup and while the
+//! write-ahead log is moved into the file, loses no acknowledged change, makes none that nobody
+//! asked for, and makes none twice under its key. The database stays whole (the server checks it at
+//! each start), the audit log's chain holds, and robots are answered soon.
 
 use client::{
     Capture, ClientError, LandmarkRegion, MapClient, NewView, RobotClient, RobotOptions,
@@ -24,7 +25,8 @@ const TEACHERS: usize = 3;
 const ROBOT: &str = "r1";
 /// Far more than a start takes: how long it takes is printed, and measured elsewhere.
 const LONGEST_START: Duration = Duration::from_secs(30);
-/// Side of the floor plans that fill the write-ahead log: a picture of noise has as many bytes as pixels.
+/// Side of the floor plans that fill the write-ahead log: a picture of noise has as many bytes as
+/// pixels.
 const NOISE_PX: usize = 900;
 
 /// What a client asks for, once under one key.
@@ -94,7 +96,8 @@ impl Journal {
     }
 }
 
-/// Teaches one new landmark after another until the server is gone. The first of each teacher gets a lesson.
+/// Teaches one new landmark after another until the server is gone. The first of each teacher gets
+/// a lesson.
 async fn teach(
     maps: MapClient,
     (map, prefix): (String, String),
@@ -129,7 +132,8 @@ async fn back_up(maps: MapClient) -> Result<(), ClientError> {
     }
 }
 
-/// Writes so much that the write-ahead log is moved into the file all the time, until the server is gone.
+/// Writes so much that the write-ahead log is moved into the file all the time, until the server is
+/// gone.
 async fn fill(maps: MapClient, map: String) -> Result<(), ClientError> {
     for seed in 0.. {
         let noise = pictures::blocks(seed, NOISE_PX, NOISE_PX);
@@ -177,8 +181,8 @@ fn expected(asked: &[Asked]) -> BTreeMap<&str, (bool, u64, u64)> {
     all
 }
 
-/// Nothing acknowledged is lost and nothing is there that nobody asked for; then asks again for what was not acknowledged, and
-/// everything is there once. How much of that had been made before.
+/// Nothing acknowledged is lost and nothing is there that nobody asked for; then asks again for
+/// what was not acknowledged, and everything is there once. How much of that had been made before.
 async fn check(maps: &MapClient, map: &str, journal: &Journal) -> u64 {
     let (asked, open) = journal.of(map);
     let (there, said) = (stored(maps, map).await, expected(&asked));
@@ -206,7 +210,8 @@ async fn check(maps: &MapClient, map: &str, journal: &Journal) -> u64 {
     before - acknowledged
 }
 
-/// Views and lessons have the numbers that were acknowledged, and there is no lesson beside those that were asked for.
+/// Views and lessons have the numbers that were acknowledged, and there is no lesson beside those
+/// that were asked for.
 async fn check_numbers(maps: &MapClient, asked: &[Asked]) {
     let mut views = BTreeMap::<(&str, &str), BTreeSet<i64>>::new();
     let mut lessons = BTreeSet::new();
@@ -253,7 +258,8 @@ fn kills() -> u64 {
 
 type Work = JoinHandle<Result<(), ClientError>>;
 
-/// Teachers, and beside them, by the number of the kill, nobody, backups, or writes that fill the write-ahead log.
+/// Teachers, and beside them, by the number of the kill, nobody, backups, or writes that fill the
+/// write-ahead log.
 fn work(server: &Child, map: &str, kill: u64, journal: &Arc<Journal>) -> Vec<Work> {
     let teach = |i: usize| {
         let place = (map.to_owned(), format!("l{kill}-{i}"));
@@ -319,7 +325,8 @@ async fn nothing_acknowledged_is_lost_by_a_kill() {
     assert!(longest < LONGEST_START, "the first answer came {longest:?} after the start");
 }
 
-/// Everything at once, at the end: all maps, numbers, lessons, the audit log, and the file as a backup sees it.
+/// Everything at once, at the end: all maps, numbers, lessons, the audit log, and the file as a
+/// backup sees it.
 async fn finish(server: &Child, all: &[String], journal: &Journal) {
     let maps = server.maps();
     for map in all {

@@ -1,6 +1,7 @@
-//! Claim: the API says of each robot what it does: frames answered and refused with the last reason, when its last message
-//! came, and when a landmark was named. Robots that are refused because nobody registered them are listed until somebody does. A
-//! person can say where a robot is: odometry carries that on, unsupported until a landmark agrees.
+//! Claim: the API says of each robot what it does: frames answered and refused with the last
+//! reason, when its last message came, and when a landmark was named. Robots that are refused
+//! because nobody registered them are listed until somebody does. A person can say where a robot
+//! is: odometry carries that on, unsupported until a landmark agrees.
 
 use client::{
     Capture, ClientError,
@@ -53,7 +54,8 @@ async fn what_a_robot_does_is_told() {
     inside.server.stop().await;
 }
 
-/// Neither scans nor odometry are answered: the robot's own page, and `robot show`, are where their refusal is seen.
+/// Neither scans nor odometry are answered: the robot's own page, and `robot show`, are where their
+/// refusal is seen.
 #[tokio::test(flavor = "multi_thread")]
 async fn a_robot_whose_every_scan_and_odometry_is_refused_says_so() {
     let inside = Inside::start(Limits::default()).await;

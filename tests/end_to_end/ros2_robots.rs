@@ -1,6 +1,7 @@
-//! Claim: a robot of ROS 2 is served on its own topics, without a bridge process or with zenoh-bridge-ros2dds. Its images
-//! get the answers that a native robot gets for the same data; poses and transforms come back as ROS has them; a
-//! publisher that waits for a subscriber is woken; what is no message of the robot changes nothing and is counted.
+//! Claim: a robot of ROS 2 is served on its own topics, without a bridge process or with
+//! zenoh-bridge-ros2dds. Its images get the answers that a native robot gets for the same data;
+//! poses and transforms come back as ROS has them; a publisher that waits for a subscriber is
+//! woken; what is no message of the robot changes nothing and is counted.
 
 mod encrypted;
 mod run;
@@ -52,7 +53,8 @@ fn compare(ros: &v1::Answer, native: &v1::Answer) {
     }
 }
 
-/// Drives past the landmark; compares the answers of both robots. Capture times of the frames with a fix, and the fixes.
+/// Drives past the landmark; compares the answers of both robots. Capture times of the frames with
+/// a fix, and the fixes.
 async fn drive(run: &mut Run, suffixes: [&str; 2], with_raw: bool) -> Vec<(i64, v1::Pose2)> {
     let params = DriveParams { start_m: 9.0, ..DriveParams::default() };
     let mut robot =

@@ -1,5 +1,6 @@
-//! Claim: maps have locations and links: a pose on one floor can be transformed to another map, links have no
-//! cycles; and the command line imports a building plan in GeoJSON as the walls of a map on a running server.
+//! Claim: maps have locations and links: a pose on one floor can be transformed to another map,
+//! links have no cycles; and the command line imports a building plan in GeoJSON as the walls of a
+//! map on a running server.
 
 use client::{
     LandmarkRegion, MapClient,
@@ -127,8 +128,8 @@ async fn poses_are_transformed_between_linked_maps() {
     );
     assert!((number(&found["level_m"]) - 3.0).abs() < 1e-9);
     assert_eq!(found["via"], json!(["upper", "house", "ground"]));
-    // Both floors' links add uncertainty (the ground's by the default for a tape), and over a metre the turn does,
-    // too.
+    // Both floors' links add uncertainty (the ground's by the default for a tape), and over a metre
+    // the turn does, too.
     let variance = number(&found["pose"]["covariance"][0]);
     assert!((variance - (0.01 + 0.0025 + 0.0001 + 0.0087 * 0.0087)).abs() < 1e-6, "{found}");
     let back = maps

@@ -1,6 +1,7 @@
-//! Claim: several servers share a router of the operator. Every frame is answered once, by the server of its map or robot,
-//! while servers join, are killed and come back; a robot that drives from one to the other goes on; robots of a server that is
-//! killed are told; a map that two servers have is served by one at most; a restart of the router changes nothing.
+//! Claim: several servers share a router of the operator. Every frame is answered once, by the
+//! server of its map or robot, while servers join, are killed and come back; a robot that drives
+//! from one to the other goes on; robots of a server that is killed are told; a map that two
+//! servers have is served by one at most; a restart of the router changes nothing.
 
 use client::{Capture, ClientError, Delivery, RobotClient, RobotOptions, ServerEvent, api::NewMap, v1};
 use protos::{Key, Keys, Name, prost::Message};
@@ -140,7 +141,8 @@ async fn every_frame_is_answered_once_while_servers_come_and_go() {
     println!("a robot that enters the map of another server is answered after {:?}", entered.elapsed());
     heard.more("rover", "b", "").await;
 
-    // The second server is killed: its robots are told, and another one says so to those that do not listen.
+    // The second server is killed: its robots are told, and another one says so to those that do
+    // not listen.
     let mut events = r2.server_events();
     let killed = Instant::now();
     b.kill();

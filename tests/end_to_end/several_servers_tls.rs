@@ -1,4 +1,5 @@
-//! Claim: a server joins an encrypted router by a certificate, and nobody without one; the settings say what is missing.
+//! Claim: a server joins an encrypted router by a certificate, and nobody without one; the settings
+//! say what is missing.
 
 use client::{Capture, RobotClient, RobotOptions, RobotTls, api::NewMap};
 use rcgen::{BasicConstraints, CertificateParams, DnType, ExtendedKeyUsagePurpose, IsCa, Issuer, KeyPair};

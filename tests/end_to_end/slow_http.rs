@@ -1,5 +1,5 @@
-//! Claim: clients that send heads slowly, bodies slowly, or do not read what they asked for hold up nobody else; they are cut
-//! off, and what they held returns.
+//! Claim: clients that send heads slowly, bodies slowly, or do not read what they asked for hold up
+//! nobody else; they are cut off, and what they held returns.
 
 use reqwest::Method;
 use std::{

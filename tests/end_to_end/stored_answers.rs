@@ -1,5 +1,5 @@
-//! Claim: what a robot was told can be opened again, with the pictures that it rests on and what was learnt of the
-//! landmark.
+//! Claim: what a robot was told can be opened again, with the pictures that it rests on and what
+//! was learnt of the landmark.
 
 use client::{
     api::{AnswerStatus, DuplicateQuery, NewMap, NumberOrder, PriorSource, StoredAnswerQuery, ViewQuery},

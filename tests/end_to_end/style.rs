@@ -34,6 +34,8 @@ const AMBIGUOUS: [&str; 15] = [
 /// Longest cell of a table and longest line of prose, in characters.
 const MAX_CELL: usize = 300;
 const MAX_LINE: usize = 120;
+/// Longest line that is a comment of code, in characters. rustfmt does not wrap them.
+const MAX_COMMENT: usize = 100;
 /// Words of history, which belongs to docs/results.
 const HISTORY: [&str; 5] = ["not kept", "builds before", "the stop before", "asked were", "(issue"];
 
@@ -75,6 +77,27 @@ fn no_file_of_code_is_too_long() {
     };
     let long: Vec<_> = code.iter().filter(is_long).map(|(name, _)| name).collect();
     assert!(long.is_empty(), "over {MAX_FILE_LINES} lines: {long:#?}");
+}
+
+#[test]
+fn comments_wrap() {
+    let mut long = Vec::new();
+    for (name, text) in
+        files(&CRATES, "rs").into_iter().filter(|(name, _)| !GENERATED.contains(&name.as_str()))
+    {
+        let mut is_code = false;
+        for (number, line) in (1..).zip(text.lines()) {
+            let is_comment = line.trim_start().starts_with("//");
+            is_code ^= is_comment && line.contains("```");
+            // Names, links and commands cannot be broken.
+            let is_whole = ["`", "](", "://"].iter().any(|c| line.contains(c)) || line.ends_with('\\');
+            let is_prose = is_comment && !line.contains(" waymark") && !is_code && !is_whole;
+            if is_prose && line.chars().count() > MAX_COMMENT {
+                long.push(format!("{name}:{number}"));
+            }
+        }
+    }
+    assert!(long.is_empty(), "comments over {MAX_COMMENT} characters: {long:#?}");
 }
 
 #[test]

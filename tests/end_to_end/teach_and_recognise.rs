@@ -1,6 +1,6 @@
-//! Claim: posters taught over HTTP from a first round through a building are recognised over zenoh from other
-//! viewpoints, never one as another, and give the robot's pose; in another building with other posters nothing is
-//! recognised.
+//! Claim: posters taught over HTTP from a first round through a building are recognised over zenoh
+//! from other viewpoints, never one as another, and give the robot's pose; in another building with
+//! other posters nothing is recognised.
 
 use client::{
     Capture, Delivery, LandmarkRegion, RobotClient, RobotOptions,

@@ -1,4 +1,5 @@
-//! Claim: files, tests, types and constants named in documents exist, and so do the sections cited in comments.
+//! Claim: files, tests, types and constants named in documents exist, and so do the sections cited
+//! in comments.
 
 use std::{collections::BTreeSet, fs, path::PathBuf};
 use tests::documents::{documents, markdown, root};
@@ -68,7 +69,8 @@ fn quoted(text: &str) -> impl Iterator<Item = &str> {
     text.lines().filter(|line| !line.starts_with("```")).flat_map(|line| line.split('`').skip(1).step_by(2))
 }
 
-/// Paths with a folder between single backticks. A file name alone may mean several files, and `*` does.
+/// Paths with a folder between single backticks. A file name alone may mean several files, and `*`
+/// does.
 fn paths(text: &str) -> BTreeSet<&str> {
     let is_path = |word: &&str| {
         word.contains('/') && !word.contains([' ', '*']) && ENDINGS.iter().any(|end| word.ends_with(end))
@@ -180,8 +182,8 @@ fn bare(word: &str) -> &str {
     word.trim_end_matches([')', '`', '"', ']', ',', '.', ':', ';'])
 }
 
-/// Citations of the method in comments, with the number of the line: `method 3.6`, `method 17.1 to 17.3`, `section
-/// 6.3`, the labels `A10` and `E9`, and documents by their path.
+/// Citations of the method in comments, with the number of the line: `method 3.6`,
+/// `method 17.1 to 17.3`, `section 6.3`, the labels `A10` and `E9`, and documents by their path.
 fn citations(text: &str) -> Vec<(usize, &str)> {
     let words = comment_words(text);
     let trimmed = |i: usize| words.get(i).map(|(line, word)| (*line, bare(word)));
@@ -245,7 +247,8 @@ fn every_section_cited_in_a_comment_exists() {
     assert!(cited > 150, "only {cited} citations found: the comments are no longer read");
 }
 
-/// Product code of `vision` that imports the paper's method: parameters, both detectors, their trace, the decision.
+/// Product code of `vision` that imports the paper's method: parameters, both detectors, their
+/// trace, the decision.
 const PAPER_ENTRIES: [&str; 5] = [
     "vision/src/detect/detector.rs",
     "vision/src/detect/params.rs",

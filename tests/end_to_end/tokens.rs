@@ -1,5 +1,6 @@
-//! Claim: on one machine nothing needs to be set: SDK and commands find the local token, also after a restart of the
-//! server. Elsewhere a token gives what its role and maps allow, from the next request on.
+//! Claim: on one machine nothing needs to be set: SDK and commands find the local token, also after
+//! a restart of the server. Elsewhere a token gives what its role and maps allow, from the next
+//! request on.
 
 use client::{
     ClientError, LandmarkRegion, MapClient,
@@ -109,7 +110,8 @@ async fn a_token_gives_what_its_role_and_maps_allow() {
     inside.server.stop().await;
 }
 
-/// Runs `waymark` as a user with this folder of settings and this standard input; status and output.
+/// Runs `waymark` as a user with this folder of settings and this standard input; status and
+/// output.
 fn as_user(home: &Path, url: &str, input: &str, args: &[&str]) -> (i32, String) {
     let mut command = Command::new(program());
     command.args(args).args(["--server", url]).env("XDG_CONFIG_HOME", home).env_remove("WAYMARK_TOKEN");

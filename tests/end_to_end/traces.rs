@@ -1,5 +1,6 @@
-//! Claim: with the standard variables of OpenTelemetry, traces of requests and frames reach a collector; without a collector
-//! the server does its work all the same; what cannot be meant is refused at the start.
+//! Claim: with the standard variables of OpenTelemetry, traces of requests and frames reach a
+//! collector; without a collector the server does its work all the same; what cannot be meant is
+//! refused at the start.
 
 use client::{Capture, RobotClient, RobotOptions, api::NewMap};
 use std::{

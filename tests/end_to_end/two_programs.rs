@@ -1,6 +1,6 @@
-//! Claim: while a program runs under a robot's name, another one under the same name is refused with its own code
-//! and shown by the API; the first is not affected. When the first ends, the next is admitted: at once after an
-//! orderly end, within the stated time after a kill.
+//! Claim: while a program runs under a robot's name, another one under the same name is refused
+//! with its own code and shown by the API; the first is not affected. When the first ends, the next
+//! is admitted: at once after an orderly end, within the stated time after a kill.
 
 use client::{Capture, Delivery, RobotClient, RobotOptions, api::NewMap, v1};
 use engine::epochs::MESSAGE_LIVE;

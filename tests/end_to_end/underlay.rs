@@ -1,4 +1,5 @@
-//! Claim: a map keeps the picture that is shown under it, replaced or deleted on request, and with the map.
+//! Claim: a map keeps the picture that is shown under it, replaced or deleted on request, and with
+//! the map.
 
 use client::{
     ClientError, MapClient,

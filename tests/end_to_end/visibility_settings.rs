@@ -1,6 +1,6 @@
-//! Claim: visibility follows the visibility settings: each map has its own, set over HTTP or by the command line
-//! with errors that name the field, stored over a restart; a single request may state others. A sign under the
-//! ceiling is visible only to a camera that can be tilted up.
+//! Claim: visibility follows the visibility settings: each map has its own, set over HTTP or by the
+//! command line with errors that name the field, stored over a restart; a single request may state
+//! others. A sign under the ceiling is visible only to a camera that can be tilted up.
 
 use client::api::NewMap;
 use reqwest::{Method, StatusCode};

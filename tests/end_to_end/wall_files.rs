@@ -1,4 +1,5 @@
-//! Claim: walls are read of files of other programs and stored nowhere; a file that is refused says why, whatever is in it.
+//! Claim: walls are read of files of other programs and stored nowhere; a file that is refused says
+//! why, whatever is in it.
 
 use client::{
     ClientError, MapClient,

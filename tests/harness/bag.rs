@@ -1,5 +1,5 @@
-//! A small bag of ROS 2 with MCAP storage, as `ros2 bag record -s mcap` writes it: a camera without compression, a laser,
-//! and odometry in the transforms alone.
+//! A small bag of ROS 2 with MCAP storage, as `ros2 bag record -s mcap` writes it: a camera without
+//! compression, a laser, and odometry in the transforms alone.
 
 use map::{laser::Scan, pose2::Pose2};
 use mcap::{Writer, records::MessageHeader};
@@ -74,7 +74,8 @@ pub fn write_with(path: &Path, camera: &Camera, stops: &[Stop], laser: LaserTopi
     bag.writer.finish().expect("finished");
 }
 
-/// Writes a file of messages whose content nobody looks into: encoding of the messages, and topic, type and bytes of each.
+/// Writes a file of messages whose content nobody looks into: encoding of the messages, and topic,
+/// type and bytes of each.
 pub fn write_raw(path: &Path, encoding: &str, messages: &[(&str, &str, &[u8])]) {
     let mut writer = Writer::new(BufWriter::new(File::create_new(path).expect("a file"))).expect("begun");
     for (sequence, (topic, kind, bytes)) in (0..).zip(messages) {

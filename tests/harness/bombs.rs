@@ -1,4 +1,5 @@
-//! Hostile images, made by code: sizes that lie, contents that unpack to far more than the file, structures that no decoder likes.
+//! Hostile images, made by code: sizes that lie, contents that unpack to far more than the file,
+//! structures that no decoder likes.
 
 use crate::{pictures, robots};
 use flate2::{Compression, Crc, write::ZlibEncoder};
@@ -28,7 +29,8 @@ pub struct Bomb {
     pub bytes: Vec<u8>,
     /// Codes of its refusal as a photograph.
     pub upload: Codes,
-    /// Codes of its refusal as a frame of [`CLAIMED`] size, of the encoding that its first bytes say.
+    /// Codes of its refusal as a frame of [`CLAIMED`] size, of the encoding that its first bytes
+    /// say.
     pub frame: Codes,
 }
 
@@ -40,7 +42,8 @@ fn chunk(kind: [u8; 4], data: &[u8]) -> Vec<u8> {
     [&length[..], &kind, data, &crc.sum().to_be_bytes()].concat()
 }
 
-/// `width x height` px of one colour type and depth; `before` stands before the pixels, which are these packed bytes.
+/// `width x height` px of one colour type and depth; `before` stands before the pixels, which are
+/// these packed bytes.
 fn png(size: [u32; 2], [depth, colour, interlace]: [u8; 3], before: &[u8], packed: &[u8]) -> Vec<u8> {
     let [width, height] = size.map(u32::to_be_bytes);
     let header = [&width[..], &height, &[depth, colour, 0, 0, interlace]].concat();

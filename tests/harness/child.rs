@@ -1,4 +1,5 @@
-//! The real program, `waymark serve`, as a child process: started on free ports, killed at any moment.
+//! The real program, `waymark serve`, as a child process: started on free ports, killed at any
+//! moment.
 
 use client::MapClient;
 use std::{
@@ -125,9 +126,9 @@ impl Drop for Child {
     }
 }
 
-/// The program, built with the profile of the tests: cargo does not build another package's program for a test. Built beside a
-/// test of the whole workspace, it takes the crates that the tests are linked with; by itself it has features of its own, and
-/// half of the crates are built once more.
+/// The program, built with the profile of the tests: cargo does not build another package's program
+/// for a test. Built beside a test of the whole workspace, it takes the crates that the tests are
+/// linked with; by itself it has features of its own, and half of the crates are built once more.
 pub(crate) fn program() -> &'static Path {
     static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
     PROGRAM.get_or_init(|| {
@@ -137,7 +138,8 @@ pub(crate) fn program() -> &'static Path {
         let mut cargo = Command::new(env!("CARGO"));
         cargo.args(["build", "--quiet", "--workspace", "--bin", "waymark", "--test", "wedged_router"]);
         cargo.current_dir(env!("CARGO_MANIFEST_DIR"));
-        // `cargo test` sets these for its tests. Build scripts that read them would run again, and half of the crates with them.
+        // `cargo test` sets these for its tests. Build scripts that read them would run again, and
+        // half of the crates with them.
         for (name, _) in std::env::vars()
             .filter(|(name, _)| name.starts_with("CARGO_PKG_") || name.starts_with("CARGO_MANIFEST_"))
         {

@@ -1,4 +1,5 @@
-//! One run of the real program: arguments in, status and output out. A run that does not end is killed.
+//! One run of the real program: arguments in, status and output out. A run that does not end is
+//! killed.
 
 use serde_json::Value;
 use std::{
@@ -43,8 +44,8 @@ pub fn waymark<A: AsRef<OsStr>>(args: impl IntoIterator<Item = A>, longest: Dura
     run(program(), args, longest)
 }
 
-/// The help texts of a program by command (`COMMAND` or `COMMAND SUBCOMMAND`; empty for the program itself). Checks
-/// that `--help` of every command works.
+/// The help texts of a program by command (`COMMAND` or `COMMAND SUBCOMMAND`; empty for the program
+/// itself). Checks that `--help` of every command works.
 pub fn helps(program: &Path, longest: Duration) -> BTreeMap<String, String> {
     let (mut open, mut helps) = (vec![String::new()], BTreeMap::new());
     while let Some(command) = open.pop() {

@@ -30,8 +30,8 @@ pub fn documents() -> Vec<PathBuf> {
     found
 }
 
-/// Checks that every command line of `program`, called `name` in the documents, has a command and options that the
-/// program's help lists. `least` is the smallest number of command lines expected.
+/// Checks that every command line of `program`, called `name` in the documents, has a command and
+/// options that the program's help lists. `least` is the smallest number of command lines expected.
 pub fn check_command_lines(program: &Path, name: &str, least: usize, longest: Duration) {
     let helps = helps(program, longest);
     let (mut wrong, mut count) = (Vec::new(), 0);
@@ -48,8 +48,8 @@ pub fn check_command_lines(program: &Path, name: &str, least: usize, longest: Du
     assert!(count >= least, "only {count} command lines of {name} found: the documents are no longer read");
 }
 
-/// Command lines of the program called `name`, without that name: between backticks, and lines of code blocks, with
-/// their continuation lines and without comments.
+/// Command lines of the program called `name`, without that name: between backticks, and lines of
+/// code blocks, with their continuation lines and without comments.
 fn command_lines(text: &str, name: &str) -> Vec<String> {
     let text = text.replace("\\\n", " ");
     let of_name = |line: &str| line.trim().strip_prefix(name)?.strip_prefix(' ').map(str::to_owned);

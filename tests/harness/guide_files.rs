@@ -1,4 +1,5 @@
-//! The files that the guides name: those of `waymark sample`, and what only the tests need beside them.
+//! The files that the guides name: those of `waymark sample`, and what only the tests need beside
+//! them.
 
 use crate::{
     bag,

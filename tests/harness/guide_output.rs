@@ -1,6 +1,7 @@
-//! What a guide says that commands print, against what they printed: every line of every `text` block of the document must be a
-//! line of some command's output, with numbers that are about the same. A block after `<!-- elsewhere -->` is of another
-//! machine, or of a file of the reader, and is not compared.
+//! What a guide says that commands print, against what they printed: every line of every `text`
+//! block of the document must be a line of some command's output, with numbers that are about the
+//! same. A block after `<!-- elsewhere -->` is of another machine, or of a file of the reader, and
+//! is not compared.
 
 /// Difference of a number that is about the same, as a share; or [`LAST_DIGITS`].
 const ABOUT: f64 = 0.1;

@@ -1,13 +1,15 @@
-//! Runs the guides: every `sh` block of a Markdown document is run, line by line, with the program of this build, in a
-//! folder with the files that the guide names.
+//! Runs the guides: every `sh` block of a Markdown document is run, line by line, with the program
+//! of this build, in a folder with the files that the guide names.
 //!
 //! - A block `toml NAME` or `json NAME` is written to the file NAME.
-//! - `waymark serve` stays in the background, on free ports, until the guide ends; later commands find it.
-//! - Before a block, `<!-- status N -->` says that its last command ends with status N instead of 0.
-//! - A block `bash` is for another machine (a robot with ROS 2, an installed server) and is not run: it may hold only
-//!   the programs of [`ELSEWHERE`].
-//! - `cargo run -p client --example NAME` runs the example of this build; `cargo install`, `cargo test` and the demo do
-//!   nothing here.
+//! - `waymark serve` stays in the background, on free ports, until the guide ends; later commands
+//!   find it.
+//! - Before a block, `<!-- status N -->` says that its last command ends with status N instead
+//!   of 0.
+//! - A block `bash` is for another machine (a robot with ROS 2, an installed server) and is not
+//!   run: it may hold only the programs of [`ELSEWHERE`].
+//! - `cargo run -p client --example NAME` runs the example of this build; `cargo install`,
+//!   `cargo test` and the demo do nothing here.
 
 use crate::{command::program, guide_output::unsaid};
 use std::{
@@ -97,8 +99,9 @@ pub(crate) fn commands(body: &str) -> Vec<String> {
     joined.lines().map(str::trim).filter(is_command).map(str::to_owned).collect()
 }
 
-/// Runs a guide in a folder. `after` is called after each command, with the command and the server's address and
-/// endpoint once there is one. Panics with the command, its output and its place in the guide if a status is wrong.
+/// Runs a guide in a folder. `after` is called after each command, with the command and the
+/// server's address and endpoint once there is one. Panics with the command, its output and its
+/// place in the guide if a status is wrong.
 pub fn run(guide: &Path, folder: &Path, after: &mut dyn FnMut(&str, &Guide)) {
     let text = fs::read_to_string(guide).expect("a guide in UTF-8");
     let mut guide_run = Guide::new(folder);

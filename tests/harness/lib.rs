@@ -1,5 +1,5 @@
-//! Harness of the end-to-end tests: the real program as a child process that can be killed, a server inside the
-//! test process, pictures to send. The claims are in `end_to_end/`, one a file.
+//! Harness of the end-to-end tests: the real program as a child process that can be killed, a
+//! server inside the test process, pictures to send. The claims are in `end_to_end/`, one a file.
 
 pub mod bag;
 pub mod bombs;
@@ -86,8 +86,8 @@ impl Inside {
     }
 }
 
-/// Robots of tests send the readings of minutes within seconds, and the disk of a test's machine may be nearly full: limits
-/// that are left at their defaults do not hold them up.
+/// Robots of tests send the readings of minutes within seconds, and the disk of a test's machine
+/// may be nearly full: limits that are left at their defaults do not hold them up.
 fn in_quick_motion(limits: &Limits) -> Limits {
     let default = Limits::default();
     let raised = |of: fn(&Limits) -> u32| if of(limits) == of(&default) { 1_000_000 } else { of(limits) };

@@ -1,4 +1,5 @@
-//! Machines for guides that speak of two: network namespaces on this one, joined by a cable. Linux, by root.
+//! Machines for guides that speak of two: network namespaces on this one, joined by a cable. Linux,
+//! by root.
 
 use crate::guides::{CARGO, commands, path_with};
 use std::{
@@ -42,7 +43,8 @@ fn ip(arguments: &str) -> Result<(), String> {
     run(Command::new("ip").args(arguments.split(' ')))
 }
 
-/// Two machines that reach each other, with folders named by their addresses. An error says why there are none here.
+/// Two machines that reach each other, with folders named by their addresses. An error says why
+/// there are none here.
 pub fn pair(within: &Path, addresses: [&str; 2]) -> Result<[Machine; 2], String> {
     let ends = ["a", "b"].map(|end| format!("wm{end}{}", std::process::id()));
     let made = ends.iter().zip(addresses).map(|(namespace, address)| {
@@ -89,7 +91,8 @@ impl Machine {
         shell
     }
 
-    /// Runs a command of a guide: its status and what it says. `waymark serve` goes on until the machine is dropped.
+    /// Runs a command of a guide: its status and what it says. `waymark serve` goes on until the
+    /// machine is dropped.
     pub fn run(&mut self, command: &str) -> (i32, String) {
         if !command.starts_with("waymark serve ") {
             let done = self.shell(&format!("timeout 300 {command}")).output().expect("ip");

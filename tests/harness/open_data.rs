@@ -5,8 +5,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// A set of open data: a folder of `WAYMARK_DATA`, else of `shared/data` beside the repository. None where it is absent,
-/// which is printed.
+/// A set of open data: a folder of `WAYMARK_DATA`, else of `shared/data` beside the repository.
+/// None where it is absent, which is printed.
 pub fn open_data(set: &str) -> Option<PathBuf> {
     let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
     let folder = std::env::var_os("WAYMARK_DATA").map_or(beside, PathBuf::from).join(set);

@@ -1,5 +1,6 @@
-//! Photographs of a phone that is held upright: 12 megapixels, JPEG, stored on their side with the orientation in their
-//! Exif. They show the office of the guides, with a frame around the poster and the shadow that it casts.
+//! Photographs of a phone that is held upright: 12 megapixels, JPEG, stored on their side with the
+//! orientation in their Exif. They show the office of the guides, with a frame around the poster
+//! and the shadow that it casts.
 
 use sim::{
     building::Building,
@@ -35,8 +36,8 @@ pub fn write(folder: &Path) {
     }
 }
 
-/// The JPEG file of a sensor that lies on its side: rows of the file are columns of the picture, and the Exif says that a
-/// quarter turn clockwise makes it upright (orientation 6).
+/// The JPEG file of a sensor that lies on its side: rows of the file are columns of the picture,
+/// and the Exif says that a quarter turn clockwise makes it upright (orientation 6).
 fn on_its_side(image: &GrayImage) -> Vec<u8> {
     let (width, height) = (image.width(), image.height());
     let mut stored = Vec::with_capacity(width * height);

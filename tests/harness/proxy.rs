@@ -1,5 +1,6 @@
-//! A TCP proxy on loopback whose link has faults: between a robot and its server, or between any two programs. Connections are
-//! taken and passed on; what a fault does holds for all of them, in both directions.
+//! A TCP proxy on loopback whose link has faults: between a robot and its server, or between any
+//! two programs. Connections are taken and passed on; what a fault does holds for all of them, in
+//! both directions.
 
 use std::{
     net::SocketAddr,
@@ -29,11 +30,13 @@ const SLOW_PIECE_BYTES: usize = 1_250;
 pub enum Link {
     /// Passes everything on.
     Up,
-    /// Passes nothing on and takes no new connection. Nothing is lost: it is as if packets were sent again until they arrive.
+    /// Passes nothing on and takes no new connection. Nothing is lost: it is as if packets were
+    /// sent again until they arrive.
     Down,
     /// Passes on so many bytes a second, in each direction.
     Slow(u32),
-    /// Takes everything and passes nothing on, for ever, on the connections that there are. New ones pass.
+    /// Takes everything and passes nothing on, for ever, on the connections that there are. New
+    /// ones pass.
     HalfOpen,
     /// The same, on new connections, too.
     Dead,
@@ -201,7 +204,8 @@ impl Direction {
         }
     }
 
-    /// Takes whatever comes, for as long as the proxy is there. The other end is told nothing, not even an end.
+    /// Takes whatever comes, for as long as the proxy is there. The other end is told nothing, not
+    /// even an end.
     async fn swallow(&mut self, piece: &mut [u8]) -> Ended {
         while let Ok(1..) = self.from.read(piece).await {}
         while self.link.changed().await.is_ok() {}

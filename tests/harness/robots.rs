@@ -1,4 +1,5 @@
-//! A simulated robot against a server: its building as a map, its landmarks taught, its readings as messages.
+//! A simulated robot against a server: its building as a map, its landmarks taught, its readings as
+//! messages.
 
 use crate::{Inside, SOON, eventually, http};
 use client::{
@@ -106,7 +107,8 @@ pub fn capture(readings: &SensorReadings) -> Capture {
         .with_deadline_ms(60_000)
 }
 
-/// Shows robot `name` views of the landmark `poster-0`, until its pose on [`MAP`] is known; the last view.
+/// Shows robot `name` views of the landmark `poster-0`, until its pose on [`MAP`] is known; the
+/// last view.
 pub async fn find_itself(
     inside: &Inside,
     building: &Arc<Building>,

@@ -1,9 +1,10 @@
-//! A robot of ROS 2 without ROS: its router and one of its nodes as zenoh sessions, with keys, tokens and attachments as
-//! `rmw_zenoh` and zenoh-bridge-ros2dds write them. They are written here as text, not by the crate that reads them.
+//! A robot of ROS 2 without ROS: its router and one of its nodes as zenoh sessions, with keys,
+//! tokens and attachments as `rmw_zenoh` and zenoh-bridge-ros2dds write them. They are written here
+//! as text, not by the crate that reads them.
 //!
-//! Sources: the design document of `ros2/rmw_zenoh`, `rmw_zenoh_cpp/src/detail/liveliness_utils.cpp` and
-//! `attachment_helpers.cpp` beside it; `eclipse-zenoh/zenoh-plugin-ros2dds src/liveliness_mgt.rs`; hashes of rosbags'
-//! type stores.
+//! Sources: the design document of `ros2/rmw_zenoh`,
+//! `rmw_zenoh_cpp/src/detail/liveliness_utils.cpp` and `attachment_helpers.cpp` beside it;
+//! `eclipse-zenoh/zenoh-plugin-ros2dds src/liveliness_mgt.rs`; hashes of rosbags' type stores.
 
 use crate::{SOON, documents::root, eventually};
 use std::{
@@ -97,8 +98,8 @@ impl RosRobot {
         Self::behind(router, settings("client", &own, None), speech).await
     }
 
-    /// The same on an encrypted endpoint, with the certificate in `folder` and the settings that the guide shows: those of
-    /// the router, and the namespace of the nodes.
+    /// The same on an encrypted endpoint, with the certificate in `folder` and the settings that
+    /// the guide shows: those of the router, and the namespace of the nodes.
     pub async fn start_encrypted(server: &str, speech: Speech, folder: &Path, namespace: &str) -> Self {
         let own = free_endpoint();
         let router = open(encrypted_router(server, &own, folder)).await;
@@ -259,8 +260,8 @@ fn settings(mode: &str, connect: &str, listen: Option<&str>) -> Config {
     config.expect("settings of zenoh")
 }
 
-/// `client/ros2/router_tls.json5` as a person changes it: the address of the server, and where the robot's files are. Besides,
-/// the router listens where nobody else does.
+/// `client/ros2/router_tls.json5` as a person changes it: the address of the server, and where the
+/// robot's files are. Besides, the router listens where nobody else does.
 pub fn encrypted_router(server: &str, listen: &str, folder: &Path) -> Config {
     let path = root().join("client/ros2/router_tls.json5");
     let shown = std::fs::read_to_string(path).expect("the settings of the guide");

@@ -1,4 +1,5 @@
-//! A zenoh router as an operator runs it, inside the test: it can end and begin again at the same place.
+//! A zenoh router as an operator runs it, inside the test: it can end and begin again at the same
+//! place.
 
 use serde_json::{Value, json};
 use std::net::TcpListener;

@@ -26,8 +26,8 @@ pub fn views(building: &Arc<Building>, params: &LessonParams) -> Vec<(String, Se
     stops(building, params).into_iter().map(measure).collect()
 }
 
-/// Writes `truth.json`, the pictures, and the posters of `taught` as pictures to teach from. Quads with a side
-/// shorter than `min_side_px` are not labelled.
+/// Writes `truth.json`, the pictures, and the posters of `taught` as pictures to teach from. Quads
+/// with a side shorter than `min_side_px` are not labelled.
 pub fn write_set(
     folder: &Path,
     building: &Building,

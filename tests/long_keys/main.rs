@@ -1,7 +1,8 @@
-//! Claim: a robot may put, delete, ask, reply, declare and be interested in keys of more than 65 535 bytes, which zenoh cannot
-//! send: its connection ends, it is told so, no thread panics, the server stays ready, and another robot loses no message. So
-//! it is with a certificate and without. A panic inside zenoh by another way ends the program in order, with its cause. A
-//! process of its own: what is looked for ends the process.
+//! Claim: a robot may put, delete, ask, reply, declare and be interested in keys of more than 65
+//! 535 bytes, which zenoh cannot send: its connection ends, it is told so, no thread panics, the
+//! server stays ready, and another robot loses no message. So it is with a certificate and without.
+//! A panic inside zenoh by another way ends the program in order, with its cause. A process of its
+//! own: what is looked for ends the process.
 
 mod raw;
 
@@ -33,7 +34,8 @@ fn count_panics() {
     }));
 }
 
-/// Keys of a length: below what the robot `r1` writes and hears, of a map, of a server, of another robot, of none.
+/// Keys of a length: below what the robot `r1` writes and hears, of a map, of a server, of another
+/// robot, of none.
 fn keys(length: usize) -> Vec<String> {
     let shapes = [
         ("robot/r1/frame/", ""),
@@ -108,7 +110,8 @@ async fn long_keys_of_a_robot_disturb_no_other() {
     }
 }
 
-/// Says one kind of thing about keys of all lengths and of all shapes, each in a session of its own. Each is told that it ends.
+/// Says one kind of thing about keys of all lengths and of all shapes, each in a session of its
+/// own. Each is told that it ends.
 fn said(endpoint: &str, tls: Option<&RobotTls>, kind: Kind) {
     let of_all_lengths = LENGTHS.iter().flat_map(|length| keys(*length).into_iter().take(1));
     let keys = of_all_lengths.chain(keys(LENGTHS[1]).into_iter().skip(1));

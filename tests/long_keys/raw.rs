@@ -1,4 +1,5 @@
-//! A robot that speaks zenoh's transport by hand: the client of the crate stops itself before it sends what is wrong.
+//! A robot that speaks zenoh's transport by hand: the client of the crate stops itself before it
+//! sends what is wrong.
 
 use client::RobotTls;
 use rustls::{
@@ -92,7 +93,8 @@ impl RawRobot {
         self.send(&init);
         let ack = self.receive();
         assert_eq!(ack[0] & 0x3f, 0x21, "{ack:?}");
-        // Version, kind with the length of the id, id; resolution and size of batches where they are announced; cookie.
+        // Version, kind with the length of the id, id; resolution and size of batches where they
+        // are announced; cookie.
         let mut at = 3 + usize::from(ack[2] >> 4) + 1 + if ack[0] & 0x40 == 0 { 0 } else { 3 };
         let (mut length, mut shift) = (0, 0);
         loop {
@@ -133,7 +135,8 @@ impl RawRobot {
         self.send(&frame);
     }
 
-    /// Declares all of `key` but its end, in parts that rest on one another; the id of what is declared, and the end.
+    /// Declares all of `key` but its end, in parts that rest on one another; the id of what is
+    /// declared, and the end.
     fn declare<'a>(&mut self, key: &'a str) -> (u64, &'a str) {
         let (mut scope, mut rest) = (0, key);
         while rest.len() > PART {
@@ -182,7 +185,8 @@ pub(crate) enum Kind {
     TokenQuestion,
     /// Present and coming subscribers and queryables, and declared keys.
     Interest,
-    /// The same, told as one: zenoh 1.10.2 declares the key of the interest in return, which no access control checks.
+    /// The same, told as one: zenoh 1.10.2 declares the key of the interest in return, which no
+    /// access control checks.
     AggregateInterest,
 }
 

@@ -1,4 +1,5 @@
-//! Time of each stage from image to segments on a 640x480 scene: framed posters with texture on a shaded wall, noise.
+//! Time of each stage from image to segments on a 640x480 scene: framed posters with texture on a
+//! shaded wall, noise.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
@@ -11,7 +12,8 @@ use vision::{
     frame::GrayImage,
 };
 
-/// Six framed posters, a quarter of the image each way filled with blocks of texture, noise of +-3 levels.
+/// Six framed posters, a quarter of the image each way filled with blocks of texture, noise of +-3
+/// levels.
 fn scene() -> GrayImage {
     GrayImage::from_fn(640, 480, |u, v| {
         let hash = |a: usize, b: usize| ((a * 73_856_093) ^ (b * 19_349_663)).wrapping_mul(83_492_791) >> 7;

@@ -1,4 +1,5 @@
-//! Cost of recognition: features of one icon, and one quad that is no landmark against 1000 of them.
+//! Cost of recognition: features of one icon, and one quad that is no landmark against 1000 of
+//! them.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use nalgebra::Matrix2;

@@ -1,5 +1,6 @@
-//! Prints the straight segments of photographs as CSV, and the time of each stage to standard error:
-//! `cargo run --release -p vision --example segments -- [PARAMS.json] IMAGE...`, the parameters as in `DetectParams`.
+//! Prints the straight segments of photographs as CSV, and the time of each stage to standard
+//! error: `cargo run --release -p vision --example segments -- [PARAMS.json] IMAGE...`, the
+//! parameters as in `DetectParams`.
 #![expect(clippy::disallowed_methods, clippy::disallowed_types, reason = "a program with files and a clock")]
 #![expect(clippy::print_stdout, reason = "a command-line example")]
 

@@ -1,5 +1,5 @@
-//! A quad in, its rectified square picture, the icon, out (method 4). Grey levels of the source are averaged over
-//! each icon cell. The corner order defines the orientation.
+//! A quad in, its rectified square picture, the icon, out (method 4). Grey levels of the source are
+//! averaged over each icon cell. The corner order defines the orientation.
 
 use crate::{
     frame::GrayImage,
@@ -13,7 +13,8 @@ pub const MIN_ICON_SIZE: usize = 20;
 /// Largest icon side, in pixels.
 pub const MAX_ICON_SIZE: usize = 200;
 
-/// A landmark's appearance, rectified to a square of `size` x `size` grey levels, upright as the corners say.
+/// A landmark's appearance, rectified to a square of `size` x `size` grey levels, upright as the
+/// corners say.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "UncheckedIcon")]
 pub struct Icon {
@@ -54,7 +55,8 @@ pub enum IconError {
         /// The setting.
         size: usize,
     },
-    /// A grey level is not in [0, 255], their number is not size x size, or the scale is not positive and finite.
+    /// A grey level is not in [0, 255], their number is not size x size, or the scale is not
+    /// positive and finite.
     #[error("icon field {field} is malformed")]
     Malformed {
         /// Name of the field.
@@ -95,7 +97,8 @@ impl TryFrom<UncheckedIcon> for Icon {
 }
 
 impl Icon {
-    /// Checks an icon from external data: `pixels` row-major, `size * size` grey levels in [0, 255].
+    /// Checks an icon from external data: `pixels` row-major, `size * size` grey levels in [0,
+    /// 255].
     pub fn new(size: usize, pixels: Vec<f32>, source_scale: f64) -> Result<Self, IconError> {
         if !(MIN_ICON_SIZE..=MAX_ICON_SIZE).contains(&size) {
             return Err(IconError::Size { size });
@@ -109,7 +112,8 @@ impl Icon {
         Ok(Self { size, pixels, source_scale })
     }
 
-    /// The icon that `corners.rotated(shift)` would give: a turn by `shift` quarters, counter-clockwise.
+    /// The icon that `corners.rotated(shift)` would give: a turn by `shift` quarters,
+    /// counter-clockwise.
     #[must_use]
     pub fn rotated(&self, shift: usize) -> Self {
         let last = self.size.saturating_sub(1);
@@ -179,8 +183,8 @@ fn outside_cells(image: &GrayImage, image_from_icon: &Homography, size: usize) -
         .count()
 }
 
-/// Sum and number of the pixels whose centres lie in each cell. A pixel centre lies in the quadrilateral that a cell
-/// maps to exactly when the inverse map takes it into the cell.
+/// Sum and number of the pixels whose centres lie in each cell. A pixel centre lies in the
+/// quadrilateral that a cell maps to exactly when the inverse map takes it into the cell.
 fn cell_sums(
     image: &GrayImage,
     corners_px: &Corners,
@@ -230,7 +234,8 @@ fn row_span(points: &[Point2<f64>; 4], v: f64, width: usize) -> Option<(usize, u
         low = low.min(u);
         high = high.max(u);
     }
-    // One column more on both sides: the inverse map, not this, decides which pixels belong to the quad.
+    // One column more on both sides: the inverse map, not this, decides which pixels belong to the
+    // quad.
     let low = (low.floor() - 1.0).max(0.0);
     let high = (high.ceil() + 1.0).min((width - 1) as f64);
     (low <= high).then_some((low as usize, high as usize))
@@ -238,16 +243,18 @@ fn row_span(points: &[Point2<f64>; 4], v: f64, width: usize) -> Option<(usize, u
 
 /// Bilinear samples along each axis of a cell that is not averaged.
 ///
-/// Departs from method 4: it takes one sample, and only in cells without any pixel centre. Between one and two source
-/// pixels a cell, averaging the one or two centres that happen to fall in is noisier than sampling.
+/// Departs from method 4: it takes one sample, and only in cells without any pixel centre. Between
+/// one and two source pixels a cell, averaging the one or two centres that happen to fall in is
+/// noisier than sampling.
 const SAMPLES: usize = 2;
 /// Width that a bilinear sample covers, in pixels: its kernel reaches one pixel to either side.
 const SAMPLE_PX: f64 = 1.5;
 /// Most samples along each axis of a cell.
 const MAX_SAMPLES: usize = 4;
 
-/// Grey levels of cells `first`, `first + 1`, ... of `row`, by samples spread over each: as many along each axis as
-/// leave one for every [`SAMPLE_PX`] of the image's pixels, up to four. For the surroundings of an icon.
+/// Grey levels of cells `first`, `first + 1`, ... of `row`, by samples spread over each: as many
+/// along each axis as leave one for every [`SAMPLE_PX`] of the image's pixels, up to four. For the
+/// surroundings of an icon.
 pub(crate) fn sample_cells(
     image: &GrayImage,
     image_from_cell: &Homography,
@@ -259,8 +266,8 @@ pub(crate) fn sample_cells(
     sample_row(image, image_from_cell, first, row, samples_for(pixels_per_cell, SAMPLE_PX), cells);
 }
 
-/// Samples along each axis of a cell of so many of the image's pixels, one for every `sample_px`, at most
-/// [`MAX_SAMPLES`].
+/// Samples along each axis of a cell of so many of the image's pixels, one for every `sample_px`,
+/// at most [`MAX_SAMPLES`].
 pub(crate) fn samples_for(pixels_per_cell: f64, sample_px: f64) -> usize {
     ((pixels_per_cell / sample_px).ceil() as usize).clamp(1, MAX_SAMPLES)
 }

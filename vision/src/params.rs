@@ -1,4 +1,5 @@
-//! All parameters of the pipeline, grouped by stage. Defaults and their sources: docs/method/20-parameters.md.
+//! All parameters of the pipeline, grouped by stage. Defaults and their sources:
+//! docs/method/20-parameters.md.
 
 mod distance_hash;
 

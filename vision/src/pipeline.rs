@@ -1,5 +1,5 @@
-//! The recognition pipeline: an image, the landmarks of a map and what is known of the camera in; quads, verdicts and
-//! poses out.
+//! The recognition pipeline: an image, the landmarks of a map and what is known of the camera in;
+//! quads, verdicts and poses out.
 //!
 //! Calls the stages in order. The map crate computes the robot's pose.
 
@@ -77,11 +77,11 @@ pub struct FrameAnalysis {
 pub struct QuadAnalysis {
     /// The quad as detected.
     pub quad: Quad,
-    /// The verdict; `None` for quads that were not compared (beyond [`MAX_RECOGNISED_QUADS`]), and for
-    /// three-sided ones that no points identify.
+    /// The verdict; `None` for quads that were not compared (beyond [`MAX_RECOGNISED_QUADS`]), and
+    /// for three-sided ones that no points identify.
     pub recognition: Option<RecognitionResult>,
-    /// The corners of a landmark that was uniquely recognised, its top-left first: those that the pose rests on, or
-    /// without a pose those by the picture. `None` for other quads.
+    /// The corners of a landmark that was uniquely recognised, its top-left first: those that the
+    /// pose rests on, or without a pose those by the picture. `None` for other quads.
     pub border_px: Option<Corners>,
     /// The landmark in the camera frame, or why not.
     pub pose: Result<LandmarkPose, PoseUnavailable>,
@@ -104,15 +104,16 @@ pub enum PoseUnavailable {
     Border(#[from] BorderError),
 }
 
-/// The pipeline with memory reused from frame to frame: fresh planes cost more than a tenth of the time to
-/// segments. One a thread. Results do not depend on the memory.
+/// The pipeline with memory reused from frame to frame: fresh planes cost more than a tenth of the
+/// time to segments. One a thread. Results do not depend on the memory.
 #[derive(Debug, Default)]
 pub struct Pipeline {
     buffers: DetectBuffers,
 }
 
 impl Pipeline {
-    /// Quads, verdicts and poses of a picture. Colour serves the detection; what a quad shows is read in grey.
+    /// Quads, verdicts and poses of a picture. Colour serves the detection; what a quad shows is
+    /// read in grey.
     pub fn analyse<'a>(
         &mut self,
         image: impl Into<PictureRef<'a>>,
@@ -204,8 +205,9 @@ fn is_recognised(analysis: &QuadAnalysis) -> bool {
     analysis.recognition.as_ref().is_some_and(|v| v.verdict != Verdict::Unknown)
 }
 
-/// Where no quad has a name, compares the first one in the rotations that up rules out. A landmark may hang otherwise
-/// than it was taught, and a mounting may be wrong: then its name says so, and its pose fits no robot on the floor.
+/// Where no quad has a name, compares the first one in the rotations that up rules out. A landmark
+/// may hang otherwise than it was taught, and a mounting may be wrong: then its name says so, and
+/// its pose fits no robot on the floor.
 fn recognise_turned(
     image: &GrayImage,
     (quads, verdicts): (&mut [Quad], &mut [Option<RecognitionResult>]),
@@ -227,7 +229,8 @@ fn recognise_turned(
     }
 }
 
-/// While no pose of a robot is supported, adds those of landmarks that the texture shows without a border.
+/// While no pose of a robot is supported, adds those of landmarks that the texture shows without a
+/// border.
 fn add_by_texture(
     image: &GrayImage,
     (quads, verdicts): (&mut Vec<Quad>, &mut Vec<Option<RecognitionResult>>),
@@ -256,8 +259,9 @@ fn named(quad: &Quad, verdict: &RecognitionResult) -> Option<(LandmarkId, Corner
     Some((landmark, verdict.aligned_px.unwrap_or(quad.corners_px)))
 }
 
-/// Which of the landmarks a single quad may be, by its picture alone, and their common border in the image; `None`
-/// for the border where it is none of them. For look-alikes, which a single frame cannot identify.
+/// Which of the landmarks a single quad may be, by its picture alone, and their common border in
+/// the image; `None` for the border where it is none of them. For look-alikes, which a single frame
+/// cannot identify.
 pub fn recognise_quad(
     image: &GrayImage,
     quad: &Quad,
@@ -270,8 +274,8 @@ pub fn recognise_quad(
     (verdict, border)
 }
 
-/// Where an alternate border was recognised, it becomes the corners of the quad: the outer border may be the wall
-/// round a poster.
+/// Where an alternate border was recognised, it becomes the corners of the quad: the outer border
+/// may be the wall round a poster.
 fn turn_to_recognised(quad: &mut Quad, verdict: &mut RecognitionResult) {
     if verdict.verdict == Verdict::Unknown || verdict.border == 0 {
         return;
@@ -282,7 +286,8 @@ fn turn_to_recognised(quad: &mut Quad, verdict: &mut RecognitionResult) {
     }
 }
 
-/// The border of a uniquely recognised landmark of known size, seen by a known camera: only such a landmark has a pose.
+/// The border of a uniquely recognised landmark of known size, seen by a known camera: only such a
+/// landmark has a pose.
 fn border<'c>(
     image: PictureRef<'_>,
     quad: &Quad,

@@ -1,5 +1,5 @@
-//! A small seeded source of random numbers for generated views: the same seed gives the same views on every machine.
-//! Not for secrets.
+//! A small seeded source of random numbers for generated views: the same seed gives the same views
+//! on every machine. Not for secrets.
 
 /// `SplitMix64` (Steele, Lea, Flood 2014): one 64-bit word of state, every seed is valid.
 #[derive(Debug, Clone)]

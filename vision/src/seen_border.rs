@@ -3,7 +3,8 @@
 use crate::{detect::quad::BORDER_SIGMA_PX, geometry::corners::Corners, params::Params};
 use nalgebra::Matrix2;
 
-/// Standard deviation of an aligned corner, in icon pixels: twice the tolerance of the alignment's test.
+/// Standard deviation of an aligned corner, in icon pixels: twice the tolerance of the alignment's
+/// test.
 pub(crate) const ALIGNED_SIGMA_ICON_PX: f64 = 0.5;
 
 /// The taught border of a landmark in an image.
@@ -52,7 +53,8 @@ pub(crate) fn aligned_covariance_px2(corners_px: &Corners, icon_size: usize) -> 
 /// Corners that differ by less, in icon pixels, belong to one border.
 const SAME_BORDER_ICON_PX: f64 = 1.5;
 
-/// Whether aligned corners are those of the detected border; its edges then give the more accurate corners.
+/// Whether aligned corners are those of the detected border; its edges then give the more accurate
+/// corners.
 pub(crate) fn is_same_border(detected_px: &Corners, aligned_px: &Corners, p: &Params) -> bool {
     let icon_px = detected_px.area_px2().sqrt() / p.icon.size as f64;
     detected_px.furthest_px(aligned_px) < SAME_BORDER_ICON_PX * icon_px

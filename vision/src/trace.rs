@@ -1,5 +1,5 @@
-//! An optional record of every stage, for pictures and timings. The pipeline hands each stage's output to a `Trace`;
-//! with [`NoTrace`] that costs nothing. Implementations measure time and draw.
+//! An optional record of every stage, for pictures and timings. The pipeline hands each stage's
+//! output to a `Trace`; with [`NoTrace`] that costs nothing. Implementations measure time and draw.
 
 use crate::{
     detect::{

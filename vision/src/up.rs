@@ -1,8 +1,8 @@
 //! Which corner of a quad is the top-left one (method 4, A10).
 //!
-//! In: quads as the detector names their corners, by +v of the image; the direction of up in the camera frame, from
-//! the camera's mounting. Out: the same quads, named by that direction. Where it does not decide, or is not known,
-//! they are marked, and recognition tries all four rotations.
+//! In: quads as the detector names their corners, by +v of the image; the direction of up in the
+//! camera frame, from the camera's mounting. Out: the same quads, named by that direction. Where it
+//! does not decide, or is not known, they are marked, and recognition tries all four rotations.
 
 use crate::{
     detect::{quad::Quad, refine::corners::upright_ambiguous},
@@ -11,11 +11,11 @@ use crate::{
 };
 use nalgebra::{Point2, Unit, Vector2, Vector3};
 
-/// Largest elevation of a line of sight, above or below the horizon, at which up in the image decides. Near the
-/// zenith objects on ceilings are as likely as those on walls.
+/// Largest elevation of a line of sight, above or below the horizon, at which up in the image
+/// decides. Near the zenith objects on ceilings are as likely as those on walls.
 const MAX_ELEVATION_DEG: f64 = 45.0;
-/// The same in a map with landmarks that are level: from lines of sight nearer to the horizon they are seen at more
-/// than 70 degrees, where none is recognised.
+/// The same in a map with landmarks that are level: from lines of sight nearer to the horizon they
+/// are seen at more than 70 degrees, where none is recognised.
 const MAX_ELEVATION_WITH_LEVEL_DEG: f64 = 20.0;
 
 /// The direction of up in the camera frame, of a camera whose robot stands on the floor.
@@ -26,7 +26,8 @@ pub struct Up {
 }
 
 impl Up {
-    /// From a direction of any length, camera frame (x right, y down, z forward). `None` where it has none.
+    /// From a direction of any length, camera frame (x right, y down, z forward). `None` where it
+    /// has none.
     pub fn new(camera_up: Vector3<f64>) -> Option<Self> {
         let is_direction = camera_up.iter().all(|x| x.is_finite());
         let camera_up = Unit::try_new(camera_up, f64::MIN_POSITIVE).filter(|_| is_direction)?;
@@ -51,9 +52,9 @@ impl Up {
         (!upright_ambiguous(&corners_px.rotated(shift), &down)).then_some(shift)
     }
 
-    /// The direction of gravity at `px`, in pixels (unit length): towards the vanishing point of what is vertical.
-    /// `None` where the line of sight is too steep. Without intrinsics, every line of sight is taken as the optical
-    /// axis.
+    /// The direction of gravity at `px`, in pixels (unit length): towards the vanishing point of
+    /// what is vertical. `None` where the line of sight is too steep. Without intrinsics, every
+    /// line of sight is taken as the optical axis.
     pub(crate) fn down_at(&self, px: &Point2<f64>, intrinsics: Option<&Intrinsics>) -> Option<Vector2<f64>> {
         let up = self.camera_up;
         let straight = intrinsics.map(|k| {
@@ -83,8 +84,8 @@ fn centre(corners_px: &Corners) -> Point2<f64> {
 }
 
 impl Quad {
-    /// Names the corners of quad and alternates by `up`, and marks the quad where that does not decide. `None`: up is
-    /// not known, the corners stay as they are, and the quad is marked.
+    /// Names the corners of quad and alternates by `up`, and marks the quad where that does not
+    /// decide. `None`: up is not known, the corners stay as they are, and the quad is marked.
     #[must_use]
     pub fn named_by(self, up: Option<&Up>, intrinsics: Option<&Intrinsics>) -> Self {
         let down = up.and_then(|up| up.down_at(&centre(&self.corners_px), intrinsics));

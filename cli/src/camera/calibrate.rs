@@ -1,4 +1,5 @@
-//! `waymark camera calibrate`: a camera's intrinsics from pictures of one flat object of known shape, no server needed.
+//! `waymark camera calibrate`: a camera's intrinsics from pictures of one flat object of known
+//! shape, no server needed.
 
 use crate::{
     camera_arg::{Lens, LensDifference},
@@ -21,16 +22,18 @@ use vision::{
 /// `waymark camera calibrate`.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// Pictures by one camera (PNG, JPEG, or folders of them) of one flat, textured rectangle: 2 to 32, better 3 or more,
-    /// from sides that differ by more than 15 degrees. The report has their lens, where their EXIF says it.
+    /// Pictures by one camera (PNG, JPEG, or folders of them) of one flat, textured rectangle: 2 to
+    /// 32, better 3 or more, from sides that differ by more than 15 degrees. The report has their
+    /// lens, where their EXIF says it.
     #[arg(required_unless_present = "corners")]
     images: Vec<PathBuf>,
-    /// Width and height of the object in metres, such as 0.60x0.84. With corners only their ratio matters for the camera;
-    /// with pictures they only set the distances.
+    /// Width and height of the object in metres, such as 0.60x0.84. With corners only their ratio
+    /// matters for the camera; with pictures they only set the distances.
     #[arg(long, value_parser = size)]
     size: LandmarkSize,
-    /// Corners instead of pictures: JSON `{"width": px, "height": px, "views": [[[x,y],[x,y],[x,y],[x,y]], ...]}`, each
-    /// view top-left, top-right, bottom-right, bottom-left.
+    /// Corners instead of pictures: JSON
+    /// `{"width": px, "height": px, "views": [[[x,y],[x,y],[x,y],[x,y]], ...]}`, each view
+    /// top-left, top-right, bottom-right, bottom-left.
     #[arg(long, value_name = "FILE", conflicts_with = "images")]
     corners: Option<PathBuf>,
     #[command(flatten)]
@@ -43,16 +46,19 @@ pub(crate) struct Args {
 /// What is known of the camera beside the views.
 #[derive(Debug, clap::Args)]
 struct Constraints {
-    /// Radial coefficients (k1, k2) that may be fitted, 0 to 2; only those are that the views ask for.
+    /// Radial coefficients (k1, k2) that may be fitted, 0 to 2; only those are that the views ask
+    /// for.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u8).range(0..=2))]
     radial: u8,
     /// The camera does not roll (C2).
     #[arg(long)]
     zero_roll: bool,
-    /// With corners: the camera is this high over the landmark's centre in all views, metres; negative below (C3).
+    /// With corners: the camera is this high over the landmark's centre in all views, metres;
+    /// negative below (C3).
     #[arg(long, value_name = "METRES", allow_negative_numbers = true, requires = "corners")]
     height_m: Option<f64>,
-    /// With corners: the ratio of the landmark's sides is not what its size says, and is found with the camera.
+    /// With corners: the ratio of the landmark's sides is not what its size says, and is found with
+    /// the camera.
     #[arg(long, requires = "corners")]
     unknown_aspect: bool,
 }
@@ -135,7 +141,8 @@ fn views_of_file(file: &Path, size: LandmarkSize) -> anyhow::Result<Views> {
     Ok(((0..views.len()).map(|i| format!("view {i}")).collect(), views, [given.width, given.height]))
 }
 
-/// Names and pictures, and the lens that they are by, where their files say it. Error: they are by several.
+/// Names and pictures, and the lens that they are by, where their files say it. Error: they are by
+/// several.
 fn read(images: &[PathBuf]) -> anyhow::Result<(Vec<String>, Vec<GrayImage>, Option<Lens>)> {
     let (mut names, mut read, mut lens) = (vec![], vec![], None);
     let files = detect::files(images)?;

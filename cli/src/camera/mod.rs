@@ -20,16 +20,18 @@ pub(crate) struct Args {
 
 #[derive(Debug, clap::Subcommand)]
 enum Verb {
-    /// A camera's focal length, principal point and distortion from pictures of one flat object; no server needed
+    /// A camera's focal length, principal point and distortion from pictures of one flat object; no
+    /// server needed
     ///
-    /// Five to ten pictures of one poster or board from different sides, each of which shows it as its largest quad; at
-    /// least three of the sides must differ by more than 15 degrees. Pictures that do not fit the others are left out
-    /// and named. For example:
+    /// Five to ten pictures of one poster or board from different sides, each of which shows it as
+    /// its largest quad; at least three of the sides must differ by more than 15 degrees. Pictures
+    /// that do not fit the others are left out and named. For example:
     ///   waymark camera calibrate pictures/ --size 0.60x0.84
     ///   waymark camera calibrate --corners corners.json --size 1x1 --radial 0 --json
     #[command(verbatim_doc_comment)]
     Calibrate(calibrate::Args),
-    /// List the cameras of a robot: intrinsics, frames, and whether fixes say that the intrinsics are wrong.
+    /// List the cameras of a robot: intrinsics, frames, and whether fixes say that the intrinsics
+    /// are wrong.
     List {
         /// The robot.
         robot: String,

@@ -1,5 +1,6 @@
-//! Files of cameras. In: the report of `waymark camera calibrate --json`, `Intrinsics` as JSON, or the YAML file of ROS'
-//! `camera_calibration` (`ost.yaml`) and of OpenCV. Out: intrinsics, and the size of picture that they are of.
+//! Files of cameras. In: the report of `waymark camera calibrate --json`, `Intrinsics` as JSON, or
+//! the YAML file of ROS' `camera_calibration` (`ost.yaml`) and of OpenCV. Out: intrinsics, and the
+//! size of picture that they are of.
 
 use super::{CameraArg, lens::Lens};
 use client::{api::CalibrationReport, v1};

@@ -1,5 +1,5 @@
-//! Which lens a photograph was taken with. In: a picture file. Out: what its EXIF says, and whether two photographs may be of one
-//! camera.
+//! Which lens a photograph was taken with. In: a picture file. Out: what its EXIF says, and whether
+//! two photographs may be of one camera.
 
 use image::ImageDecoder as _;
 use serde::{Deserialize, Serialize};
@@ -14,7 +14,8 @@ const FOCAL_LENGTH_35MM: u16 = 0xa405;
 const MAX_ENTRIES: u16 = 512;
 /// Longest name, in bytes.
 const MAX_NAME_BYTES: usize = 64;
-/// Largest difference of two focal lengths of one lens, as a share; they are rounded to a millimetre, too.
+/// Largest difference of two focal lengths of one lens, as a share; they are rounded to a
+/// millimetre, too.
 const SAME_FOCAL: f64 = 0.06;
 
 /// The lens and its camera, as far as they are stated.
@@ -26,7 +27,8 @@ pub(crate) struct Lens {
     /// Which camera it is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     model: Option<String>,
-    /// Focal length that a film of 36 x 24 mm would have for the same view, mm: each lens of a phone has its own.
+    /// Focal length that a film of 36 x 24 mm would have for the same view, mm: each lens of a
+    /// phone has its own.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     focal_35mm: Option<u16>,
 }
@@ -60,7 +62,8 @@ impl Lens {
         (lens != Self::default()).then_some(lens)
     }
 
-    /// What speaks against both being of one camera; what one does not state speaks against nothing.
+    /// What speaks against both being of one camera; what one does not state speaks against
+    /// nothing.
     pub(crate) fn difference(&self, other: &Self) -> Option<LensDifference> {
         if let Some((a, b)) = self.focal_35mm.zip(other.focal_35mm)
             && f64::from(a.abs_diff(b)) > (SAME_FOCAL * f64::from(a.max(b))).max(1.0)

@@ -1,4 +1,5 @@
-//! The demo's second part: robots drive, send frames and odometry over zenoh, and receive their poses.
+//! The demo's second part: robots drive, send frames and odometry over zenoh, and receive their
+//! poses.
 
 use super::{Args, MAP};
 use crate::{pictures, screen};
@@ -77,7 +78,8 @@ pub(super) async fn drive(
         let params = RobotParams {
             drive: DriveParams {
                 seed: args.seed.wrapping_mul(1000) + u64::from(number) + 1,
-                // Every other robot comes the other way, from the far end, the others from places of their own.
+                // Every other robot comes the other way, from the far end, the others from places
+                // of their own.
                 start_m: if number % 2 == 0 { 1.5 * f64::from(number) } else { FAR_END_M },
                 reverse: number % 2 == 1,
                 legs: args.legs,
@@ -241,7 +243,8 @@ fn is_true(name: &str, quad: &client::v1::QuadAnswer, truth: &FrameTruth, size_p
 }
 
 impl Record {
-    /// Counts a landmark that was named. One that the pose named is no recognition, whether right or wrong.
+    /// Counts a landmark that was named. One that the pose named is no recognition, whether right
+    /// or wrong.
     pub(super) fn count(&mut self, is_guided: bool, is_true: bool) {
         match (is_guided, is_true) {
             (false, true) => self.recognitions += 1,

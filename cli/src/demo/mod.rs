@@ -1,5 +1,6 @@
-//! `waymark demo`: a server, a simulated corridor, a first drive that teaches, then robots that are localised.
-//! Everything works as with real robots: lessons over HTTP, frames over zenoh. Only the building is simulated.
+//! `waymark demo`: a server, a simulated corridor, a first drive that teaches, then robots that are
+//! localised. Everything works as with real robots: lessons over HTTP, frames over zenoh. Only the
+//! building is simulated.
 
 mod drive;
 mod summary;
@@ -50,13 +51,15 @@ pub(crate) struct Args {
     /// Where the page listens [default: 127.0.0.1:8080, or a free port if that is taken].
     #[arg(long)]
     http: Option<String>,
-    /// Keep the server and its map in this folder afterwards [default: a temporary folder, removed].
+    /// Keep the server and its map in this folder afterwards [default: a temporary folder,
+    /// removed].
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
     /// Keep serving the page after the summary, until Ctrl-C.
     #[arg(long)]
     stay: bool,
-    /// Record the robots' drives to this MCAP file, which must not exist; they send the scans of their lasers, too.
+    /// Record the robots' drives to this MCAP file, which must not exist; they send the scans of
+    /// their lasers, too.
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
     /// End with the summary as one JSON object.

@@ -16,7 +16,8 @@ pub(super) struct Summary {
     landmark_views: usize,
     recognitions: usize,
     pub(super) false_matches: usize,
-    /// Quads that the pose named where the picture alone did not, and those of them that are not that landmark.
+    /// Quads that the pose named where the picture alone did not, and those of them that are not
+    /// that landmark.
     guided: usize,
     pub(super) false_guided: usize,
     corrections: u64,

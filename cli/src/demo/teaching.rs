@@ -1,4 +1,5 @@
-//! The demo's first part: teaches the server over HTTP what the surveying robot measured (`cli/survey.rs`).
+//! The demo's first part: teaches the server over HTTP what the surveying robot measured
+//! (`cli/survey.rs`).
 
 use super::MAP;
 use crate::{

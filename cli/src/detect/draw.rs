@@ -1,4 +1,5 @@
-//! One picture for every stage of the detector, and an overview of all. In: the recorded stages. Out: pictures.
+//! One picture for every stage of the detector, and an overview of all. In: the recorded stages.
+//! Out: pictures.
 
 use super::record::Record;
 use crate::drawing::{BLUE, CYAN, Colour, GREEN, MAGENTA, ORANGE, Picture, RED, SERIES, WHITE, YELLOW};

@@ -23,13 +23,15 @@ pub(crate) struct Args {
     /// PNG or JPEG files, or folders of them.
     #[arg(required_unless_present = "show_params")]
     images: Vec<PathBuf>,
-    /// One JSON line per picture: `{"image","width","height","quads":[{"corners":[[x,y]*4],"kind","score"}],"timings_ms"}`.
+    /// One JSON line per picture:
+    /// `{"image","width","height","quads":[{"corners":[[x,y]*4],"kind","score"}],"timings_ms"}`.
     ///
-    /// Corners are top-left, top-right, bottom-right, bottom-left in pixels; pixel (0, 0) is the centre of the
-    /// top-left pixel.
+    /// Corners are top-left, top-right, bottom-right, bottom-left in pixels; pixel (0, 0) is the
+    /// centre of the top-left pixel.
     #[arg(long)]
     json: bool,
-    /// Write pictures of every stage (edges, chains, segments, pairs or proposals, quads) and an overview here.
+    /// Write pictures of every stage (edges, chains, segments, pairs or proposals, quads) and an
+    /// overview here.
     #[arg(long, value_name = "DIR")]
     draw: Option<PathBuf>,
     /// Print all parameters as JSON, as a file for --params, and end if there are no images.

@@ -1,5 +1,5 @@
-//! The file with the token of each server, `waymark/credentials.toml` in the user's folder of settings, readable by the user
-//! alone.
+//! The file with the token of each server, `waymark/credentials.toml` in the user's folder of
+//! settings, readable by the user alone.
 
 use super::TokenArg;
 use crate::failure::{Class, Failure};

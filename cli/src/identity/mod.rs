@@ -1,5 +1,5 @@
-//! Who asks: `waymark login`, `waymark logout`, `waymark open`, `waymark token`, and the credentials that the other commands
-//! use.
+//! Who asks: `waymark login`, `waymark logout`, `waymark open`, `waymark token`, and the
+//! credentials that the other commands use.
 
 pub(crate) mod credentials;
 pub(crate) mod login;

@@ -22,7 +22,8 @@ pub(crate) struct Args {
 enum Verb {
     /// Make a token, and print it: it is shown this once
     ///
-    /// Each role may do all that those before it may: viewer, robot, teacher, operator, admin. For example:
+    /// Each role may do all that those before it may: viewer, robot, teacher, operator, admin. For
+    /// example:
     ///   waymark token create kim --role teacher --for-map office --valid 90d
     #[command(verbatim_doc_comment)]
     Create {

@@ -29,7 +29,8 @@ pub(crate) struct Args {
 enum Verb {
     /// List the landmarks of a map: state, size, place, quality
     ///
-    /// For example, those that are not in use and have `door` in their names; those that were changed last:
+    /// For example, those that are not in use and have `door` in their names; those that were
+    /// changed last:
     ///   waymark landmark list --state inactive --name door
     ///   waymark landmark list --sort=-changed
     #[command(verbatim_doc_comment)]
@@ -41,9 +42,10 @@ enum Verb {
     },
     /// Teach a landmark from photographs
     ///
-    /// The server finds the one framed object in each photograph, learns it, and says whether the landmark is in use or
-    /// which check it failed. Where a photograph shows several, they are numbered in a picture beside it: take one with
-    /// --pick. Nothing is made if no photograph can be used.
+    /// The server finds the one framed object in each photograph, learns it, and says whether the
+    /// landmark is in use or which check it failed. Where a photograph shows several, they are
+    /// numbered in a picture beside it: take one with --pick. Nothing is made if no photograph can
+    /// be used.
     ///
     /// For example:
     ///   waymark landmark teach poster --size 0.60x0.84 photo1.jpg photo2.jpg
@@ -51,16 +53,19 @@ enum Verb {
     ///   waymark landmark teach poster hall.jpg --pick 2
     #[command(verbatim_doc_comment)]
     Teach(teach::TeachArgs),
-    /// Set the place of a landmark: on a wall by tape measure, by coordinates, or by a photograph from a known place
+    /// Set the place of a landmark: on a wall by tape measure, by coordinates, or by a photograph
+    /// from a known place
     ///
-    /// By tape measure: `waymark map walls MAP --draw walls.svg` numbers the walls; stand before the wall, measure from its
-    /// left end to the middle of the landmark, and from the floor to its middle. For example:
+    /// By tape measure: `waymark map walls MAP --draw walls.svg` numbers the walls; stand before
+    /// the wall, measure from its left end to the middle of the landmark, and from the floor to its
+    /// middle. For example:
     ///   waymark landmark place poster --wall 12 --at 1.85 --height 1.50
     ///   waymark landmark place poster --xy 4.20,7.35 --facing 90 --height 1.50
     ///   waymark landmark place poster --photo p.jpg --camera 610,610,320,240 --from 2.5,3.0,45 --camera-height 1.2
     #[command(verbatim_doc_comment)]
     Place(Box<place::PlaceArgs>),
-    /// Set the width and height of a landmark; a size whose ratio its photographs contradict is refused.
+    /// Set the width and height of a landmark; a size whose ratio its photographs contradict is
+    /// refused.
     Size {
         /// The landmark.
         landmark: String,
@@ -82,7 +87,8 @@ enum Verb {
     Health {
         /// The landmark.
         landmark: String,
-        /// `sound`: it is where the map says; `flagged`: in doubt, but used; `quarantined`: corrects no pose.
+        /// `sound`: it is where the map says; `flagged`: in doubt, but used; `quarantined`:
+        /// corrects no pose.
         #[arg(value_enum)]
         health: HealthWord,
     },

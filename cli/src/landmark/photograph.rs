@@ -1,5 +1,6 @@
-//! One photograph to a training view. In: a file, and how it is cut. Out: the stored view, or a failure that names the file
-//! and what helps. Where several framed objects are found, one is taken by number.
+//! One photograph to a training view. In: a file, and how it is cut. Out: the stored view, or a
+//! failure that names the file and what helps. Where several framed objects are found, one is taken
+//! by number.
 
 use super::quad_choice::{picked, quads, refusal};
 use crate::{

@@ -1,4 +1,5 @@
-//! `waymark landmark place`: where a landmark hangs, by tape measure, by coordinates, or by a photograph.
+//! `waymark landmark place`: where a landmark hangs, by tape measure, by coordinates, or by a
+//! photograph.
 
 use super::{photograph::Photograph, show};
 use crate::{
@@ -36,7 +37,8 @@ pub(super) struct PlaceArgs {
     /// Its middle in the map: x,y in metres.
     #[arg(long, value_name = "X,Y", value_parser = pair, requires = "facing", allow_hyphen_values = true)]
     xy: Option<[f64; 2]>,
-    /// Direction that it faces, away from its wall: degrees, counter-clockwise from the map's x axis.
+    /// Direction that it faces, away from its wall: degrees, counter-clockwise from the map's x
+    /// axis.
     #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
     facing: Option<f64>,
     /// Metres from the floor to its middle.
@@ -51,8 +53,8 @@ pub(super) struct PlaceArgs {
     /// The framed object to take where the photograph shows several: 1 is the leftmost.
     #[arg(long, value_name = "N", requires = "photo")]
     pick: Option<usize>,
-    /// The camera of the photograph: the file that `waymark camera calibrate --json` wrote, ROS' ost.yaml, or
-    /// fx,fy,cx,cy in pixels.
+    /// The camera of the photograph: the file that `waymark camera calibrate --json` wrote, ROS'
+    /// ost.yaml, or fx,fy,cx,cy in pixels.
     #[arg(long, value_name = "FILE|FX,FY,CX,CY", value_parser = camera)]
     camera: Option<CameraArg>,
     /// Where the camera stood and looked: x,y in metres, direction in degrees.
@@ -136,8 +138,8 @@ fn height(args: &PlaceArgs, landmark: &Landmark) -> Result<f64, Failure> {
     }
 }
 
-/// Place and direction at so many metres from the left end of a wall, as seen from its free side, which is left of a to b:
-/// the left end is b.
+/// Place and direction at so many metres from the left end of a wall, as seen from its free side,
+/// which is left of a to b: the left end is b.
 fn on_wall(wall: &WallBody, at_m: f64) -> Result<(f64, f64, f64), Failure> {
     let (dx, dy) = (wall.a[0] - wall.b[0], wall.a[1] - wall.b[1]);
     let length_m = dx.hypot(dy);
@@ -206,7 +208,8 @@ mod tests {
 
     #[test]
     fn metres_run_from_the_left_end_as_one_stands_before_the_wall() {
-        // The wall runs along x with the free side at y above it: whoever stands there has b, at x = 5, to the left.
+        // The wall runs along x with the free side at y above it: whoever stands there has b, at
+        // x = 5, to the left.
         let wall = WallBody::between([1.0, 2.0], [5.0, 2.0]);
         let (x, y, theta) = on_wall(&wall, 1.0).unwrap();
         assert!((x - 4.0).abs() < 1e-12 && (y - 2.0).abs() < 1e-12);

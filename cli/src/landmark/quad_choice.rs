@@ -1,5 +1,6 @@
-//! A photograph that shows several framed objects: they are numbered from left to right, drawn beside the photograph,
-//! and one is taken with `--pick`. In: the quads of the server's refusal. Out: a picture, or the corners of one.
+//! A photograph that shows several framed objects: they are numbered from left to right, drawn
+//! beside the photograph, and one is taken with `--pick`. In: the quads of the server's refusal.
+//! Out: a picture, or the corners of one.
 
 use crate::{
     drawing::{Picture, SERIES},

@@ -1,4 +1,5 @@
-//! `waymark landmark teach`: photographs to a landmark that is in use, or to the reason why it is not.
+//! `waymark landmark teach`: photographs to a landmark that is in use, or to the reason why it is
+//! not.
 
 use super::{photograph::Photograph, reasons::in_use, show};
 use crate::{
@@ -26,8 +27,9 @@ pub(super) struct TeachArgs {
     /// Photographs of it, PNG or JPEG.
     #[arg(required = true, value_name = "PHOTO")]
     photographs: Vec<PathBuf>,
-    /// Its width and height in metres, such as 0.60x0.84; without it there is recognition but no pose. A size whose ratio
-    /// the photographs contradict, such as one with swapped sides, is refused.
+    /// Its width and height in metres, such as 0.60x0.84; without it there is recognition but no
+    /// pose. A size whose ratio the photographs contradict, such as one with swapped sides, is
+    /// refused.
     #[arg(long, value_parser = size)]
     size: Option<Size>,
     /// The whole picture is the landmark (a scan, a cut-out).
@@ -39,8 +41,9 @@ pub(super) struct TeachArgs {
     /// Its corners in one photograph, pixels: top-left, top-right, bottom-right, bottom-left.
     #[arg(long, value_name = "X,Y,X,Y,X,Y,X,Y", value_parser = corners)]
     corners: Option<[[f64; 2]; 4]>,
-    /// Warped, dimmed and blurred views made of each photograph; left out, the server chooses by the number of
-    /// photographs. A landmark learnt from generated views is recognised less surely than one seen from many sides.
+    /// Warped, dimmed and blurred views made of each photograph; left out, the server chooses by
+    /// the number of photographs. A landmark learnt from generated views is recognised less surely
+    /// than one seen from many sides.
     #[arg(long)]
     generated_views: Option<u32>,
     #[command(flatten)]
@@ -119,8 +122,9 @@ async fn resize(session: &Session, map: &str, landmark: &Landmark, size: Size) -
     Ok(())
 }
 
-/// Sends all photographs and gives the failures of those that could not be used. An error if none could be: then nothing
-/// was made. An error that is not about one photograph, such as a size that it contradicts, ends it.
+/// Sends all photographs and gives the failures of those that could not be used. An error if none
+/// could be: then nothing was made. An error that is not about one photograph, such as a size that
+/// it contradicts, ends it.
 async fn upload_all(
     session: &Session,
     map: &str,

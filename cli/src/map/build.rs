@@ -33,9 +33,10 @@ struct Upload {
 /// `waymark map build`.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// The scan log: a CARMEN log (FLASER or ROBOTLASER1 lines), numbered scans (`i dx dy dtheta r0 r1 ..`), or a
-    /// Waymark scan log, `.gz` is unpacked. Or a file of messages: a recording (`waymark record`, `demo --record`), or a bag of
-    /// ROS 2 with laser scans and odometry (MCAP, or the bag's folder).
+    /// The scan log: a CARMEN log (FLASER or ROBOTLASER1 lines), numbered scans
+    /// (`i dx dy dtheta r0 r1 ..`), or a Waymark scan log, `.gz` is unpacked. Or a file of
+    /// messages: a recording (`waymark record`, `demo --record`), or a bag of ROS 2 with laser
+    /// scans and odometry (MCAP, or the bag's folder).
     #[arg(value_name = "LOG")]
     recording: PathBuf,
     #[command(flatten)]

@@ -1,4 +1,5 @@
-//! What an import would change: which walls of a map stay, go and come. In: old and new segments. Out: metres of each.
+//! What an import would change: which walls of a map stay, go and come. In: old and new segments.
+//! Out: metres of each.
 
 use client::api::{WallBody, WallsBody};
 use serde::Serialize;

@@ -20,8 +20,8 @@ pub(crate) struct ExportArgs {
 /// A file that walls are written to.
 #[derive(Debug, Clone, clap::Args)]
 pub(super) struct TargetArgs {
-    /// Where to: NAME.yaml (and NAME.pgm beside it) for `map_server`, NAME.txt for a vector map, NAME.geojson,
-    /// NAME.json for a map file.
+    /// Where to: NAME.yaml (and NAME.pgm beside it) for `map_server`, NAME.txt for a vector map,
+    /// NAME.geojson, NAME.json for a map file.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
     /// Side of a cell of the grid, metres.

@@ -9,8 +9,8 @@ use client::api::{FusionModeBody, ModalityBody, ModalityMapBody, ModalityMapPatc
 pub(crate) struct FusionArgs {
     /// The map.
     map: String,
-    /// `all`: every modality, each as sure as it proved to be; `near_best`: those nearly as good as the best; `best`: the
-    /// best alone. Odometry carries the pose in any case.
+    /// `all`: every modality, each as sure as it proved to be; `near_best`: those nearly as good as
+    /// the best; `best`: the best alone. Odometry carries the pose in any case.
     #[arg(value_parser = PossibleValuesParser::new(["all", "near_best", "best"]).map(|word| mode(&word)))]
     mode: Option<FusionModeBody>,
     #[command(flatten)]

@@ -1,5 +1,5 @@
-//! `waymark map import`: the walls and the underlay of a map from another program's file, with the difference before
-//! anything changes.
+//! `waymark map import`: the walls and the underlay of a map from another program's file, with the
+//! difference before anything changes.
 
 use super::{
     difference::Difference,
@@ -43,14 +43,17 @@ pub(crate) struct ImportArgs {
 /// A file with walls.
 #[derive(Debug, Clone, clap::Args)]
 pub(super) struct SourceArgs {
-    /// A `map_server` YAML file (or its picture, with the YAML of the same name beside it), a vector map (`x1, y1, x2,
-    /// y2` in metres, one segment a line; or `.geojson` in map metres or degrees: lines are walls with the free side on their left,
-    /// polygons are rooms with columns for holes), an SVG floor plan, or a map of `waymark map build`.
+    /// A `map_server` YAML file (or its picture, with the YAML of the same name beside it), a
+    /// vector map (`x1, y1, x2, y2` in metres, one segment a line; or `.geojson` in map metres or
+    /// degrees: lines are walls with the free side on their left, polygons are rooms with columns
+    /// for holes), an SVG floor plan, or a map of `waymark map build`.
     file: PathBuf,
-    /// Leave out pieces of a grid's walls shorter than this, metres, but for those that alone explain some cells.
+    /// Leave out pieces of a grid's walls shorter than this, metres, but for those that alone
+    /// explain some cells.
     #[arg(long, default_value_t = ImportOptions::default().min_length_m)]
     min_length_m: f64,
-    /// Metres of a unit of an SVG floor plan; without it the plan's width and height in mm, cm, in or pt count.
+    /// Metres of a unit of an SVG floor plan; without it the plan's width and height in mm, cm, in
+    /// or pt count.
     #[arg(long, value_name = "METRES")]
     metres_per_unit: Option<f64>,
     /// Draw the walls as SVG.
@@ -172,7 +175,8 @@ pub(super) enum Replacing {
     },
 }
 
-/// Replaces the walls of a map; asks with the difference if there are walls already. Gives the difference.
+/// Replaces the walls of a map; asks with the difference if there are walls already. Gives the
+/// difference.
 pub(super) async fn replace(
     session: &Session,
     map: &str,

@@ -58,7 +58,8 @@ enum Verb {
     },
     /// Set where a map belongs, and its link to another map
     ///
-    /// For example, the first floor of a house whose plan is the map `house`, 3.4 m up, turned by 90 degrees:
+    /// For example, the first floor of a house whose plan is the map `house`, 3.4 m up, turned by
+    /// 90 degrees:
     ///   waymark map locate floor1 --building house --floor 1st --in house --at 12.5,-3,90 --level-m 3.4
     #[command(verbatim_doc_comment)]
     Locate {
@@ -69,9 +70,11 @@ enum Verb {
         #[command(flatten)]
         server: ServerArgs,
     },
-    /// Show or set the visibility settings of a map: the camera and the limits that define "visible"
+    /// Show or set the visibility settings of a map: the camera and the limits that define
+    /// "visible"
     ///
-    /// The visibility areas of landmarks follow from them. For example, a camera 0.8 m up that tilts up to 60 degrees:
+    /// The visibility areas of landmarks follow from them. For example, a camera 0.8 m up that
+    /// tilts up to 60 degrees:
     ///   waymark map visibility office --image 1280x720 --focal-px 900 --camera-height-m 0.8 --tilt-deg -10,60
     #[command(verbatim_doc_comment)]
     Visibility {
@@ -82,7 +85,8 @@ enum Verb {
         #[command(flatten)]
         server: ServerArgs,
     },
-    /// Show or set the fusion mode of a map: what is fused where reference runs know the best modality.
+    /// Show or set the fusion mode of a map: what is fused where reference runs know the best
+    /// modality.
     Fusion(fusion::FusionArgs),
     /// Give a map another name; no robot may be on it.
     Rename {
@@ -94,7 +98,8 @@ enum Verb {
         #[command(flatten)]
         server: ServerArgs,
     },
-    /// Make a new map of all that a map has: landmarks with views and models, walls, floor plan, runs, settings
+    /// Make a new map of all that a map has: landmarks with views and models, walls, floor plan,
+    /// runs, settings
     ///
     /// Robots stay on the first one. For example:
     ///   waymark map duplicate office office-trial
@@ -108,7 +113,8 @@ enum Verb {
         #[command(flatten)]
         server: ServerArgs,
     },
-    /// Save a map to one file: landmarks with photographs and models, walls, floor plan, runs, settings
+    /// Save a map to one file: landmarks with photographs and models, walls, floor plan, runs,
+    /// settings
     ///
     /// The file is a zip that other programs read without Waymark. For example:
     ///   waymark map save office office.zip
@@ -131,8 +137,8 @@ enum Verb {
     },
     /// Set a map's walls from a ROS occupancy grid, a floor plan, a vector map or a map file
     ///
-    /// If the map has walls, the difference is shown first and you are asked. The picture of a grid becomes the map's
-    /// underlay. For example:
+    /// If the map has walls, the difference is shown first and you are asked. The picture of a grid
+    /// becomes the map's underlay. For example:
     ///   waymark map import office floor.yaml --dry-run
     ///   waymark map import office plan.geojson --yes
     #[command(verbatim_doc_comment)]
@@ -151,17 +157,19 @@ enum Verb {
     ///   waymark map convert floor.yaml --out floor.json --draw floor.svg
     #[command(verbatim_doc_comment)]
     Convert(convert::ConvertArgs),
-    /// Build walls from a laser log: scans are matched and loops closed; a server is needed only with --into
+    /// Build walls from a laser log: scans are matched and loops closed; a server is needed only
+    /// with --into
     ///
-    /// The first pose is the origin of the map. Standard output says how many loops were closed and refused: a picture
-    /// (--draw) shows where. Poses in a CARMEN log are taken for odometry; in a corrected log they are nearly right
-    /// already.
+    /// The first pose is the origin of the map. Standard output says how many loops were closed and
+    /// refused: a picture (--draw) shows where. Poses in a CARMEN log are taken for odometry; in a
+    /// corrected log they are nearly right already.
     ///
     /// For example:
     ///   waymark map build hall.log.gz --out hall.json --draw hall.svg
     ///   waymark map build hall.jsonl --into hall
     ///
-    /// A Waymark scan log is JSON lines: a head, then one scan a line (`null`: no return; `t_s` and `truth` if known).
+    /// A Waymark scan log is JSON lines: a head, then one scan a line (`null`: no return; `t_s` and
+    /// `truth` if known).
     ///   `{"waymark_recording":1,"robot_from_laser":[0.2,0,0],"first_bearing_rad":-1.57,"bearing_step_rad":0.0087,"max_range_m":30}`
     ///   `{"t_s":12.5,"odom":[1.0,0.2,0.05],"ranges_m":[1.93,null,2.01]}`
     #[command(verbatim_doc_comment)]

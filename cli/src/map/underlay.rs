@@ -1,5 +1,5 @@
-//! The picture of an occupancy grid as the underlay of a map. In: the picture and where it lies. Out: an upload, or why
-//! there is none.
+//! The picture of an occupancy grid as the underlay of a map. In: the picture and where it lies.
+//! Out: an upload, or why there is none.
 
 use crate::{
     failure::{Class, Failure},
@@ -41,8 +41,8 @@ pub(super) async fn revision(session: &Session, map: &str) -> anyhow::Result<Opt
     }
 }
 
-/// Uploads a picture, in the place of the one with this revision. What the server refuses, such as one that is too large, is
-/// an outcome.
+/// Uploads a picture, in the place of the one with this revision. What the server refuses, such as
+/// one that is too large, is an outcome.
 pub(super) async fn upload(
     session: &Session,
     map: &str,

@@ -1,5 +1,5 @@
-//! `waymark map walls`: the walls of a map with their numbers, as a table and as a picture. Numbers count from 1 in the
-//! order of the server's list.
+//! `waymark map walls`: the walls of a map with their numbers, as a table and as a picture. Numbers
+//! count from 1 in the order of the server's list.
 
 use crate::{screen::Table, session::ServerArgs};
 use anyhow::Context as _;
@@ -24,7 +24,8 @@ pub(crate) struct WallsArgs {
     server: ServerArgs,
 }
 
-/// A wall with its number. Its free side is on the left of a to b: who stands before it has b on the left.
+/// A wall with its number. Its free side is on the left of a to b: who stands before it has b on
+/// the left.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 struct NumberedWall {
     wall: usize,

@@ -1,4 +1,5 @@
-//! Topics and frames of a bag on the command line. In: options, and the channels of the file. Out: settings of a robot.
+//! Topics and frames of a bag on the command line. In: options, and the channels of the file. Out:
+//! settings of a robot.
 
 use recordings::read::ChannelInfo;
 use ros2::robot::{CameraSettings, RobotSettings};
@@ -11,7 +12,8 @@ pub(crate) struct MotionArgs {
     /// Topic of the laser [default: /scan].
     #[arg(long, value_name = "TOPIC")]
     pub(crate) scan: Option<String>,
-    /// Topic of the odometry; `tf` takes it from the transforms [default: /odom, or `tf` if the bag lacks that].
+    /// Topic of the odometry; `tf` takes it from the transforms [default: /odom, or `tf` if the bag
+    /// lacks that].
     #[arg(long, value_name = "TOPIC")]
     odometry: Option<String>,
     /// The robot's frame [default: `base_link`].

@@ -1,5 +1,5 @@
-//! Which file is played. In: what was named: an MCAP file, or the folder of a bag as `ros2 bag play` takes it. Out: the file, or
-//! what converts it.
+//! Which file is played. In: what was named: an MCAP file, or the folder of a bag as
+//! `ros2 bag play` takes it. Out: the file, or what converts it.
 
 use crate::failure::{Class, Failure};
 use std::{
@@ -73,7 +73,8 @@ fn in_folder(folder: &Path) -> Result<PathBuf, Failure> {
 mod tests {
     use super::*;
 
-    /// Files of a folder, `(name, first bytes)`, and the name that is played, or words of the refusal.
+    /// Files of a folder, `(name, first bytes)`, and the name that is played, or words of the
+    /// refusal.
     type Case = (&'static [(&'static str, &'static [u8])], Result<&'static str, &'static str>);
 
     const CASES: &[Case] = &[

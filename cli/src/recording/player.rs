@@ -1,8 +1,8 @@
-//! Plays the messages of a drive into a server, as a robot. In: messages in the order of time. Out: the new answers, with
-//! the numbers and times of the recording, and counts.
+//! Plays the messages of a drive into a server, as a robot. In: messages in the order of time. Out:
+//! the new answers, with the numbers and times of the recording, and counts.
 //!
-//! One frame is in work at a time, so that none is replaced by a newer one. Capture times are moved to the present
-//! ([`recordings::restamp`]), because a server compares them with its own clock.
+//! One frame is in work at a time, so that none is replaced by a newer one. Capture times are moved
+//! to the present ([`recordings::restamp`]), because a server compares them with its own clock.
 
 use super::poses::PosesFile;
 use crate::screen;

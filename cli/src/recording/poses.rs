@@ -1,5 +1,5 @@
-//! Fused poses of a replay as a file of a trajectory. In: poses with times of the recording. Out: a text file of the TUM
-//! benchmark, as `evo` and others read it.
+//! Fused poses of a replay as a file of a trajectory. In: poses with times of the recording. Out: a
+//! text file of the TUM benchmark, as `evo` and others read it.
 
 use super::new_file;
 use client::v1::RobotPose;
@@ -18,8 +18,8 @@ const HEAD: &str = "# Fused poses of the robot in the map frame, z = 0: stamp (s
 #[derive(Debug)]
 pub(super) struct PosesFile {
     out: BufWriter<File>,
-    /// By capture time, ns: x and y in metres, heading in radians, and the map. Of two poses of one time the later one counts: a
-    /// landmark has corrected it.
+    /// By capture time, ns: x and y in metres, heading in radians, and the map. Of two poses of one
+    /// time the later one counts: a landmark has corrected it.
     poses: BTreeMap<i64, ([f64; 3], String)>,
 }
 

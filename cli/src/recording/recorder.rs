@@ -1,5 +1,5 @@
-//! Writes what a fleet sends into a file until it is told to end. In: messages of the SDK's listener, walls and landmarks
-//! over HTTP. Out: an MCAP file, and counts.
+//! Writes what a fleet sends into a file until it is told to end. In: messages of the SDK's
+//! listener, walls and landmarks over HTTP. Out: an MCAP file, and counts.
 
 use super::{PROGRAM, new_file};
 use crate::screen;

@@ -1,4 +1,5 @@
-//! `waymark replay`: plays a recording or a bag of ROS 2 into a server, as a robot, and compares the answers.
+//! `waymark replay`: plays a recording or a bag of ROS 2 into a server, as a robot, and compares
+//! the answers.
 
 use super::{
     Endpoints, PROGRAM,
@@ -37,7 +38,8 @@ use std::{
 
 /// Longest wait until the server has seen what was sent.
 const SETTLED: Duration = Duration::from_secs(2);
-/// First bytes of a message that rosbag2 packed with `compression_mode: message`. A message of ROS begins with 0.
+/// First bytes of a message that rosbag2 packed with `compression_mode: message`. A message of ROS
+/// begins with 0.
 const ZSTD: &[u8] = b"\x28\xb5\x2f\xfd";
 
 /// `waymark replay`.
@@ -60,12 +62,14 @@ pub(crate) struct Args {
     /// Write the new answers to this file; it must not exist.
     #[arg(long, value_name = "OUT")]
     answers: Option<PathBuf>,
-    /// Write the fused poses to this file, which must not exist, as lines of the TUM benchmark: stamp x y z qx qy qz qw.
-    /// Stamps are those of the recording in seconds, positions metres in the frame of the map (z is 0), and the quaternion is
-    /// map from robot. Fused poses depend on the speed: `--speed 1` plays as it was recorded.
+    /// Write the fused poses to this file, which must not exist, as lines of the TUM benchmark:
+    /// stamp x y z qx qy qz qw. Stamps are those of the recording in seconds, positions metres in
+    /// the frame of the map (z is 0), and the quaternion is map from robot. Fused poses depend on
+    /// the speed: `--speed 1` plays as it was recorded.
     #[arg(long, value_name = "OUT")]
     poses: Option<PathBuf>,
-    /// Compare the answers with those of the recording, or of another file; exit status 1 if they differ.
+    /// Compare the answers with those of the recording, or of another file; exit status 1 if they
+    /// differ.
     #[arg(long, value_name = "OTHER", num_args = 0..=1)]
     #[allow(clippy::option_option, reason = "clap's form of an option with an optional value")]
     compare: Option<Option<PathBuf>>,
@@ -79,7 +83,8 @@ pub(crate) struct Args {
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "Bags of ROS 2")]
 struct BagArgs {
-    /// A topic of images, as `NAME=TOPIC` with the camera's name; may be given several times [default: all of the bag].
+    /// A topic of images, as `NAME=TOPIC` with the camera's name; may be given several times
+    /// [default: all of the bag].
     #[arg(long, value_name = "NAME=TOPIC")]
     image: Vec<String>,
     #[command(flatten)]
@@ -149,7 +154,8 @@ async fn activity(session: &Session, robot: &Name) -> Option<RobotActivity> {
     session.maps().robot(robot.as_str()).await.ok()?.activity
 }
 
-/// What the server used and refused of the messages since `earlier`, as soon as it has seen the `sent` ones without an answer.
+/// What the server used and refused of the messages since `earlier`, as soon as it has seen the
+/// `sent` ones without an answer.
 async fn inputs_used(
     session: &Session,
     robot: &Name,

@@ -1,5 +1,5 @@
-//! Laser scans of a file of messages. In: a recording of ours, or a bag of ROS 2, and which robot or topics. Out: a scan log, as
-//! walls are built from.
+//! Laser scans of a file of messages. In: a recording of ours, or a bag of ROS 2, and which robot
+//! or topics. Out: a scan log, as walls are built from.
 
 use super::{
     bag_args::MotionArgs,
@@ -22,7 +22,8 @@ use std::{
     sync::Arc,
 };
 
-/// First bytes of every MCAP file, plain or packed, of bags in SQLite and of ROS 1: files that are no scan log of text.
+/// First bytes of every MCAP file, plain or packed, of bags in SQLite and of ROS 1: files that are
+/// no scan log of text.
 const MESSAGE_FILES: [&[u8]; 4] = [b"\x89MCAP", b"\x28\xb5\x2f\xfd", b"SQLite format 3\0", b"#ROSBAG V"];
 /// Why messages of other topics are not used: walls need none of them.
 const OTHER_MESSAGES: [&str; 2] = ["not_used", "unknown_type"];
@@ -56,8 +57,8 @@ pub(crate) fn has_messages(path: &Path) -> bool {
     path.is_dir() || MESSAGE_FILES.iter().any(|form| head[..read].starts_with(form))
 }
 
-/// Reads the scans of a file of messages. Errors: no file of messages; no scans in it, with the topics that there are; none that
-/// can be used, with the first reason.
+/// Reads the scans of a file of messages. Errors: no file of messages; no scans in it, with the
+/// topics that there are; none that can be used, with the first reason.
 pub(crate) fn scans(path: &Path, args: &ScanArgs) -> anyhow::Result<FileScans> {
     let (messages, channels) = open_messages(path)?;
     let is_bag = bag::is_bag(channels.iter().map(AsRef::as_ref));

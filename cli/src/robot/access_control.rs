@@ -8,7 +8,8 @@ use std::collections::{BTreeMap, BTreeSet};
 /// Whom the router knows by which certificates.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
-    /// Common name in the certificate of a server that joins the router; may be given several times.
+    /// Common name in the certificate of a server that joins the router; may be given several
+    /// times.
     #[arg(long = "server-certificate", value_name = "NAME", required = true)]
     servers: Vec<String>,
     /// A robot that is registered with another server; may be given several times.

@@ -1,5 +1,5 @@
-//! `waymark robot enrol`: a key made here, a certificate signed by the server, and the file with which a robot's program
-//! connects.
+//! `waymark robot enrol`: a key made here, a certificate signed by the server, and the file with
+//! which a robot's program connects.
 
 use crate::{failure::Failure, session::Session};
 use anyhow::Context as _;
@@ -30,7 +30,8 @@ pub(super) struct Args {
     /// Folder for the key, the certificate and robot.json; made if missing.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Name or address by which the robot reaches the server [default: that of --server, or the first of tls.names].
+    /// Name or address by which the robot reaches the server [default: that of --server, or the
+    /// first of tls.names].
     #[arg(long, value_name = "HOST")]
     host: Option<String>,
     /// How long the certificate is valid: a number with s, m, h, d or w [default: 365d].

@@ -34,9 +34,11 @@ enum Verb {
         #[arg(long)]
         map: String,
     },
-    /// List the robots: the map of each, whether it is connected, where it is and how far that is trusted.
+    /// List the robots: the map of each, whether it is connected, where it is and how far that is
+    /// trusted.
     List,
-    /// Show a robot: connection, pose, what that rests on, and which of its messages are used or refused.
+    /// Show a robot: connection, pose, what that rests on, and which of its messages are used or
+    /// refused.
     Show {
         /// The robot.
         robot: String,
@@ -49,8 +51,9 @@ enum Verb {
     Send(Box<send::Args>),
     /// Give a robot a certificate for the encrypted listener
     ///
-    /// The private key is made here and stays here: run it on the robot's machine, or bring the folder there as a secret.
-    /// Programs of the SDKs take the file robot.json of the folder. For example:
+    /// The private key is made here and stays here: run it on the robot's machine, or bring the
+    /// folder there as a secret. Programs of the SDKs take the file robot.json of the folder. For
+    /// example:
     ///   waymark robot enrol r1 --out r1
     #[command(verbatim_doc_comment)]
     Enrol(enrol::Args),
@@ -59,9 +62,11 @@ enum Verb {
         /// The robot.
         robot: String,
     },
-    /// Revoke certificates of a robot: its messages are refused at once, and its connection is closed.
+    /// Revoke certificates of a robot: its messages are refused at once, and its connection is
+    /// closed.
     Revoke(certificates::RevokeArgs),
-    /// Print who may do what on a zenoh router of your own that servers join, for the settings of zenohd
+    /// Print who may do what on a zenoh router of your own that servers join, for the settings of
+    /// zenohd
     ///
     /// Robots are those of the server, known by certificates with their names. For example:
     ///   waymark robot access-control --server-certificate hall-server > access.json5

@@ -24,14 +24,17 @@ const CAMERA: &str = "camera";
 pub(super) struct Args {
     /// The robot: one that is known to the server, and that no other program drives.
     robot: Name,
-    /// Photographs, PNG, JPEG or BMP; turned upright, and made smaller where they have more pixels than a frame may have.
+    /// Photographs, PNG, JPEG or BMP; turned upright, and made smaller where they have more pixels
+    /// than a frame may have.
     #[arg(required = true, value_name = "PHOTO")]
     photographs: Vec<PathBuf>,
-    /// Camera for poses of the landmarks: the file that `waymark camera calibrate --json` wrote, ROS' ost.yaml, or
-    /// fx,fy,cx,cy in pixels. A photograph that is made smaller has scaled intrinsics.
+    /// Camera for poses of the landmarks: the file that `waymark camera calibrate --json` wrote,
+    /// ROS' ost.yaml, or fx,fy,cx,cy in pixels. A photograph that is made smaller has scaled
+    /// intrinsics.
     #[arg(long, value_name = "FILE|FX,FY,CX,CY", value_parser = camera)]
     camera: Option<CameraArg>,
-    /// The file robot.json of `waymark robot enrol`, for an encrypted server: in place of --zenoh and --fleet.
+    /// The file robot.json of `waymark robot enrol`, for an encrypted server: in place of --zenoh
+    /// and --fleet.
     #[arg(long, value_name = "FILE")]
     robot_file: Option<PathBuf>,
     /// Where the server takes messages of robots.

@@ -1,5 +1,5 @@
-//! `waymark run`: records a robot's run and gives its reference trajectory, so that the map learns which modality to trust
-//! where.
+//! `waymark run`: records a robot's run and gives its reference trajectory, so that the map learns
+//! which modality to trust where.
 
 mod trajectory;
 
@@ -42,8 +42,8 @@ enum Verb {
     Learn {
         /// The robot.
         robot: String,
-        /// A pose a line, on the map and by the robot's clock: `seconds x y z qx qy qz qw` (TUM), or `seconds x y theta`;
-        /// metres, radians, `#` begins a remark.
+        /// A pose a line, on the map and by the robot's clock: `seconds x y z qx qy qz qw` (TUM),
+        /// or `seconds x y theta`; metres, radians, `#` begins a remark.
         trajectory: PathBuf,
         /// Standard deviation of its positions, metres [default: 0.01].
         #[arg(long)]

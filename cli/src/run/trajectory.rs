@@ -1,4 +1,5 @@
-//! Files of reference trajectories: where a robot really was, by its own clock. In: text. Out: (ns, x, y, theta) rows.
+//! Files of reference trajectories: where a robot really was, by its own clock. In: text. Out: (ns,
+//! x, y, theta) rows.
 
 use anyhow::{Context as _, bail};
 

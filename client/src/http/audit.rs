@@ -15,7 +15,8 @@ impl MapClient {
         self.send(self.ask_query(&LIST, &[], query)?).await
     }
 
-    /// Whether the audit log is as it was written. `noted`: an earlier [`AuditCheck::head`], kept outside of the server.
+    /// Whether the audit log is as it was written. `noted`: an earlier [`AuditCheck::head`], kept
+    /// outside of the server.
     pub async fn check_audit(&self, noted: Option<&AuditHead>) -> Result<AuditCheck, ClientError> {
         let query =
             AuditHeadQuery { seq: noted.map(|head| head.seq), sha256: noted.map(|head| head.sha256.clone()) };

@@ -49,7 +49,8 @@ impl FileDownload {
 }
 
 impl MapClient {
-    /// Begins a backup in the server's data directory. Refused with `in_use` while another one is being made.
+    /// Begins a backup in the server's data directory. Refused with `in_use` while another one is
+    /// being made.
     pub async fn make_backup(&self) -> Result<Backup, ClientError> {
         self.send(self.ask(&MAKE, &[])?).await
     }

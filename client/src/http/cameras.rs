@@ -36,8 +36,8 @@ impl MapClient {
         Ok(found.cameras)
     }
 
-    /// Calibrates a camera, from uploaded corners or from stored views of its own frames. The server's state does
-    /// not change: a robot sends its intrinsics with its frames.
+    /// Calibrates a camera, from uploaded corners or from stored views of its own frames. The
+    /// server's state does not change: a robot sends its intrinsics with its frames.
     pub async fn calibrate_camera(
         &self,
         robot: &str,

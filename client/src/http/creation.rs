@@ -1,4 +1,5 @@
-//! Creations: each is sent with a key, and once more with the same key where its answer was lost. The server makes it once.
+//! Creations: each is sent with a key, and once more with the same key where its answer was lost.
+//! The server makes it once.
 
 use reqwest::{Client, Request, Response, StatusCode, header::RETRY_AFTER};
 use std::{
@@ -20,7 +21,8 @@ pub(super) fn fresh_key() -> String {
     format!("{:016x}{:016x}", random(), random())
 }
 
-/// Sends. A request with a key is sent once more if the connection breaks, or the server has no time for it.
+/// Sends. A request with a key is sent once more if the connection breaks, or the server has no
+/// time for it.
 pub(super) async fn execute(http: &Client, request: Request) -> reqwest::Result<Response> {
     let repeat = if request.headers().contains_key(KEY) { request.try_clone() } else { None };
     let answer = http.execute(request).await;

@@ -29,7 +29,8 @@ impl MapClient {
         self.done(self.ask(&DISCARD, &[&map, &draft])?).await
     }
 
-    /// What publishing a draft would change, with one page of the landmarks that differ, and what is in the way.
+    /// What publishing a draft would change, with one page of the landmarks that differ, and what
+    /// is in the way.
     pub async fn draft_difference(
         &self,
         map: &str,
@@ -39,13 +40,14 @@ impl MapClient {
         self.send(self.ask_query(&DIFFERENCE, &[&map, &draft], query)?).await
     }
 
-    /// Publishes a draft by one commit of its map; the draft is gone then. Refused with `conflict` where both have changed the
-    /// same.
+    /// Publishes a draft by one commit of its map; the draft is gone then. Refused with `conflict`
+    /// where both have changed the same.
     pub async fn publish_draft(&self, map: &str, draft: &str) -> Result<RollbackOutcome, ClientError> {
         self.send(self.ask(&PUBLISH, &[&map, &draft])?).await
     }
 
-    /// Answers the last frames of the map's robots by map and draft, `frames` at most, and reports what differs.
+    /// Answers the last frames of the map's robots by map and draft, `frames` at most, and reports
+    /// what differs.
     pub async fn replay_draft(
         &self,
         map: &str,

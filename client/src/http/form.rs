@@ -1,4 +1,5 @@
-//! Forms with a picture (`multipart/form-data`), whole in memory, so that they can be sent a second time.
+//! Forms with a picture (`multipart/form-data`), whole in memory, so that they can be sent a second
+//! time.
 
 use super::creation::fresh_key;
 use reqwest::{RequestBuilder, header::CONTENT_TYPE};

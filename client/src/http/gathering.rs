@@ -1,4 +1,5 @@
-//! Gatherings: training views that a robot collects while it drives, and a person's decision on their tracks.
+//! Gatherings: training views that a robot collects while it drives, and a person's decision on
+//! their tracks.
 
 use super::{map_client::MapClient, operation::operations};
 use crate::ClientError;
@@ -17,8 +18,8 @@ operations! {
 }
 
 impl MapClient {
-    /// Begins to gather views with a robot: of one landmark, or of new objects (with an option of known landmarks,
-    /// too).
+    /// Begins to gather views with a robot: of one landmark, or of new objects (with an option of
+    /// known landmarks, too).
     pub async fn start_gathering(&self, map: &str, new: &NewGatheringBody) -> Result<Gathering, ClientError> {
         self.send(self.ask(&START, &[&map])?.json(new)).await
     }

@@ -21,8 +21,9 @@ impl MapClient {
         self.send(self.ask(&HEALTH, &[])?).await
     }
 
-    /// Whether every part of the server runs and the database answers; an error with status 503 otherwise. With a token it
-    /// names what is wrong: the local one is looked for, since the server asks nobody for one here.
+    /// Whether every part of the server runs and the database answers; an error with status 503
+    /// otherwise. With a token it names what is wrong: the local one is looked for, since the
+    /// server asks nobody for one here.
     pub async fn readiness(&self) -> Result<Readiness, ClientError> {
         if self.token().is_none() {
             // Whoever is refused is told what strangers are.

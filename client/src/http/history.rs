@@ -23,7 +23,8 @@ impl MapClient {
         self.send(self.ask(&GET, &[&map, &commit])?).await
     }
 
-    /// What differs between a map at two kept commits, or at one and now, with one page of the landmarks that differ.
+    /// What differs between a map at two kept commits, or at one and now, with one page of the
+    /// landmarks that differ.
     pub async fn difference(&self, map: &str, query: &DifferenceQuery) -> Result<Difference, ClientError> {
         self.send(self.ask_query(&DIFFERENCE, &[&map], query)?).await
     }

@@ -15,7 +15,8 @@ operations! {
 }
 
 impl MapClient {
-    /// Thresholds, keypoints, points and sizes of a landmark's model. Refused with `not_learnt` if there is none.
+    /// Thresholds, keypoints, points and sizes of a landmark's model. Refused with `not_learnt` if
+    /// there is none.
     pub async fn landmark_model(
         &self,
         map: &str,

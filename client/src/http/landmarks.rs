@@ -46,15 +46,16 @@ impl MapClient {
         self.send(self.ask_query(&LIST, &[&map], query)?).await
     }
 
-    /// Adds landmarks without views, at most 2000: all or none. The field of a refusal has the number of the one at fault.
+    /// Adds landmarks without views, at most 2000: all or none. The field of a refusal has the
+    /// number of the one at fault.
     pub async fn add_landmarks(&self, map: &str, new: &[NewLandmark]) -> Result<u64, ClientError> {
         let body = NewLandmarks { landmarks: new.to_vec() };
         let done: BulkOutcome = self.send(self.ask(&ADD_ALL, &[&map])?.json(&body)).await?;
         Ok(done.count)
     }
 
-    /// Deletes landmarks with their views and models, at most 2000: all or none. One with a revision is deleted only if it
-    /// still has that.
+    /// Deletes landmarks with their views and models, at most 2000: all or none. One with a
+    /// revision is deleted only if it still has that.
     pub async fn delete_landmarks(
         &self,
         map: &str,
@@ -80,8 +81,8 @@ impl MapClient {
         self.send(self.ask(&UPDATE, &[&map, &landmark])?.json(patch)).await
     }
 
-    /// Makes two landmarks one: `into` gets the views of `from`, and the size and place that it lacks; `from` is deleted. Learn
-    /// it again afterwards.
+    /// Makes two landmarks one: `into` gets the views of `from`, and the size and place that it
+    /// lacks; `from` is deleted. Learn it again afterwards.
     pub async fn merge_landmarks(&self, map: &str, into: &str, from: &str) -> Result<Landmark, ClientError> {
         let body = LandmarkMerge { from: from.to_owned() };
         self.send(self.ask(&MERGE, &[&map, &into])?.json(&body)).await

@@ -41,8 +41,8 @@ impl JobEvents {
 }
 
 impl MapClient {
-    /// Starts to learn: these landmarks, or all that have views. `generated_views` warped views are made of each
-    /// photograph, 0 to 100; `None` leaves the number to the server.
+    /// Starts to learn: these landmarks, or all that have views. `generated_views` warped views are
+    /// made of each photograph, 0 to 100; `None` leaves the number to the server.
     pub async fn learn(
         &self,
         map: &str,

@@ -12,7 +12,8 @@ operations! {
     EVENTS: GET "/maps/{map}/live" => live_events,
 }
 
-/// Answers, poses and changes of a map from now on. A reader that is too slow misses events and gets their number.
+/// Answers, poses and changes of a map from now on. A reader that is too slow misses events and
+/// gets their number.
 #[derive(Debug)]
 pub struct LiveEvents(Events);
 

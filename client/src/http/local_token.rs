@@ -1,5 +1,6 @@
-//! The token of a server on this machine. A server on loopback says with 401 in which file its local token is; that file is
-//! read only if it is a local token, of this user, for the very port that was asked. In: the header. Out: the token.
+//! The token of a server on this machine. A server on loopback says with 401 in which file its
+//! local token is; that file is read only if it is a local token, of this user, for the very port
+//! that was asked. In: the header. Out: the token.
 
 use reqwest::{Url, header::HeaderValue};
 use std::{
@@ -63,7 +64,8 @@ pub(super) fn read(path: &Path, port: u16) -> Result<String, LocalTokenError> {
         return Err(LocalTokenError::Name(path.to_owned()));
     }
     let failed = |error| LocalTokenError::File(path.to_owned(), error);
-    // Not through a link, and nothing that blocks: looked at before it is opened, and again when it is open.
+    // Not through a link, and nothing that blocks: looked at before it is opened, and again when it
+    // is open.
     check(path, &path.symlink_metadata().map_err(failed)?)?;
     let file = File::open(path).map_err(failed)?;
     check(path, &file.metadata().map_err(failed)?)?;

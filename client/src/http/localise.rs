@@ -41,7 +41,8 @@ impl Sensed {
 }
 
 impl MapClient {
-    /// Finds where a robot is by what it senses at one place, without knowing anything of it before. "No match" is an answer.
+    /// Finds where a robot is by what it senses at one place, without knowing anything of it
+    /// before. "No match" is an answer.
     pub async fn localise(&self, map: &str, sensed: &Sensed) -> Result<LocaliseResult, ClientError> {
         let mut form = match &sensed.picture {
             Some((image, camera, mounting)) => Form::with_image(image)

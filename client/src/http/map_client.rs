@@ -1,6 +1,8 @@
-//! A connection to the server's HTTP interface: sends requests with a token, reads answers, turns refusals into errors.
+//! A connection to the server's HTTP interface: sends requests with a token, reads answers, turns
+//! refusals into errors.
 //!
-//! A client without a token takes that of a server on this machine, once the server has answered 401 (`local_token`).
+//! A client without a token takes that of a server on this machine, once the server has answered
+//! 401 (`local_token`).
 
 use super::{
     creation::{KEY, execute, fresh_key},
@@ -59,8 +61,8 @@ pub struct Revised<T> {
 }
 
 impl MapClient {
-    /// A client of the server at `base`, such as `http://127.0.0.1:8080`. Nothing is sent yet. On this machine and for this
-    /// user no token is needed; else [`MapClient::with_token`].
+    /// A client of the server at `base`, such as `http://127.0.0.1:8080`. Nothing is sent yet. On
+    /// this machine and for this user no token is needed; else [`MapClient::with_token`].
     ///
     /// With `https`, the server's certificate must be signed by an authority of the system, or see
     /// [`MapClient::with_authority`].
@@ -68,8 +70,9 @@ impl MapClient {
         Self::believing(base, None)
     }
 
-    /// The same for a server whose certificate is signed by one of these authorities, PEM, and by no other: for one with
-    /// its built-in authority, the file `tls/authority.pem` of its data directory.
+    /// The same for a server whose certificate is signed by one of these authorities, PEM, and by
+    /// no other: for one with its built-in authority, the file `tls/authority.pem` of its data
+    /// directory.
     pub fn with_authority(base: &str, authority_pem: &[u8]) -> Result<Self, ClientError> {
         Self::believing(base, Some(authority_pem))
     }
@@ -91,16 +94,18 @@ impl MapClient {
         Self { token, local_port: None, ..self }
     }
 
-    /// The same with this key for its next creation, in place of a fresh one: a program that repeats a creation by itself, also
-    /// after its own restart, gives the same key again. The server makes it once, and answers with `idempotency_key_reused` if
-    /// the key was used for another one. 1 to 128 visible ASCII characters; kept for a day.
+    /// The same with this key for its next creation, in place of a fresh one: a program that
+    /// repeats a creation by itself, also after its own restart, gives the same key again. The
+    /// server makes it once, and answers with `idempotency_key_reused` if the key was used for
+    /// another one. 1 to 128 visible ASCII characters; kept for a day.
     #[must_use]
     pub fn with_idempotency_key(&self, key: &str) -> Self {
         Self { key: Some(key.to_owned()), ..self.clone() }
     }
 
-    /// The same for changes of what still has this revision: another one is refused with `changed_meanwhile` (status 412) and
-    /// changes nothing. Without it, changes are made whatever is there.
+    /// The same for changes of what still has this revision: another one is refused with
+    /// `changed_meanwhile` (status 412) and changes nothing. Without it, changes are made whatever
+    /// is there.
     ///
     /// ```no_run
     /// # async fn example(maps: client::MapClient) -> Result<(), client::ClientError> {
@@ -115,7 +120,8 @@ impl MapClient {
         Self { revision: Some(revision.to_owned()), ..self.clone() }
     }
 
-    /// The same with this reason for its changes: the history of the map has it. One line, 1 to 200 characters.
+    /// The same with this reason for its changes: the history of the map has it. One line, 1 to 200
+    /// characters.
     #[must_use]
     pub fn with_reason(&self, why: &str) -> Self {
         Self { why: Some(why.to_owned()), ..self.clone() }
@@ -219,11 +225,13 @@ impl MapClient {
         whole(self.checked(request).await?).await
     }
 
-    /// Sends, and turns refusals into errors. A 401 of a server on this machine is followed by a second try with its token.
+    /// Sends, and turns refusals into errors. A 401 of a server on this machine is followed by a
+    /// second try with its token.
     pub(super) async fn checked(&self, request: RequestBuilder) -> Result<Response, ClientError> {
         let request = request.build().map_err(|e| self.unsent(&e))?;
         let again = request.try_clone();
-        // A form is a stream that can be sent once, and a refusal may break off a large body: the token is found before.
+        // A form is a stream that can be sent once, and a refusal may break off a large body: the
+        // token is found before.
         if again.is_none() || (request.body().is_some() && self.token().is_none()) {
             self.find_local_token().await;
         }
@@ -238,8 +246,8 @@ impl MapClient {
         }
     }
 
-    /// Makes sure that the token is that of the server on this machine, if there is one and no other token was given. What
-    /// goes wrong here goes wrong with the request, too, which says so.
+    /// Makes sure that the token is that of the server on this machine, if there is one and no
+    /// other token was given. What goes wrong here goes wrong with the request, too, which says so.
     async fn find_local_token(&self) {
         let asked = self.http.request(Method::GET, format!("{}/api/v1/whoami", self.base)).build();
         if let Some(asked) = asked.ok().filter(|_| self.local_port.is_some()) {

@@ -31,13 +31,15 @@ impl MapClient {
         self.done(self.ask(&CANCEL, &[&map])?).await
     }
 
-    /// Ends the drive: the walls are fitted once more and stored. [`MapClient::mapping`] says when they are.
+    /// Ends the drive: the walls are fitted once more and stored. [`MapClient::mapping`] says when
+    /// they are.
     pub async fn finish_mapping(&self, map: &str) -> Result<MappingProgressBody, ClientError> {
         self.send(self.ask(&FINISH, &[&map])?).await
     }
 
-    /// Ends the drive, and holds the walls: [`MapClient::mapping`] has them once they are found. Then
-    /// [`MapClient::finish_mapping`] stores them, and [`MapClient::cancel_mapping`] gives them up.
+    /// Ends the drive, and holds the walls: [`MapClient::mapping`] has them once they are found.
+    /// Then [`MapClient::finish_mapping`] stores them, and [`MapClient::cancel_mapping`] gives them
+    /// up.
     pub async fn hold_mapping(&self, map: &str) -> Result<MappingProgressBody, ClientError> {
         self.send(self.ask_query(&FINISH, &[&map], &FinishMappingQuery { hold: true })?).await
     }

@@ -1,5 +1,5 @@
-//! The teacher's and the administrator's side, over HTTP: one method for each operation of the API, a file for each
-//! resource. In and out: the types of [`protos::api`].
+//! The teacher's and the administrator's side, over HTTP: one method for each operation of the API,
+//! a file for each resource. In and out: the types of [`protos::api`].
 
 mod audit;
 mod backups;

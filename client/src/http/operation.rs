@@ -1,5 +1,5 @@
-//! Operations of the API: method and path with the client's method for them. In: a path with names in braces and the
-//! values for them. Out: the path as it is sent, percent-encoded.
+//! Operations of the API: method and path with the client's method for them. In: a path with names
+//! in braces and the values for them. Out: the path as it is sent, percent-encoded.
 
 use crate::ClientError;
 use protos::Name;
@@ -51,7 +51,8 @@ const REVISED: [&str; 10] = [
 ];
 
 impl Operation {
-    /// Whether it asks for an `If-Match`: the client sends `*` unless [`crate::MapClient::if_match`] says another.
+    /// Whether it asks for an `If-Match`: the client sends `*` unless
+    /// [`crate::MapClient::if_match`] says another.
     pub fn takes_revision(&self) -> bool {
         REVISED.contains(&self.path) && self.method != Method::GET
     }
@@ -62,7 +63,8 @@ impl Operation {
     }
 }
 
-/// Declares the operations of a file, and their list. A call that is no method of [`crate::MapClient`] does not compile.
+/// Declares the operations of a file, and their list. A call that is no method of
+/// [`crate::MapClient`] does not compile.
 macro_rules! operations {
     ($($name:ident: $method:ident $path:literal => $call:ident),+ $(,)?) => {
         $(const $name: $crate::http::operation::Operation = $crate::http::operation::Operation {

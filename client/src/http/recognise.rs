@@ -11,8 +11,8 @@ operations! {
 }
 
 impl MapClient {
-    /// Recognises the landmarks of one photograph, JPEG or PNG. Without intrinsics there is no pose. Those of a photograph
-    /// of another size are refused where the principal point shows it.
+    /// Recognises the landmarks of one photograph, JPEG or PNG. Without intrinsics there is no
+    /// pose. Those of a photograph of another size are refused where the principal point shows it.
     pub async fn recognise(
         &self,
         map: &str,
@@ -22,8 +22,8 @@ impl MapClient {
         self.recognise_by(map, image, camera.map(|camera| json!(intrinsics_wire(camera)))).await
     }
 
-    /// The same by a camera that was calibrated with pictures of this width and height, px: a photograph of another scale
-    /// has scaled intrinsics, and one of other proportions is refused.
+    /// The same by a camera that was calibrated with pictures of this width and height, px: a
+    /// photograph of another scale has scaled intrinsics, and one of other proportions is refused.
     pub async fn recognise_of_size(
         &self,
         map: &str,

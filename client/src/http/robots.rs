@@ -37,7 +37,8 @@ impl MapClient {
         self.send(self.ask_query(&LIST, &[], query)?).await
     }
 
-    /// One robot: whether it is connected, its pose and how old that is, and whether a second program uses its name.
+    /// One robot: whether it is connected, its pose and how old that is, and whether a second
+    /// program uses its name.
     pub async fn robot(&self, robot: &str) -> Result<Robot, ClientError> {
         self.send(self.ask(&GET, &[&robot])?).await
     }
@@ -47,7 +48,8 @@ impl MapClient {
         self.send(self.ask(&UNKNOWN, &[])?).await
     }
 
-    /// Puts a robot where a person says it is. It has to send odometry; the pose is unsupported until a landmark agrees.
+    /// Puts a robot where a person says it is. It has to send odometry; the pose is unsupported
+    /// until a landmark agrees.
     pub async fn set_robot_pose(&self, robot: &str, pose: &PoseByHand) -> Result<RobotPose, ClientError> {
         self.send(self.ask(&SET_POSE, &[&robot])?.json(pose)).await
     }

@@ -19,8 +19,9 @@ const FIRST_PAUSE: Duration = Duration::from_millis(250);
 /// Longest pause.
 const MAX_PAUSE: Duration = Duration::from_secs(5);
 
-/// The events of a server, one after the other. A lost connection is replaced, and the events meanwhile follow; where the
-/// server has forgotten some of them, [`ServerEventBody::Reset`] says to read anew.
+/// The events of a server, one after the other. A lost connection is replaced, and the events
+/// meanwhile follow; where the server has forgotten some of them, [`ServerEventBody::Reset`] says
+/// to read anew.
 #[derive(Debug)]
 pub struct ServerEvents {
     client: MapClient,
@@ -47,13 +48,14 @@ impl ServerEvents {
         Ok(Events::new(self.client.checked(request).await?))
     }
 
-    /// The id of the last event, for a query that goes on after it: also after a start of this program.
+    /// The id of the last event, for a query that goes on after it: also after a start of this
+    /// program.
     pub fn last_event_id(&self) -> Option<&str> {
         self.query.last_event_id.as_deref()
     }
 
-    /// The next event; waits for it, and connects again as long as the server cannot be reached or is busy. Errors: the server
-    /// refuses, for instance because the token was revoked.
+    /// The next event; waits for it, and connects again as long as the server cannot be reached or
+    /// is busy. Errors: the server refuses, for instance because the token was revoked.
     pub async fn next(&mut self) -> Result<ServerEvent, ClientError> {
         loop {
             let Some(stream) = &mut self.stream else {
@@ -79,7 +81,8 @@ impl ServerEvents {
         }
     }
 
-    /// An event, if it is for whoever follows: not the first of a connection, and not one that only a newer server sends.
+    /// An event, if it is for whoever follows: not the first of a connection, and not one that only
+    /// a newer server sends.
     fn read(&mut self, data: &str) -> Option<ServerEvent> {
         let value: Value = serde_json::from_str(data).ok()?;
         if let Some(id) = value["id"].as_str() {

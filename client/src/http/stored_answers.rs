@@ -19,7 +19,8 @@ impl MapClient {
         self.send(self.ask_query(&LIST, &[], query)?).await
     }
 
-    /// One stored answer: quads, candidates with their distances and thresholds, poses, paths of pictures.
+    /// One stored answer: quads, candidates with their distances and thresholds, poses, paths of
+    /// pictures.
     pub async fn stored_answer(&self, answer: i64) -> Result<StoredAnswer, ClientError> {
         self.send(self.ask(&GET, &[&answer])?).await
     }

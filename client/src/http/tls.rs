@@ -1,4 +1,5 @@
-//! Encryption of HTTP. In: the server's address and whom to believe. Out: a client that speaks to it, plain or encrypted.
+//! Encryption of HTTP. In: the server's address and whom to believe. Out: a client that speaks to
+//! it, plain or encrypted.
 
 use crate::ClientError;
 use reqwest::ClientBuilder;
@@ -9,7 +10,8 @@ use rustls::{
 };
 use std::{io, sync::Arc};
 
-/// Adds what `https` needs. Without `authority_pem`, the authorities of the system are believed; with it, no other.
+/// Adds what `https` needs. Without `authority_pem`, the authorities of the system are believed;
+/// with it, no other.
 pub(super) fn encrypted(
     builder: ClientBuilder,
     base: &str,

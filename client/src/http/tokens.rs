@@ -38,8 +38,8 @@ impl MapClient {
         self.send(self.ask(&LINK, &[])?).await
     }
 
-    /// The text of the token that requests carry, after one request by which a server on this machine tells where its local
-    /// token is. `None` where none is needed. It is a secret.
+    /// The text of the token that requests carry, after one request by which a server on this
+    /// machine tells where its local token is. `None` where none is needed. It is a secret.
     pub async fn token_in_use(&self) -> Result<Option<String>, ClientError> {
         self.whoami().await?;
         Ok(self.token())

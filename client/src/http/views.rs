@@ -33,7 +33,8 @@ pub struct NewView {
     pub image: Vec<u8>,
     /// The landmark in the photograph.
     pub region: LandmarkRegion,
-    /// How the photograph was taken; with it the server places the landmark, unless it was placed by hand.
+    /// How the photograph was taken; with it the server places the landmark, unless it was placed
+    /// by hand.
     pub capture: Option<CaptureMetadata>,
     /// Store it even if it is a near-duplicate of a stored view.
     pub keep_near_duplicate: bool,
@@ -49,7 +50,8 @@ impl NewView {
         Self { image, region, capture: None, keep_near_duplicate: false, make_landmark: false, size: None }
     }
 
-    /// Makes the landmark if it does not exist, of this size. Nothing is made if the view is refused.
+    /// Makes the landmark if it does not exist, of this size. Nothing is made if the view is
+    /// refused.
     #[must_use]
     pub fn or_make_landmark(self, size: Option<Size>) -> Self {
         Self { make_landmark: true, size, ..self }
@@ -121,7 +123,8 @@ impl MapClient {
         self.bytes(self.ask(&IMAGE, &[&map, &landmark, &view])?).await
     }
 
-    /// The photographs that uploads refused or the last lesson left out, newest first, at most 50, each with the reason.
+    /// The photographs that uploads refused or the last lesson left out, newest first, at most 50,
+    /// each with the reason.
     pub async fn refused_views(&self, map: &str, landmark: &str) -> Result<Vec<RefusedView>, ClientError> {
         self.all(&REFUSED, &[&map, &landmark]).await
     }

@@ -27,8 +27,8 @@ impl MapClient {
         self.send(self.ask(&COVERAGE, &[&map])?.json(request)).await
     }
 
-    /// Ranks landmarks as gaze targets from a pose, with pan and tilt. The server's state does not change; a robot
-    /// that turns its camera uses [`crate::RobotClient::gaze`].
+    /// Ranks landmarks as gaze targets from a pose, with pan and tilt. The server's state does not
+    /// change; a robot that turns its camera uses [`crate::RobotClient::gaze`].
     pub async fn gaze_ranking(
         &self,
         map: &str,

@@ -129,7 +129,8 @@ fn robots_are_bounded() {
     assert_eq!(world.epochs.lock().len(), MAX_TRACKED_ROBOTS);
 }
 
-/// Names that are not registered neither grow the list without bound nor replace a registered robot.
+/// Names that are not registered neither grow the list without bound nor replace a registered
+/// robot.
 #[test]
 fn names_that_nobody_registered_are_bounded() {
     let world = World::new();
@@ -141,7 +142,8 @@ fn names_that_nobody_registered_are_bounded() {
     }
     assert_eq!(world.epochs.lock().len(), MAX_UNREGISTERED + 1);
     assert!(world.status(0).alive, "the registered robot is shown");
-    // A registered robot is let in when the list is full, and one whose token came before its registration is alive.
+    // A registered robot is let in when the list is full, and one whose token came before its
+    // registration is alive.
     world.epochs.token(&name("r2"), (1, true), world.at(9), |n| n.as_str() == "r2");
     assert!(world.epochs.status(&name("r2"), world.at(9)).alive);
     let latest = format!("made-up-{}", 3 * MAX_UNREGISTERED - 1);

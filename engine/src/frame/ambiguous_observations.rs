@@ -1,9 +1,11 @@
-//! Observations of landmarks that look alike. In: a frame, its analysis, the map with its look-alike classes. Out: for each quad
-//! that several placed landmarks fit, each landmark that it may be, with its pose relative to the robot.
+//! Observations of landmarks that look alike. In: a frame, its analysis, the map with its
+//! look-alike classes. Out: for each quad that several placed landmarks fit, each landmark that it
+//! may be, with its pose relative to the robot.
 //!
-//! The thresholds of the classes are fitted without negatives (`snapshot/look_alike_classes.rs`), so that a quad may match every
-//! landmark of its class. Such a match is never a recognition. It serves relocalisation (`relocalise.rs`) and guided recognition
-//! (`guided.rs`). Where points say nothing, icons are compared with all landmarks, those included that only their points name.
+//! The thresholds of the classes are fitted without negatives (`snapshot/look_alike_classes.rs`),
+//! so that a quad may match every landmark of its class. Such a match is never a recognition. It
+//! serves relocalisation (`relocalise.rs`) and guided recognition (`guided.rs`). Where points say
+//! nothing, icons are compared with all landmarks, those included that only their points name.
 
 use crate::snapshot::map_snapshot::MapSnapshot;
 use map::{
@@ -30,14 +32,17 @@ use vision::{
     seen_border::SeenBorder,
 };
 
-/// Most members of a look-alike class: an observation that may be of more says too little for what it costs.
+/// Most members of a look-alike class: an observation that may be of more says too little for what
+/// it costs.
 pub const MAX_CLASS_MEMBERS: usize = map::relocalise::MAX_MEMBERS / 2;
 
-/// One object: each landmark it may be, and where that landmark is from the robot if it is that one.
+/// One object: each landmark it may be, and where that landmark is from the robot if it is that
+/// one.
 pub type AmbiguousObservation = Vec<(LandmarkId, RelativeObservation)>;
 
-/// The ambiguous observations of a frame: quads that may be several landmarks, all of known and trusted place. Where the
-/// place of one member is not known, that member would be taken for the others again and again.
+/// The ambiguous observations of a frame: quads that may be several landmarks, all of known and
+/// trusted place. Where the place of one member is not known, that member would be taken for the
+/// others again and again.
 pub fn ambiguous_observations(
     image: &GrayImage,
     analysis: &FrameAnalysis,
@@ -93,7 +98,8 @@ pub fn are_placed_and_trusted(landmarks: &BTreeSet<LandmarkId>, map: &MapSnapsho
     landmarks.iter().all(is_placed)
 }
 
-/// The look-alike class that a quad matches. `None` where it matches no member, or where a member has no trusted place.
+/// The look-alike class that a quad matches. `None` where it matches no member, or where a member
+/// has no trusted place.
 pub fn match_look_alikes(image: &GrayImage, quad: &Quad, map: &MapSnapshot) -> Option<LookAlikeMatch> {
     let compare = |p: &Params| recognise_quad(image, quad, &map.look_alikes.models, p);
     let (mut result, mut border) = compare(&map.params);
@@ -113,7 +119,8 @@ pub fn match_look_alikes(image: &GrayImage, quad: &Quad, map: &MapSnapshot) -> O
     Some(LookAlikeMatch { members, fitting: fitting.len(), ratio, corners_px, covariance_px2 })
 }
 
-/// The landmarks that fit, and the members of their classes. `None` if that is none, or more than [`MAX_CLASS_MEMBERS`].
+/// The landmarks that fit, and the members of their classes. `None` if that is none, or more than
+/// [`MAX_CLASS_MEMBERS`].
 fn class_members(
     fitting: &BTreeSet<LandmarkId>,
     classes: &BTreeMap<LandmarkId, Arc<Vec<LandmarkId>>>,
@@ -149,8 +156,8 @@ fn relative_observations(
     fixes.into_iter().map(relative).collect()
 }
 
-/// The association hypotheses of an observation, equally probable; `clutter` is the probability of an object that is on no
-/// map, 0 to 1.
+/// The association hypotheses of an observation, equally probable; `clutter` is the probability of
+/// an object that is on no map, 0 to 1.
 pub fn association_hypotheses<'a>(
     observation: &[(LandmarkId, RelativeObservation)],
     map: &'a MapSnapshot,

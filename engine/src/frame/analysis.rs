@@ -1,5 +1,6 @@
-//! A frame on its way, as one value that grows: opened (decoded, with its map and the pose without it), then analysed:
-//! quads with verdicts by the pipeline of `vision`, landmarks that the pose names, fixes and landmark checks.
+//! A frame on its way, as one value that grows: opened (decoded, with its map and the pose without
+//! it), then analysed: quads with verdicts by the pipeline of `vision`, landmarks that the pose
+//! names, fixes and landmark checks.
 
 use super::{
     context::FrameContext,
@@ -37,7 +38,8 @@ pub enum Effect {
     },
     /// Nothing: the robot has begun another epoch.
     AnswerOnly,
-    /// Nothing: it is compared with another map than its robot's, on which the robot's own pose means nothing.
+    /// Nothing: it is compared with another map than its robot's, on which the robot's own pose
+    /// means nothing.
     OtherMap,
 }
 
@@ -124,8 +126,8 @@ pub fn found_quads<'a>(analysis: &'a FrameAnalysis, guided: &'a GuidedResult) ->
 }
 
 impl OpenedFrame<'_> {
-    /// Looks for all landmarks of the map. The guide is the server's pose while nothing contradicts it; without one,
-    /// the robot's own.
+    /// Looks for all landmarks of the map. The guide is the server's pose while nothing contradicts
+    /// it; without one, the robot's own.
     pub fn searched(&self, times: &mut StageTimes) -> AnalysedFrame {
         let analysis = analyse_checked(self.frame, &*self.picture, &self.map, times);
         let context = FrameContext::new(self.frame, &analysis, &self.map);
@@ -139,8 +141,8 @@ impl OpenedFrame<'_> {
         self.with(analysis, guided, evaluation)
     }
 
-    /// Looks for the landmarks that the server's pose expects alone. `None` where the result calls for a search:
-    /// nothing found, a contradiction, or a missing landmark that is surely in view.
+    /// Looks for the landmarks that the server's pose expects alone. `None` where the result calls
+    /// for a search: nothing found, a contradiction, or a missing landmark that is surely in view.
     pub fn by_expected(&self, times: &mut StageTimes) -> Option<AnalysedFrame> {
         let prior = self.prior.clone()?;
         let analysis = FrameAnalysis { quads: Vec::new() };
@@ -198,7 +200,8 @@ impl Trace for StageTimes {
     }
 }
 
-/// Recognises a frame: what its detector finds, or the quads that the robot found, from there on alike.
+/// Recognises a frame: what its detector finds, or the quads that the robot found, from there on
+/// alike.
 pub fn analyse_checked<'a>(
     frame: &CheckedFrame,
     picture: impl Into<PictureRef<'a>>,

@@ -1,5 +1,5 @@
-//! Answers as messages: names instead of numbers, verdicts, landmark poses, and the robot's pose where placed landmarks
-//! give one. What is not known is an absent field, never zero.
+//! Answers as messages: names instead of numbers, verdicts, landmark poses, and the robot's pose
+//! where placed landmarks give one. What is not known is an absent field, never zero.
 
 use super::{
     analysis::{AnalysedFrame, FoundQuad, StageTimes, analyse_frame, found_quads, frame_camera},
@@ -89,7 +89,8 @@ fn with_fixes(
     answer
 }
 
-/// The answer to one picture without a robot: an uploaded photograph. Nothing says how the camera was held.
+/// The answer to one picture without a robot: an uploaded photograph. Nothing says how the camera
+/// was held.
 pub fn answer_to_photograph<'a>(
     picture: impl Into<PictureRef<'a>>,
     camera: Option<&Intrinsics>,

@@ -5,7 +5,8 @@ use map::{extrinsics::CameraExtrinsics, pose2::Pose2Covariance};
 use protos::CheckedFrame;
 use vision::{frame::Intrinsics, pipeline::FrameAnalysis};
 
-/// What the evaluation of a frame needs: its quads, its map, its camera and its robot's own prior pose.
+/// What the evaluation of a frame needs: its quads, its map, its camera and its robot's own prior
+/// pose.
 #[derive(Debug, Clone, Copy)]
 pub struct FrameContext<'a> {
     /// Its quads with verdicts.

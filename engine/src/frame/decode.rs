@@ -1,7 +1,8 @@
-//! Decodes images. In: encoded bytes. Out: a checked picture, grey or in colour, within limits of bytes and pixels. Nothing
-//! else calls the decoders: the size is read from the header and checked before any pixel is unpacked, and metadata is
-//! ignored. What is transparent is white. The grey level of JPEG is its luma; the colours of PNG and of raw pixels are weighted as JPEG weights them, so
-//! that all give the same grey.
+//! Decodes images. In: encoded bytes. Out: a checked picture, grey or in colour, within limits of
+//! bytes and pixels. Nothing else calls the decoders: the size is read from the header and checked
+//! before any pixel is unpacked, and metadata is ignored. What is transparent is white. The grey
+//! level of JPEG is its luma; the colours of PNG and of raw pixels are weighted as JPEG weights
+//! them, so that all give the same grey.
 
 mod colour;
 mod file_kind;
@@ -54,8 +55,8 @@ impl ImageLimits {
     pub const UPLOAD: Self = Self { bytes: 16 << 20, pixels: vision::frame::MAX_AREA_PX };
 }
 
-/// The picture of a frame; of quads, their [`mosaic()`]. Errors: over the limits, not of the claimed encoding and size, or
-/// not decodable.
+/// The picture of a frame; of quads, their [`mosaic()`]. Errors: over the limits, not of the
+/// claimed encoding and size, or not decodable.
 pub fn decode_frame(frame: &CheckedFrame, limits: ImageLimits) -> Result<Picture, Rejection> {
     let claimed = (frame.width_px as usize, frame.height_px as usize);
     match &frame.pixels {
@@ -84,7 +85,8 @@ pub(super) fn decode_image(
     }
 }
 
-/// The picture of an uploaded file, JPEG or PNG by its first bytes. Errors: over the limits, or not decodable.
+/// The picture of an uploaded file, JPEG or PNG by its first bytes. Errors: over the limits, or not
+/// decodable.
 pub fn decode_upload(bytes: &[u8], limits: ImageLimits) -> Result<Picture, Rejection> {
     check_bytes(bytes, limits)?;
     match sniff(bytes) {

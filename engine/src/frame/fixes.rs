@@ -1,5 +1,6 @@
-//! The robot's pose by the landmarks that a frame shows. In: analysed quads, the map, extrinsics, an optional prior pose.
-//! Out: a fix (map frame, m and rad, with covariance), or why there is none.
+//! The robot's pose by the landmarks that a frame shows. In: analysed quads, the map, extrinsics,
+//! an optional prior pose. Out: a fix (map frame, m and rad, with covariance), or why there is
+//! none.
 
 use crate::snapshot::MapSnapshot;
 use map::{
@@ -101,7 +102,8 @@ pub fn unique_landmarks(analysis: &FrameAnalysis) -> Vec<(LandmarkId, &LandmarkP
     analysis.quads.iter().filter_map(|q| Some((unique(q)?, q.pose.as_ref().ok()?))).collect()
 }
 
-/// Observations of the landmarks that were recognised, posed, and have a trusted place; or why there are none.
+/// Observations of the landmarks that were recognised, posed, and have a trusted place; or why
+/// there are none.
 pub fn landmark_observations<'a>(
     analysis: &'a FrameAnalysis,
     map: &'a MapSnapshot,

@@ -1,8 +1,10 @@
-//! Guided recognition: what a known pose adds to a frame. It says which of several look-alikes a quad is, by where each is
-//! expected, and it finds expected landmarks that were not detected, one by one.
+//! Guided recognition: what a known pose adds to a frame. It says which of several look-alikes a
+//! quad is, by where each is expected, and it finds expected landmarks that were not detected, one
+//! by one.
 //!
-//! In: the image, its analysis, the map, the prior pose without the frame. Out: [`GuidedResult`]: landmarks that picture and
-//! place name together, each with its pose. A quad that fits no landmark is never named. Stateless.
+//! In: the image, its analysis, the map, the prior pose without the frame. Out: [`GuidedResult`]:
+//! landmarks that picture and place name together, each with its pose. A quad that fits no landmark
+//! is never named. Stateless.
 
 use super::{
     ambiguous_observations::{LookAlikeMatch, are_placed_and_trusted, match_look_alikes},
@@ -32,10 +34,12 @@ use vision::{
     seen_border::{FoundBy, SeenBorder},
 };
 
-/// Two quads that overlap by more than this and may be the same landmark are two borders of one object.
+/// Two quads that overlap by more than this and may be the same landmark are two borders of one
+/// object.
 const SAME_OBJECT_IOU: f64 = 0.5;
 
-/// Expected landmarks that are searched for one by one in a frame, at most: those with the longest shortest side.
+/// Expected landmarks that are searched for one by one in a frame, at most: those with the longest
+/// shortest side.
 pub const MAX_EXPECTED_SEARCHES: usize = 8;
 
 /// A landmark that is surely in view with sides of at least this is found if it is there.
@@ -48,7 +52,8 @@ pub struct GuidedObservation {
     pub quad: Option<usize>,
     /// Which landmark.
     pub landmark: LandmarkId,
-    /// Corners in the landmark's order, px; outside of the image where its border cuts the landmark.
+    /// Corners in the landmark's order, px; outside of the image where its border cuts the
+    /// landmark.
     pub corners_px: Corners,
     /// Covariances of the corners, px^2.
     pub covariance_px2: [Matrix2<f64>; 4],
@@ -89,8 +94,8 @@ struct QuadMatch {
     points: Option<PointEvidence>,
 }
 
-/// Names by `prior`, the pose without the frame, what the picture alone leaves open. Without intrinsics or extrinsics, and
-/// while look-alike classes are pending, the result is empty.
+/// Names by `prior`, the pose without the frame, what the picture alone leaves open. Without
+/// intrinsics or extrinsics, and while look-alike classes are pending, the result is empty.
 pub fn recognise_guided(
     image: &GrayImage,
     frame: &FrameContext<'_>,
@@ -144,8 +149,8 @@ fn is_distinct(map: &MapSnapshot, id: LandmarkId) -> bool {
     map.models.get(id).is_some() && !map.look_alikes.classes.contains_key(&id)
 }
 
-/// What may be landmarks, each object once: of several borders the best match, and detected quads before expected landmarks
-/// that were searched for.
+/// What may be landmarks, each object once: of several borders the best match, and detected quads
+/// before expected landmarks that were searched for.
 fn quad_matches(image: &GrayImage, frame: &FrameContext<'_>, expected: &Expectations) -> Vec<QuadMatch> {
     let quads = frame.analysis.quads.iter().enumerate();
     let mut all: Vec<QuadMatch> =
@@ -180,7 +185,8 @@ fn overlap(a: &Corners, b: &Corners) -> bool {
     polygon::iou(a.points(), b.points()) > SAME_OBJECT_IOU
 }
 
-/// Whether an expected landmark need not be searched for: the picture names it, or a quad detected there may be it.
+/// Whether an expected landmark need not be searched for: the picture names it, or a quad detected
+/// there may be it.
 fn is_found(chosen: &QuadMatch, e: &Expected) -> bool {
     let LookAlikeMatch { members, corners_px, .. } = &chosen.matched;
     let is_there = Corners::new(e.corners_px).is_ok_and(|expected_px| overlap(corners_px, &expected_px));
@@ -213,7 +219,8 @@ fn match_quad(
     Some(QuadMatch { quad, is_unique: false, picture_nats: ACCEPTED_NATS, matched, points: None })
 }
 
-/// A quad that matches one landmark by its icon, without points, where that landmark has no look-alikes.
+/// A quad that matches one landmark by its icon, without points, where that landmark has no
+/// look-alikes.
 fn match_by_icon(analysis: &QuadAnalysis, frame: &FrameContext<'_>) -> Option<LookAlikeMatch> {
     let result = analysis.recognition.as_ref()?;
     let Verdict::Ambiguous(landmark) = result.verdict else { return None };
@@ -229,7 +236,8 @@ fn match_by_icon(analysis: &QuadAnalysis, frame: &FrameContext<'_>) -> Option<Lo
     Some(LookAlikeMatch { members, fitting: 1, ratio: first.ratio, corners_px, covariance_px2 })
 }
 
-/// Searches for an expected landmark that was not detected. What is found may be any member of its look-alike class.
+/// Searches for an expected landmark that was not detected. What is found may be any member of its
+/// look-alike class.
 fn search(image: &GrayImage, e: &Expected, frame: &FrameContext<'_>) -> Option<QuadMatch> {
     let (map, id) = (frame.map, e.landmark);
     let models =
@@ -252,7 +260,8 @@ fn observation(quad: &QuadMatch) -> Observation {
     Observation::new(*corners_px, covariance_px2, members.iter().map(candidate).collect())
 }
 
-/// The landmark at a quad that the prior pose names; `None` where no border is clear enough for a pose.
+/// The landmark at a quad that the prior pose names; `None` where no border is clear enough for a
+/// pose.
 fn guided_observation(
     image: &GrayImage,
     quad_match: &QuadMatch,

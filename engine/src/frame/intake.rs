@@ -1,5 +1,6 @@
-//! The intake of frames. In: bytes of a robot on the key of a camera. Out: the frame in its slot, or a refusal as the answer
-//! to publish at once. It checks everything but the pixels, and never waits: it runs on the transport's threads.
+//! The intake of frames. In: bytes of a robot on the key of a camera. Out: the frame in its slot,
+//! or a refusal as the answer to publish at once. It checks everything but the pixels, and never
+//! waits: it runs on the transport's threads.
 
 use super::slots::{Held, SlotKey, Slots};
 use crate::{
@@ -34,8 +35,8 @@ pub struct FrameJob {
     pub deadline: Instant,
     /// The robot's clock is off, or the capture time does not fit the robot's other messages.
     pub clock_suspect: bool,
-    /// Present if the capture time does not fit the robot's other messages and must not be used: what the robot's clock showed
-    /// at receipt, ns.
+    /// Present if the capture time does not fit the robot's other messages and must not be used:
+    /// what the robot's clock showed at receipt, ns.
     pub stamp_instead_ns: Option<i64>,
     /// Bytes of its message.
     pub message_bytes: usize,
@@ -68,14 +69,14 @@ pub struct Intake {
     pub frame_bytes: usize,
     /// Deadline of frames that name none.
     pub deadline: Duration,
-    /// Whether robots are tied to certificates. Then a frame may name the robot's map and maps linked with it alone; others
-    /// look as if they did not exist.
+    /// Whether robots are tied to certificates. Then a frame may name the robot's map and maps
+    /// linked with it alone; others look as if they did not exist.
     pub linked_maps_only: bool,
 }
 
 impl Intake {
-    /// Puts a frame in its slot, or counts its refusal and gives the answer that says why. Quads have the slot of their
-    /// camera's frames, and one numbering with them.
+    /// Puts a frame in its slot, or counts its refusal and gives the answer that says why. Quads
+    /// have the slot of their camera's frames, and one numbering with them.
     pub fn take(
         &self,
         kind: FrameKind,
@@ -223,7 +224,8 @@ pub fn unknown_map(map: &str) -> Rejection {
     Rejection::new(Code::UnknownMap, "map", format!("there is no map {map}"))
 }
 
-/// Whether a capture time is further than [`CLOCK_TOLERANCE`] from this machine's clock. It is reported, and changes nothing.
+/// Whether a capture time is further than [`CLOCK_TOLERANCE`] from this machine's clock. It is
+/// reported, and changes nothing.
 fn clock_suspect(captured_ns: i64) -> bool {
     let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     (i128::from(captured_ns) - now.as_nanos() as i128).unsigned_abs() > CLOCK_TOLERANCE.as_nanos()

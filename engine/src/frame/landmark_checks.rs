@@ -1,9 +1,10 @@
-//! Checks landmarks by their places, and computes the fixes of a frame. In: an analysed frame, the prior pose without it, the
-//! guided observations. Out: [`FrameEvaluation`]. Stateless.
+//! Checks landmarks by their places, and computes the fixes of a frame. In: an analysed frame, the
+//! prior pose without it, the guided observations. Out: [`FrameEvaluation`]. Stateless.
 //!
-//! Each observed landmark is compared with its place by the prior pose. An observation of a landmark that hangs elsewhere is
-//! dropped. The others give two fixes: a global one by the landmarks that the picture alone names, and a guided one by the
-//! landmarks that the prior pose names.
+//! Each observed landmark is compared with its place by the prior pose. An observation of a
+//! landmark that hangs elsewhere is dropped. The others give two fixes: a global one by the
+//! landmarks that the picture alone names, and a guided one by the landmarks that the prior pose
+//! names.
 
 use super::{
     context::FrameContext,
@@ -67,8 +68,8 @@ impl FrameEvaluation {
     }
 }
 
-/// Fixes and landmark checks of a searched frame. `guided` holds the landmarks that the prior pose names: `known`, the
-/// server's, or without it the robot's own.
+/// Fixes and landmark checks of a searched frame. `guided` holds the landmarks that the prior pose
+/// names: `known`, the server's, or without it the robot's own.
 pub fn evaluate_frame(
     frame: &FrameContext<'_>,
     known: Option<PriorPose>,
@@ -100,8 +101,8 @@ pub fn evaluate_frame(
     }
 }
 
-/// The guided fix of a frame in which only the expected landmarks were looked for: it may correct the prior pose. Searched
-/// frames find landmarks that were moved or are missing.
+/// The guided fix of a frame in which only the expected landmarks were looked for: it may correct
+/// the prior pose. Searched frames find landmarks that were moved or are missing.
 pub fn evaluate_expected_only(
     frame: &FrameContext<'_>,
     prior: PriorPose,
@@ -120,8 +121,9 @@ pub fn evaluate_expected_only(
     }
 }
 
-/// The robot's pose by landmarks. The robot's own prior gates. The server's prior only chooses between two solutions, so that
-/// a wrong fused pose cannot keep out the fixes that would correct it.
+/// The robot's pose by landmarks. The robot's own prior gates. The server's prior only chooses
+/// between two solutions, so that a wrong fused pose cannot keep out the fixes that would correct
+/// it.
 fn frame_fixes(
     frame: &FrameContext<'_>,
     observations: &[LandmarkObservation<'_>],
@@ -139,8 +141,8 @@ fn frame_fixes(
     (fix, independent.ok())
 }
 
-/// The robot's pose by the landmarks that the prior pose names, and those in `with`. A landmark that may have been moved is
-/// left out.
+/// The robot's pose by the landmarks that the prior pose names, and those in `with`. A landmark
+/// that may have been moved is left out.
 fn guided_fix(
     frame: &FrameContext<'_>,
     guided: &GuidedResult,
@@ -195,7 +197,8 @@ fn landmark_checks(
         Some(ExpectedLandmark { landmark: model.id, place, visible })
     });
     let camera = MountedCamera { mounting: extrinsics, camera, image_px };
-    // Only a pose that rests on several other landmarks shows that one is missing, and only in a whole image.
+    // Only a pose that rests on several other landmarks shows that one is missing, and only in a
+    // whole image.
     let missed = if frame.is_whole && prior.supporting_landmarks.len() >= p.supporters {
         expected(&prior.pose, &camera, &candidates.collect::<Vec<_>>(), p)
     } else {

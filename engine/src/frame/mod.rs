@@ -1,5 +1,6 @@
-//! The way of a frame: `intake -> slots -> workers -> decode -> analysis -> guided -> landmark_checks -> fixes ->
-//! answer`, and on to the observers and to `motion`.
+//! The way of a frame:
+//! `intake -> slots -> workers -> decode -> analysis -> guided -> landmark_checks -> fixes -> answer`,
+//! and on to the observers and to `motion`.
 
 pub mod ambiguous_observations;
 pub mod analysis;

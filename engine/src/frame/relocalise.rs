@@ -1,6 +1,7 @@
-//! Relocalisation of robots that have no pose and recognise nothing unique: a grid belief (`map::relocalise`) for each. In:
-//! frames with odometry and ambiguous observations. Out: pose hypotheses, and a pose once one hypothesis holds 95 %, explains
-//! observations of two different landmarks, and no other pose explains nearly as much. Runs on the vision threads only.
+//! Relocalisation of robots that have no pose and recognise nothing unique: a grid belief
+//! (`map::relocalise`) for each. In: frames with odometry and ambiguous observations. Out: pose
+//! hypotheses, and a pose once one hypothesis holds 95 %, explains observations of two different
+//! landmarks, and no other pose explains nearly as much. Runs on the vision threads only.
 
 use super::ambiguous_observations::{AmbiguousObservation, association_hypotheses, on_floor};
 use crate::snapshot::MapSnapshot;
@@ -16,7 +17,8 @@ use std::{
 };
 use vision::model::LandmarkId;
 
-/// Robots that are relocalised at a time, some 50 MB each at most. A further one replaces the one with the oldest frame.
+/// Robots that are relocalised at a time, some 50 MB each at most. A further one replaces the one
+/// with the oldest frame.
 pub const MAX_RELOCALISERS: usize = 8;
 /// Cells of a grid belief: 180 m by 180 m at the coarsest step.
 pub const MAX_CELLS: usize = 1_200_000;
@@ -91,8 +93,8 @@ pub enum MissingCondition {
 pub struct RelocalisationUpdate {
     /// Pose hypotheses, most probable first.
     pub hypotheses: Vec<PoseHypothesis>,
-    /// The pose at the frame (map frame) once every condition is met, and the landmarks by which it explains the
-    /// observations.
+    /// The pose at the frame (map frame) once every condition is met, and the landmarks by which it
+    /// explains the observations.
     pub pose: Option<(Pose2Covariance, Vec<LandmarkId>)>,
 }
 
@@ -134,7 +136,8 @@ struct Open {
 }
 
 impl Relocalisers {
-    /// Takes a frame. `None` until a frame has ambiguous observations, and on a map that is too large.
+    /// Takes a frame. `None` until a frame has ambiguous observations, and on a map that is too
+    /// large.
     pub fn update(&self, robot: &Name, frame: &RelocalisationInput<'_>) -> Option<RelocalisationUpdate> {
         let relocaliser = self.of(robot, frame)?;
         let mut relocaliser = relocaliser.lock().unwrap_or_else(PoisonError::into_inner);
@@ -276,9 +279,10 @@ impl Relocaliser {
         self.missing.is_empty().then_some((Pose2Covariance { covariance, ..first.pose }, landmarks))
     }
 
-    /// Whether another pose explains the observations, too, within the errors of odometry and places. The belief takes its
-    /// errors for independent, and is overconfident where look-alikes hang nearly evenly. The poses tried are those that
-    /// follow if the landmarks that `now` explains are other look-alikes.
+    /// Whether another pose explains the observations, too, within the errors of odometry and
+    /// places. The belief takes its errors for independent, and is overconfident where look-alikes
+    /// hang nearly evenly. The poses tried are those that follow if the landmarks that `now`
+    /// explains are other look-alikes.
     fn has_rival(&self, now: &Pose2, landmarks: &[LandmarkId], map: &MapSnapshot) -> bool {
         let place = |id: &LandmarkId| Some(on_floor(map.landmarks.get(id)?.place.as_ref()?));
         let others: BTreeSet<LandmarkId> =
@@ -296,7 +300,8 @@ impl Relocaliser {
         rivals.filter(is_other).any(|rival| self.explained(&rival, map).1 >= MIN_EXPLAINED)
     }
 
-    /// The landmarks by which a pose explains the observations, and the share of the observations that it explains, 0 to 1.
+    /// The landmarks by which a pose explains the observations, and the share of the observations
+    /// that it explains, 0 to 1.
     fn explained(&self, now: &Pose2, map: &MapSnapshot) -> (Vec<LandmarkId>, f64) {
         let (mut landmarks, mut explained, mut all) = (BTreeSet::new(), 0.0, 0.0_f64);
         for frame in &self.frames {
@@ -322,8 +327,8 @@ impl Relocaliser {
     }
 }
 
-/// The rectangle around the walls, or without walls around the landmarks and their reach (lower and upper corner, map frame,
-/// m).
+/// The rectangle around the walls, or without walls around the landmarks and their reach (lower and
+/// upper corner, map frame, m).
 fn extent(map: &MapSnapshot) -> Option<[Point2<f64>; 2]> {
     let (points, margin): (Vec<Point2<f64>>, f64) = if map.walls.is_empty() {
         let places = map.landmarks.values().filter_map(|l| l.place.as_ref());

@@ -1,7 +1,8 @@
-//! One slot per robot and camera: one frame in work, one waiting, the newest wins. In: frames in any order and at any
-//! rate. Out: work, in turns of the robots and then of the cameras of each, so that no robot starves another. Every frame ends
-//! in exactly one of processed, superseded, expired, rejected, and the counts say so at every moment. Knows no vision and no
-//! transport; time is passed in.
+//! One slot per robot and camera: one frame in work, one waiting, the newest wins. In: frames in
+//! any order and at any rate. Out: work, in turns of the robots and then of the cameras of each, so
+//! that no robot starves another. Every frame ends in exactly one of processed, superseded,
+//! expired, rejected, and the counts say so at every moment. Knows no vision and no transport; time
+//! is passed in.
 
 mod turns;
 
@@ -22,9 +23,11 @@ pub trait Held {
 
 /// Cameras of one robot.
 pub const MAX_CAMERAS_PER_ROBOT: usize = 8;
-/// A slot without a frame for this long may be replaced by a camera of another robot; its order is forgotten then.
+/// A slot without a frame for this long may be replaced by a camera of another robot; its order is
+/// forgotten then.
 pub const IDLE_SLOT: Duration = Duration::from_mins(10);
-/// A robot with all the cameras that it may have: a new one replaces the one with the oldest frame, if that is this old.
+/// A robot with all the cameras that it may have: a new one replaces the one with the oldest frame,
+/// if that is this old.
 pub const IDLE_CAMERA: Duration = Duration::from_secs(5);
 
 /// A robot and one of its cameras.
@@ -150,7 +153,8 @@ pub struct Slots<T> {
 }
 
 impl<T: Held> Slots<T> {
-    /// At most `max_slots` cameras over all robots, whose frames that wait or are in work take at most `max_bytes`.
+    /// At most `max_slots` cameras over all robots, whose frames that wait or are in work take at
+    /// most `max_bytes`.
     pub fn new(max_slots: usize, max_bytes: usize) -> Self {
         let state = State {
             slots: BTreeMap::new(),
@@ -163,8 +167,9 @@ impl<T: Held> Slots<T> {
         Self { state: Mutex::new(state), ready: Condvar::new(), limit: max_slots, max_bytes }
     }
 
-    /// Puts a frame in its slot; the one that waited there is superseded. Never waits for work. Errors: the frame is not newer
-    /// than the last of its camera, there are too many cameras, or the frames of all take too much memory.
+    /// Puts a frame in its slot; the one that waited there is superseded. Never waits for work.
+    /// Errors: the frame is not newer than the last of its camera, there are too many cameras, or
+    /// the frames of all take too much memory.
     pub fn offer(&self, key: SlotKey, order: (u64, u64), job: T, now: Instant) -> Result<(), Rejection> {
         let mut guard = self.lock();
         let state = &mut *guard;
@@ -214,8 +219,8 @@ impl<T: Held> Slots<T> {
         *counts.rejected.entry(code).or_default() += 1;
     }
 
-    /// The next frame in turn; waits for one. `None` after [`Slots::close`]. Every frame taken is given back to
-    /// [`Slots::finish`].
+    /// The next frame in turn; waits for one. `None` after [`Slots::close`]. Every frame taken is
+    /// given back to [`Slots::finish`].
     pub fn take(&self) -> Option<(SlotKey, T)> {
         let mut state = self.lock();
         loop {
@@ -234,7 +239,8 @@ impl<T: Held> Slots<T> {
         self.lock().next()
     }
 
-    /// Ends the work on the frame last taken from this slot; its next frame queues behind the others.
+    /// Ends the work on the frame last taken from this slot; its next frame queues behind the
+    /// others.
     pub fn finish(&self, key: &SlotKey, outcome: FrameOutcome) {
         let mut guard = self.lock();
         let state = &mut *guard;
@@ -246,7 +252,8 @@ impl<T: Held> Slots<T> {
             FrameOutcome::Processed => state.counts.processed += 1,
             FrameOutcome::Expired => {
                 state.counts.expired += 1;
-                // Otherwise, with more robots than are served in time, the same ones would be served again and again.
+                // Otherwise, with more robots than are served in time, the same ones would be
+                // served again and again.
                 let (turn, before) = slot.turn;
                 slot.last_turn = before;
                 state.ready.give_back(&key.robot, turn);
@@ -338,8 +345,8 @@ impl<T: Held> State<T> {
         None
     }
 
-    /// Makes room for one more slot: removes slots that have been idle for [`IDLE_SLOT`], and if need be the robot's camera that
-    /// has been idle longest, for at least [`IDLE_CAMERA`].
+    /// Makes room for one more slot: removes slots that have been idle for [`IDLE_SLOT`], and if
+    /// need be the robot's camera that has been idle longest, for at least [`IDLE_CAMERA`].
     fn make_room(&mut self, key: &SlotKey, max_slots: usize, now: Instant) -> Result<(), Rejection> {
         let of_robot =
             |slots: &BTreeMap<SlotKey, Slot<T>>| slots.keys().filter(|k| k.robot == key.robot).count();

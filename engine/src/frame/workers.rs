@@ -1,7 +1,8 @@
-//! A fixed pool of threads that turns frames into answers: decode, pipeline, robot pose, publish; and one for laser
-//! scans. Vision for robots runs only here, never on the async runtime. A panic in a frame's work is caught, counted
-//! and answered as `internal`; the slot is free again and the worker goes on. A thread that ends before it is told to
-//! makes the server fail, and so does one that does not come to the end of a frame ([`crate::heartbeats`]).
+//! A fixed pool of threads that turns frames into answers: decode, pipeline, robot pose, publish;
+//! and one for laser scans. Vision for robots runs only here, never on the async runtime. A panic
+//! in a frame's work is caught, counted and answered as `internal`; the slot is free again and the
+//! worker goes on. A thread that ends before it is told to makes the server fail, and so does one
+//! that does not come to the end of a frame ([`crate::heartbeats`]).
 
 use super::{
     ambiguous_observations::ambiguous_observations,
@@ -49,7 +50,8 @@ pub struct AnsweredFrame<'a> {
 
 /// Watches frames. Workers call it: an implementation never waits.
 pub trait FrameObserver: Debug + Send + Sync {
-    /// A frame was answered. The answer is published afterwards, so that who has it finds it counted.
+    /// A frame was answered. The answer is published afterwards, so that who has it finds it
+    /// counted.
     fn answered(&self, _frame: &AnsweredFrame<'_>) {}
 
     /// The frames of a robot changed the health of landmarks.
@@ -61,8 +63,8 @@ pub trait FrameObserver: Debug + Send + Sync {
     }
 }
 
-/// When a frame may do without the search of the whole map. It does where [`map::guided::Schedule`] asks for none and
-/// the expected landmarks are found.
+/// When a frame may do without the search of the whole map. It does where [`map::guided::Schedule`]
+/// asks for none and the expected landmarks are found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SearchPolicy {
     /// Never: every frame is searched.
@@ -106,7 +108,8 @@ pub struct Engine {
 }
 
 impl Engine {
-    /// Answers a frame in a span of its own: by robot, camera, epoch and number it can be followed through the log.
+    /// Answers a frame in a span of its own: by robot, camera, epoch and number it can be followed
+    /// through the log.
     fn answer_in_span(&self, key: &SlotKey, job: &FrameJob, publish: &dyn Publish) -> FrameOutcome {
         let (robot, camera, frame) = (&key.robot, &key.camera, &job.frame);
         let (epoch, seq) = (frame.epoch, frame.seq);
@@ -115,8 +118,8 @@ impl Engine {
             .in_scope(|| self.answer_frame(key, job, publish))
     }
 
-    /// Answers one frame and publishes the answer; never panics. The outcome of an answered frame stands, whatever
-    /// happens to the pose and the findings after it.
+    /// Answers one frame and publishes the answer; never panics. The outcome of an answered frame
+    /// stands, whatever happens to the pose and the findings after it.
     fn answer_frame(&self, key: &SlotKey, job: &FrameJob, publish: &dyn Publish) -> FrameOutcome {
         let answered = Cell::new(None);
         let seq = job.frame.seq;
@@ -205,8 +208,8 @@ impl Engine {
         if effect == Effect::Full { self.motion.prior_pose(&key.robot, &key.camera, at) } else { None }
     }
 
-    /// Whether policy and schedule ask for no search of the map. Frames of robots that gather are always searched: they
-    /// show objects that are on no map.
+    /// Whether policy and schedule ask for no search of the map. Frames of robots that gather are
+    /// always searched: they show objects that are on no map.
     fn may_spare_search(&self, key: &SlotKey, opened: &OpenedFrame<'_>) -> bool {
         let plan = opened.prior.as_ref().map(|prior| &prior.plan);
         plan.is_some_and(|plan| plan.guided && plan.global.is_none())

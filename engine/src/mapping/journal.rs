@@ -1,8 +1,10 @@
-//! The journal of a mapping: its scans on disk, so that a restart of the server loses no drive. One append-only file a map. In:
-//! scans as they are mapped. Out: the same scans at the next start, up to the first record that is not whole.
+//! The journal of a mapping: its scans on disk, so that a restart of the server loses no drive. One
+//! append-only file a map. In: scans as they are mapped. Out: the same scans at the next start, up
+//! to the first record that is not whole.
 //!
-//! A record is its length (4 bytes, little-endian), the first 8 bytes of its SHA-256, and its bytes. The first record is the
-//! header as JSON; the others are scans as on the wire, which are checked again when they are read.
+//! A record is its length (4 bytes, little-endian), the first 8 bytes of its SHA-256, and its
+//! bytes. The first record is the header as JSON; the others are scans as on the wire, which are
+//! checked again when they are read.
 
 use crate::scan_job::ScanJob;
 use map::pose2::Pose2;

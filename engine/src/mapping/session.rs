@@ -32,7 +32,8 @@ pub const QUEUE: usize = 64;
 /// Most scans of one mapping.
 pub const MAX_SCANS: u64 = 100_000;
 
-/// References to the progress that the thread itself holds. If there are no more, the session was dropped.
+/// References to the progress that the thread itself holds. If there are no more, the session was
+/// dropped.
 const OWN_HANDLES: usize = 2;
 
 /// What the thread shall do next.
@@ -141,8 +142,8 @@ impl Session {
         }
     }
 
-    /// Asks for the walls: those that are held, or those of all scans, after the scans that wait. `None` if the queue is full or
-    /// the thread has ended.
+    /// Asks for the walls: those that are held, or those of all scans, after the scans that wait.
+    /// `None` if the queue is full or the thread has ended.
     pub(super) fn finish(&mut self) -> Option<oneshot::Receiver<Result<Walls, String>>> {
         let (reply, walls) = oneshot::channel();
         if let Some(held) = self.held.take() {
@@ -257,7 +258,8 @@ impl Mapper {
         Ok(())
     }
 
-    /// Writes scans to this journal from now on. Without a journal the mapping continues, and its progress says why.
+    /// Writes scans to this journal from now on. Without a journal the mapping continues, and its
+    /// progress says why.
     fn write_to(&mut self, journal: Option<io::Result<Journal>>) {
         self.journal = journal.and_then(|opened| {
             let failed = |error: &io::Error| {

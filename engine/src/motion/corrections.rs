@@ -1,4 +1,5 @@
-//! What became of each fix of a robot: the latest in a bounded log, all of them in counters. In memory only.
+//! What became of each fix of a robot: the latest in a bounded log, all of them in counters. In
+//! memory only.
 
 use map::{fuse::FixOutcome, laser_fix::LaserRefusal, localise::FixSource, pose2::Pose2};
 use std::collections::{BTreeMap, VecDeque};
@@ -15,19 +16,21 @@ pub struct Correction {
     pub captured_ns: i64,
     /// The map it is a pose in.
     pub map: String,
-    /// `landmarks` (named without the pose), `guided` (landmarks named by the pose), `laser` or `relocalisation`; `by_hand` when
-    /// a person said where it is; `map_change` when the robot came from another map.
+    /// `landmarks` (named without the pose), `guided` (landmarks named by the pose), `laser` or
+    /// `relocalisation`; `by_hand` when a person said where it is; `map_change` when the robot came
+    /// from another map.
     pub modality: &'static str,
     /// Names of the landmarks it rests on; empty for the laser.
     pub landmarks: Vec<String>,
-    /// `started` (it gave the first pose), `applied`, `gated_out` (it contradicts the pose and was left out), `reset` (the
-    /// last of several that contradict the pose and agree with one another, or a person: it replaced the pose), `excluded_by_mode` (it
-    /// agrees, but reference runs have shown another modality to be better here, and the map's fusion mode leaves this one
-    /// out), `too_old`, `waiting` (newer than the last odometry), `carried_over` (the pose on another map, in the frame of
-    /// this one).
+    /// `started` (it gave the first pose), `applied`, `gated_out` (it contradicts the pose and was
+    /// left out), `reset` (the last of several that contradict the pose and agree with one another,
+    /// or a person: it replaced the pose), `excluded_by_mode` (it agrees, but reference runs have
+    /// shown another modality to be better here, and the map's fusion mode leaves this one out),
+    /// `too_old`, `waiting` (newer than the last odometry), `carried_over` (the pose on another
+    /// map, in the frame of this one).
     pub outcome: &'static str,
-    /// Squared Mahalanobis distance of the fix from the pose before it, 3 degrees of freedom; for `applied`,
-    /// `excluded_by_mode` and `gated_out`.
+    /// Squared Mahalanobis distance of the fix from the pose before it, 3 degrees of freedom; for
+    /// `applied`, `excluded_by_mode` and `gated_out`.
     pub chi2: Option<f64>,
     /// By how much it moved the pose, in the robot frame before the fix: forwards, m.
     pub along_m: Option<f64>,
@@ -48,13 +51,16 @@ pub(super) struct CorrectionLog {
 /// The log, for readers.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Corrections {
-    /// What the pose rests on now: `odometry`, `landmarks`, `guided`, `laser`, `relocalisation`, `by_hand`; empty without a pose.
+    /// What the pose rests on now: `odometry`, `landmarks`, `guided`, `laser`, `relocalisation`,
+    /// `by_hand`; empty without a pose.
     pub modalities: Vec<String>,
-    /// For each modality how many fixes had which outcome. For the laser also why scans gave no fix: `no_pose` (there is
-    /// none to correct), `no_walls` (the map has none), `few_points`, `poor_match` (it shows something else than the map),
-    /// `gate_prior` (it contradicts the pose), `ambiguous` (several poses fit), `superseded` (a newer one came first).
+    /// For each modality how many fixes had which outcome. For the laser also why scans gave no
+    /// fix: `no_pose` (there is none to correct), `no_walls` (the map has none), `few_points`,
+    /// `poor_match` (it shows something else than the map), `gate_prior` (it contradicts the pose),
+    /// `ambiguous` (several poses fit), `superseded` (a newer one came first).
     pub totals: BTreeMap<&'static str, BTreeMap<&'static str, u64>>,
-    /// The latest 200 of each modality, oldest first; without `repeated` ones, which tell nothing new.
+    /// The latest 200 of each modality, oldest first; without `repeated` ones, which tell nothing
+    /// new.
     pub corrections: Vec<Correction>,
 }
 

@@ -2,8 +2,9 @@
 //!
 //! The calls for each frame on the robot's own map, in this order: [`MotionTracker::frame_stamp`],
 //! [`MotionTracker::prior_pose`], recognition, [`MotionTracker::apply_frame`], and where they apply
-//! [`MotionTracker::start_from_hypothesis`] and [`MotionTracker::update_landmark_health`]. [`map::guided::Schedule`] decides in
-//! which role a fix goes to the fusion: landmarks that the prior pose named correct it and do nothing else.
+//! [`MotionTracker::start_from_hypothesis`] and [`MotionTracker::update_landmark_health`].
+//! [`map::guided::Schedule`] decides in which role a fix goes to the fusion: landmarks that the
+//! prior pose named correct it and do nothing else.
 
 use super::{MAX_POSE_AGE, MotionTracker, lock_robot, robot::RobotState, timebase::Stream};
 use crate::inputs::Input;
@@ -52,7 +53,8 @@ pub struct PriorPose {
 pub struct FrameFixes<'a> {
     /// The pose without the frame: that of [`PriorPose`].
     pub prior: Option<&'a Pose2Covariance>,
-    /// By landmarks that the picture alone names, without the server's prior to choose among several solutions.
+    /// By landmarks that the picture alone names, without the server's prior to choose among
+    /// several solutions.
     pub independent: Option<&'a FixResult>,
     /// By the same landmarks; the prior chooses among several solutions.
     pub chosen: Option<&'a Fix>,
@@ -73,7 +75,8 @@ impl<'a> FrameFixes<'a> {
                 FixResult::Fixed(fix) => Some((fix, FixRole::Independent)),
                 FixResult::Ambiguous(_) | FixResult::Refused(_) => None,
             },
-            // A solution that the pose chose agrees with the pose in any case: it may correct the pose, and is no support.
+            // A solution that the pose chose agrees with the pose in any case: it may correct the
+            // pose, and is no support.
             Decision::Keep => self
                 .chosen
                 .filter(|fix| guided_corrects && fix.decided_by == AmbiguityResolvedBy::Prior)
@@ -83,8 +86,9 @@ impl<'a> FrameFixes<'a> {
 }
 
 impl MotionTracker {
-    /// Checks the capture time of a frame on its robot's own map, and counts the result. The error is the time that the robot's
-    /// clock showed at receipt, ns: such a frame may be answered, and must not change the robot's pose.
+    /// Checks the capture time of a frame on its robot's own map, and counts the result. The error
+    /// is the time that the robot's clock showed at receipt, ns: such a frame may be answered, and
+    /// must not change the robot's pose.
     pub fn frame_stamp(
         &self,
         (robot, camera): (&Name, &Name),
@@ -108,8 +112,8 @@ impl MotionTracker {
         self.lock().stamps.count(checked).ok_or(instead_ns)
     }
 
-    /// The robot's pose at a frame without the frame. It chooses between two solutions, names look-alikes, and checks
-    /// landmarks against their places.
+    /// The robot's pose at a frame without the frame. It chooses between two solutions, names
+    /// look-alikes, and checks landmarks against their places.
     pub fn prior_pose(&self, robot: &Name, camera: &Name, at: FrameStamp<'_>) -> Option<PriorPose> {
         let state = self.robot_state(robot, at.map, at.epoch)?;
         let mut state = lock_robot(&state);
@@ -119,8 +123,8 @@ impl MotionTracker {
         Some(PriorPose { pose, supporting_landmarks: state.supporting_landmarks.clone(), plan })
     }
 
-    /// Passes the fixes of a frame to the fusion. Gives the pose to publish if there was a fix; without any odometry that is
-    /// the fix itself.
+    /// Passes the fixes of a frame to the fusion. Gives the pose to publish if there was a fix;
+    /// without any odometry that is the fix itself.
     pub fn apply_frame(
         &self,
         robot: &Name,
@@ -161,8 +165,8 @@ impl MotionTracker {
         self.announce(robot, at.map, at.epoch, stated)
     }
 
-    /// Starts the fusion of a relocalised robot from the last hypothesis, and gives its pose to publish. `None` if the robot
-    /// has a pose by now.
+    /// Starts the fusion of a relocalised robot from the last hypothesis, and gives its pose to
+    /// publish. `None` if the robot has a pose by now.
     pub fn start_from_hypothesis(
         &self,
         robot: &Name,
@@ -182,13 +186,15 @@ impl MotionTracker {
         self.announce(robot, at.map, at.epoch, stated)
     }
 
-    /// Whether a robot on this map says how it moves: its newest odometry is not older than [`MAX_POSE_AGE`].
+    /// Whether a robot on this map says how it moves: its newest odometry is not older than
+    /// [`MAX_POSE_AGE`].
     pub fn hears_odometry(&self, robot: &Name, map: &str, now: Instant) -> bool {
         self.moving(robot, map, now).is_some()
     }
 
-    /// Puts a robot where a person says it is, and gives its pose to publish. It is unsupported until a landmark agrees with
-    /// it. `None` if no odometry of the robot on this map is heard: nothing would carry the pose on.
+    /// Puts a robot where a person says it is, and gives its pose to publish. It is unsupported
+    /// until a landmark agrees with it. `None` if no odometry of the robot on this map is heard:
+    /// nothing would carry the pose on.
     pub fn set_pose_by_hand(
         &self,
         robot: &Name,
@@ -216,7 +222,8 @@ impl MotionTracker {
         is_heard.then_some((epoch, shared))
     }
 
-    /// Updates the health of landmarks by a frame's checks against this prior pose. Gives the changes to be stored.
+    /// Updates the health of landmarks by a frame's checks against this prior pose. Gives the
+    /// changes to be stored.
     pub fn update_landmark_health(
         &self,
         robot: &Name,

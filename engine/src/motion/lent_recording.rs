@@ -1,5 +1,5 @@
-//! A recording that is being learnt from. The recording stays where it is until what was learnt is stored: until then it can
-//! be learnt from again.
+//! A recording that is being learnt from. The recording stays where it is until what was learnt is
+//! stored: until then it can be learnt from again.
 
 use super::{
     MotionTracker, lock_robot,
@@ -18,7 +18,8 @@ pub struct LentRecording {
 }
 
 impl MotionTracker {
-    /// Lends the recording of a robot. Copies up to some 70 MB: not for an async thread. Errors: there is none, or it is lent.
+    /// Lends the recording of a robot. Copies up to some 70 MB: not for an async thread. Errors:
+    /// there is none, or it is lent.
     pub fn lend_recording(self: &Arc<Self>, robot: &Name) -> Result<LentRecording, RecordingError> {
         let state = self.lock().robots.get(robot).cloned().ok_or(RecordingError::None)?;
         let mut state = lock_robot(&state);
@@ -39,7 +40,8 @@ impl MotionTracker {
 }
 
 impl LentRecording {
-    /// What was learnt is stored: ends the recording, unless it was cancelled and another has started.
+    /// What was learnt is stored: ends the recording, unless it was cancelled and another has
+    /// started.
     pub fn finish(self) {
         let mut recording = self.motion.recording_robots.lock().unwrap_or_else(PoisonError::into_inner);
         let Some(state) = self.motion.lock().robots.get(&self.robot).cloned() else { return };

@@ -1,5 +1,5 @@
-//! The state of one robot: its clock, its fused pose and what that rests on, the health monitor of its landmarks. A new epoch
-//! resets the state; `epochs.rs` decides which epoch is live.
+//! The state of one robot: its clock, its fused pose and what that rests on, the health monitor of
+//! its landmarks. A new epoch resets the state; `epochs.rs` decides which epoch is live.
 
 mod given_pose;
 mod trust;
@@ -150,8 +150,8 @@ impl RobotState {
         }
     }
 
-    /// Checks the capture time of the next message of a stream, with the odometry in it. If the robot's clock was set, the
-    /// fusion goes on at the new time. Errors: the stamp is stray.
+    /// Checks the capture time of the next message of a stream, with the odometry in it. If the
+    /// robot's clock was set, the fusion goes on at the new time. Errors: the stamp is stray.
     pub(super) fn check_stamp(
         &mut self,
         stream: &Stream,
@@ -212,8 +212,8 @@ impl RobotState {
         self.clock.robot_ns(now)
     }
 
-    /// The fused pose by the newest odometry. That is the last message, even if a scan or frame is stamped a little later:
-    /// such a stamp may be wrong within the tolerance.
+    /// The fused pose by the newest odometry. That is the last message, even if a scan or frame is
+    /// stamped a little later: such a stamp may be wrong within the tolerance.
     pub(super) fn pose(&self) -> Option<FusedPose> {
         let fused = self.fuser.pose()?;
         if let Some((at_ns, odometry)) = &self.last_message {
@@ -240,7 +240,8 @@ impl RobotState {
         Some(maps.relation(&self.map, map)?.compose(&here))
     }
 
-    /// Starts the filter from a pose at the newest odometry, and logs it. False if the pose is out of range.
+    /// Starts the filter from a pose at the newest odometry, and logs it. False if the pose is out
+    /// of range.
     fn start_filter(
         &mut self,
         captured_ns: i64,
@@ -312,7 +313,8 @@ impl RobotState {
         }
     }
 
-    /// Applies a fix, logs it, and gives the pose after it; without any odometry that is the fix itself.
+    /// Applies a fix, logs it, and gives the pose after it; without any odometry that is the fix
+    /// itself.
     pub(super) fn apply_fix(
         &mut self,
         captured_ns: i64,

@@ -1,5 +1,6 @@
-//! A recording: the odometry and the fixes of one robot during a drive, in memory, until somebody gives its reference
-//! trajectory, cancels it, or the server stops. In: what the robot's fusion gets. Out: the same, in order of capture.
+//! A recording: the odometry and the fixes of one robot during a drive, in memory, until somebody
+//! gives its reference trajectory, cancels it, or the server stops. In: what the robot's fusion
+//! gets. Out: the same, in order of capture.
 
 use map::{
     localise::{Fix, FixSource},
@@ -28,14 +29,15 @@ pub struct RecordingStatus {
     pub map: String,
     /// Name of the robot.
     pub robot: String,
-    /// False once it is full, a new epoch began, the robot went to another map, its odometry jumped, or its clock was set.
-    /// What was recorded until then can be learnt from.
+    /// False once it is full, a new epoch began, the robot went to another map, its odometry
+    /// jumped, or its clock was set. What was recorded until then can be learnt from.
     pub active: bool,
     /// Why it is not active any more.
     pub reason: Option<String>,
     /// Distance driven by odometry, m.
     pub distance_m: f64,
-    /// Time of the first and the last reading of odometry, ns of the robot's clock; absent before the first.
+    /// Time of the first and the last reading of odometry, ns of the robot's clock; absent before
+    /// the first.
     pub span_ns: Option<[i64; 2]>,
     /// Odometry readings in it.
     pub odometry: usize,

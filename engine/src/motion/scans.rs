@@ -1,5 +1,6 @@
-//! Laser scans that wait to be matched with the walls: one a robot, the newest wins, robots take turns. In: checked scans
-//! from the transport's threads, which never wait. Out: work for the laser thread.
+//! Laser scans that wait to be matched with the walls: one a robot, the newest wins, robots take
+//! turns. In: checked scans from the transport's threads, which never wait. Out: work for the laser
+//! thread.
 
 use crate::scan_job::ScanJob;
 use protos::Name;

@@ -351,7 +351,8 @@ fn an_epoch_that_is_over_changes_nothing() {
     assert!((motion.pose(&r1, "hall", time(2.0)).unwrap().pose.x_m - 20.0).abs() < 1e-9);
 }
 
-/// One message of another epoch must not reset the fusion, nor get the robot's own messages refused.
+/// One message of another epoch must not reset the fusion, nor get the robot's own messages
+/// refused.
 #[test]
 fn a_forged_message_leaves_the_robot_alone() {
     let (motion, r1) = motion();

@@ -1,13 +1,16 @@
-//! Checks the time stamps of a robot's messages. In: capture times by the robot's clock, with the times of receipt. Out:
-//! accepted, refused, or the robot's clock was set. Knows no messages; time is passed in.
+//! Checks the time stamps of a robot's messages. In: capture times by the robot's clock, with the
+//! times of receipt. Out: accepted, refused, or the robot's clock was set. Knows no messages; time
+//! is passed in.
 //!
-//! The *lead* of a message is its capture time less its time of receipt, each by its own clock. Delay only lowers the lead,
-//! so the largest leads of recent messages are the offset between the clocks. A message that leads by more is stamped
-//! wrongly. Clocks are compared within one robot and one epoch only; their offset to the server's clock does not matter.
+//! The *lead* of a message is its capture time less its time of receipt, each by its own clock.
+//! Delay only lowers the lead, so the largest leads of recent messages are the offset between the
+//! clocks. A message that leads by more is stamped wrongly. Clocks are compared within one robot
+//! and one epoch only; their offset to the server's clock does not matter.
 //!
-//! A simulation's clock runs at another rate than the server's. The rate is learnt from the messages (`clock_rate.rs`), and
-//! receipt counts in seconds of the robot's clock. What leads is the stream of the highest rank: a message of it that comes
-//! late and goes on from the one before it is accepted, since a simulation stood still, or a link did.
+//! A simulation's clock runs at another rate than the server's. The rate is learnt from the
+//! messages (`clock_rate.rs`), and receipt counts in seconds of the robot's clock. What leads is
+//! the stream of the highest rank: a message of it that comes late and goes on from the one before
+//! it is accepted, since a simulation stood still, or a link did.
 
 mod clock_rate;
 
@@ -18,14 +21,14 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// A message whose lead exceeds the reference by more is refused. Covers a reference by delayed messages, jitter of timers
-/// and drift of clocks.
+/// A message whose lead exceeds the reference by more is refused. Covers a reference by delayed
+/// messages, jitter of timers and drift of clocks.
 pub const AHEAD_TOLERANCE: Duration = Duration::from_millis(200);
 /// A message further behind the reference is refused: the fusion cannot replay it
 /// (`map::fuse::FuseParams::window_s`).
 pub const BEHIND_TOLERANCE: Duration = Duration::from_secs(2);
-/// A clock is young for this long after its first message, and until [`YOUNG_COUNT`] messages over [`YOUNG_SPAN`] were
-/// accepted. Nobody knows its rate yet, and it may run as fast as [`MAX_RATE`].
+/// A clock is young for this long after its first message, and until [`YOUNG_COUNT`] messages over
+/// [`YOUNG_SPAN`] were accepted. Nobody knows its rate yet, and it may run as fast as [`MAX_RATE`].
 const YOUNG_FOR: Duration = Duration::from_secs(3);
 const YOUNG_COUNT: usize = 8;
 const YOUNG_SPAN: Duration = Duration::from_millis(600);
@@ -33,9 +36,11 @@ const YOUNG_SPAN: Duration = Duration::from_millis(600);
 pub const CLOCK_SET_COUNT: u32 = 5;
 /// ...over at least this time...
 pub const CLOCK_SET_AFTER: Duration = Duration::from_secs(1);
-/// ...whose leads differ by no more than this, or that lie on a line of another rate, mean that the robot's clock was set.
+/// ...whose leads differ by no more than this, or that lie on a line of another rate, mean that the
+/// robot's clock was set.
 pub const CLOCK_SET_SPREAD: Duration = Duration::from_millis(500);
-/// The stream of the highest rank leads. A stream that is silent for this long does not lead any more.
+/// The stream of the highest rank leads. A stream that is silent for this long does not lead any
+/// more.
 pub const LEADER_SILENT: Duration = Duration::from_secs(10);
 /// Leads that the reference is computed from: the latest...
 pub const MAX_LEADS: usize = 64;
@@ -43,13 +48,14 @@ pub const MAX_LEADS: usize = 64;
 const LEAD_AGE_NS: i64 = 30_000_000_000;
 /// Streams of one robot; a further one replaces the one with the oldest message.
 pub const MAX_STREAMS: usize = 16;
-/// Two kept leads are at least this far apart, so that a fast simulation is seen over a second, too.
+/// Two kept leads are at least this far apart, so that a fast simulation is seen over a second,
+/// too.
 const LEAD_SPACING_NS: i64 = 15_000_000;
 /// The reference is the third largest lead, so that two stray stamps do not move it.
 const STRAYS: usize = 3;
 
-/// The source of a message. A later variant says more about the robot's clock: odometry carries the pose, and a camera with
-/// a clock of its own must not replace odometry's times.
+/// The source of a message. A later variant says more about the robot's clock: odometry carries the
+/// pose, and a camera with a clock of its own must not replace odometry's times.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Stream {
     /// Frames of a camera, without odometry.
@@ -62,8 +68,8 @@ pub(crate) enum Stream {
 }
 
 impl Stream {
-    /// How far a stamp may lie before that of the previous message: two lasers or threads of one robot need not send in order.
-    /// Odometry has one source.
+    /// How far a stamp may lie before that of the previous message: two lasers or threads of one
+    /// robot need not send in order. Odometry has one source.
     fn disorder(&self) -> Duration {
         if *self == Self::Odometry { Duration::ZERO } else { AHEAD_TOLERANCE }
     }
@@ -84,7 +90,8 @@ impl Stream {
 pub(crate) enum Stamp {
     /// It is in order.
     Good,
-    /// It is in order. The stamp of the previous message in its stream, which this carries (ns), was ahead.
+    /// It is in order. The stamp of the previous message in its stream, which this carries (ns),
+    /// was ahead.
     GoodAfterStray(i64),
     /// The robot's clock was set: this stamp is the new reference.
     ClockSet,
@@ -138,7 +145,8 @@ impl Default for TimeBase {
 }
 
 impl TimeBase {
-    /// Checks the capture time of the next message of its stream. Errors: the stamp is ahead of or behind the reference.
+    /// Checks the capture time of the next message of its stream. Errors: the stamp is ahead of or
+    /// behind the reference.
     pub(crate) fn check(
         &mut self,
         stream: &Stream,
@@ -164,7 +172,8 @@ impl TimeBase {
         let disorder_ns = nanos(stream.disorder());
         let stray = last.filter(|before| captured_ns < before.captured_ns.saturating_sub(disorder_ns));
         let refused = refused.or_else(|| {
-            // A later message with an earlier stamp: the stamp that is further off the reference is wrong.
+            // A later message with an earlier stamp: the stamp that is further off the reference is
+            // wrong.
             let before_ahead_ns = stray?.lead_ns(self.rate).saturating_sub(reference_ns);
             (before_ahead_ns <= ahead_ns.saturating_neg()).then_some(Code::ClockBehind)
         });
@@ -227,8 +236,8 @@ impl TimeBase {
         (nanos(AHEAD_TOLERANCE) as f64 * self.rate.max(1.0)) as i64
     }
 
-    /// Whether a clock whose rate is not certain may have come to this time since the last accepted message: a young one,
-    /// or that of a simulation, whose rate changes with its load.
+    /// Whether a clock whose rate is not certain may have come to this time since the last accepted
+    /// message: a young one, or that of a simulation, whose rate changes with its load.
     fn may_be_faster(&self, pair: TimePair) -> bool {
         let span_ns = self.leads.front().map_or(0, |first| pair.received_ns - first.received_ns);
         let is_known = self.leads.len() >= YOUNG_COUNT && span_ns >= nanos(YOUNG_SPAN);
@@ -242,7 +251,8 @@ impl TimeBase {
         (is_young || self.is_simulated) && self.newest.is_some_and(is_within)
     }
 
-    /// Whether a message behind the reference goes on from what leads: from its own stream, or from the one that leads.
+    /// Whether a message behind the reference goes on from what leads: from its own stream, or from
+    /// the one that leads.
     fn goes_on(&self, stream: &Stream, last: Option<TimePair>, pair: TimePair) -> bool {
         if self.is_leading(stream, pair.received_ns) {
             return last.is_some_and(|before| before.captured_ns <= pair.captured_ns);
@@ -311,7 +321,8 @@ impl TimeBase {
         (self.rate, self.fastest) = (rate, self.fastest.max(rate));
     }
 
-    /// The lead of a message without delay: the third largest lead, or with few messages the upper median.
+    /// The lead of a message without delay: the third largest lead, or with few messages the upper
+    /// median.
     fn reference_ns(&self) -> Option<i64> {
         let mut leads: Vec<i64> = self.leads.iter().map(|pair| pair.lead_ns(self.rate)).collect();
         leads.sort_unstable_by(|a, b| b.cmp(a));
@@ -319,8 +330,8 @@ impl TimeBase {
         leads.get(place.checked_sub(1)?).copied()
     }
 
-    /// The rate of the robot's clock, if this message completes a row that shows that it was set, stood still, or runs at
-    /// another rate.
+    /// The rate of the robot's clock, if this message completes a row that shows that it was set,
+    /// stood still, or runs at another rate.
     fn clock_of_row(&mut self, stream: &Stream, pair: TimePair) -> Option<f64> {
         if !self.is_leading(stream, pair.received_ns) {
             return None;

@@ -1,6 +1,7 @@
-//! Which answers are worth storing, and what they rest on: the icons of their quads, matched points, the prior pose. In: the
-//! answers of the workers. Out: some of them, queued for whoever stores them: of each camera the first of every kind and one in
-//! [`LONGEST`], at most one in [`SHORTEST`].
+//! Which answers are worth storing, and what they rest on: the icons of their quads, matched
+//! points, the prior pose. In: the answers of the workers. Out: some of them, queued for whoever
+//! stores them: of each camera the first of every kind and one in [`LONGEST`], at most one in
+//! [`SHORTEST`].
 
 use super::{
     kept_frames::{KeptFrame, KeptFrames},
@@ -107,8 +108,9 @@ pub fn answer_records(kept: Arc<KeptFrames>) -> (AnswerRecorder, Receiver<Answer
     (AnswerRecorder { records, last: Mutex::default(), kept }, receiver)
 }
 
-/// Why a frame gave no pose of the robot: the code of a rejection, the refusal of the pose, or where no landmark was named the
-/// gate that refused the nearest candidate. `None` where there is a pose, or nothing to refuse.
+/// Why a frame gave no pose of the robot: the code of a rejection, the refusal of the pose, or
+/// where no landmark was named the gate that refused the nearest candidate. `None` where there is a
+/// pose, or nothing to refuse.
 pub fn refusal_of(answer: &v1::Answer) -> Option<&str> {
     if let Some(rejection) = &answer.rejection {
         return Some(&rejection.code);

@@ -1,5 +1,6 @@
-//! Robots' cameras by their frames. In: frames with the landmarks recognised in them. Out: intrinsics as sent, the state of
-//! an intrinsics monitor, and views of landmarks from different sides, for a new calibration.
+//! Robots' cameras by their frames. In: frames with the landmarks recognised in them. Out:
+//! intrinsics as sent, the state of an intrinsics monitor, and views of landmarks from different
+//! sides, for a new calibration.
 //!
 //! Bounded; nothing is stored on disk.
 
@@ -37,7 +38,8 @@ pub const MAX_CAMERAS: usize = 4_096;
 pub const MAX_VIEWS: usize = 64;
 /// Views of one landmark by one camera.
 pub const MAX_VIEWS_OF_LANDMARK: usize = 12;
-/// A view is new when the landmark's normal (camera frame) differs from that of every stored view by more than this.
+/// A view is new when the landmark's normal (camera frame) differs from that of every stored view
+/// by more than this.
 const MIN_NEW_ANGLE_RAD: f64 = 0.09;
 
 /// A view of a landmark of known size, for calibration. `normal` is in the camera frame.
@@ -138,7 +140,8 @@ impl CameraRegistry {
         if record.image_px != sample.image_px {
             *record = new();
         } else if record.intrinsics != *sample.intrinsics {
-            // Another calibration of the same camera: its views still hold, the monitor's statistics do not.
+            // Another calibration of the same camera: its views still hold, the monitor's
+            // statistics do not.
             let views = std::mem::take(&mut record.views);
             *record = CameraRecord { views, ..new() };
         }
@@ -198,7 +201,8 @@ impl CameraRecord {
     }
 }
 
-/// The view with the lens distortion put back: a calibration must not rest on the intrinsics that it replaces.
+/// The view with the lens distortion put back: a calibration must not rest on the intrinsics that
+/// it replaces.
 fn distorted_view(pose: &LandmarkPose, k: &Intrinsics) -> PlanarView {
     let m = &pose.measured;
     let distorted =

@@ -1,5 +1,5 @@
-//! Findings about landmarks (moved, missing, in place again) on their way to whoever stores the map. The store commits a
-//! finding; every frame after that sees the new version of the map.
+//! Findings about landmarks (moved, missing, in place again) on their way to whoever stores the
+//! map. The store commits a finding; every frame after that sees the new version of the map.
 
 use crate::{frame::workers::FrameObserver, snapshot::MapSnapshot};
 use map::landmark_health::{Finding, HealthChange, LandmarkHealth};

@@ -18,14 +18,14 @@ pub struct GatheredFrame {
     pub quads: Vec<QuadAnalysis>,
     /// The version of the map they were recognised against.
     pub map: Arc<MapSnapshot>,
-    /// The robot's pose at the frame, as the robot states it, or the fused pose without this frame (map frame, m and
-    /// rad).
+    /// The robot's pose at the frame, as the robot states it, or the fused pose without this frame
+    /// (map frame, m and rad).
     pub map_from_robot: Option<Pose2Covariance>,
 }
 
 impl GatheredFrame {
-    /// The frame, with a capture time that can be used. `None` of one that is not to be gathered. Of quads, no
-    /// photograph is there to learn from.
+    /// The frame, with a capture time that can be used. `None` of one that is not to be gathered.
+    /// Of quads, no photograph is there to learn from.
     pub fn of(answered: &AnsweredFrame<'_>) -> Option<(CheckedFrame, Self)> {
         let (frame, found) = (answered.frame, answered.analysed?);
         let captured_ns = match found.effect {

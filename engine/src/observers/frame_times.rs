@@ -1,5 +1,5 @@
-//! How long frames took. In: each answer, when it is about to be published. Out: histograms of the time from receipt to answer
-//! by status, and of the stages.
+//! How long frames took. In: each answer, when it is about to be published. Out: histograms of the
+//! time from receipt to answer by status, and of the stages.
 
 use crate::{
     frame::workers::{AnsweredFrame, FrameObserver},

@@ -1,5 +1,6 @@
-//! The last frames of robots whose answers were stored, in memory: with them a draft of a map is tried before it is published.
-//! In: frames of the workers. Out: the newest of a map. Bounded by their bytes; the oldest go. A restart forgets them.
+//! The last frames of robots whose answers were stored, in memory: with them a draft of a map is
+//! tried before it is published. In: frames of the workers. Out: the newest of a map. Bounded by
+//! their bytes; the oldest go. A restart forgets them.
 
 use crate::frame::slots::SlotKey;
 use protos::{CheckedFrame, convert::Pixels};
@@ -70,7 +71,8 @@ impl KeptFrames {
         }
     }
 
-    /// At most `max` frames of a map, newest first; of each camera in turn, so that a fast one does not hide the others.
+    /// At most `max` frames of a map, newest first; of each camera in turn, so that a fast one does
+    /// not hide the others.
     pub fn newest(&self, map: &str, max: usize) -> Vec<Arc<KeptFrame>> {
         let of_map: Vec<Arc<KeptFrame>> = {
             let kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);

@@ -1,6 +1,7 @@
-//! What pages show: the last frame and answer of each camera, the trajectories of each robot, and a stream of events. In:
-//! frames, answers and poses of the bus and the workers. Out: copies for readers, who never hold up a worker: a slow reader
-//! misses events. Nothing is stored on disk, and every collection is bounded.
+//! What pages show: the last frame and answer of each camera, the trajectories of each robot, and a
+//! stream of events. In: frames, answers and poses of the bus and the workers. Out: copies for
+//! readers, who never hold up a worker: a slow reader misses events. Nothing is stored on disk, and
+//! every collection is bounded.
 
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 use map::pose2::{Pose2, Pose2Covariance};
@@ -59,8 +60,8 @@ pub struct LiveFrame {
 }
 
 impl LiveFrame {
-    /// The image in a form that browsers show: its media type and bytes. Raw pixels become PNG, and so do patches, each at its
-    /// place in the image.
+    /// The image in a form that browsers show: its media type and bytes. Raw pixels become PNG, and
+    /// so do patches, each at its place in the image.
     pub fn for_browsers(&self) -> Result<(&'static str, Bytes), image::ImageError> {
         let EncodedImage { encoding, bytes } = match &self.pixels {
             Pixels::Image(image) => image,

@@ -1,5 +1,6 @@
-//! The pose that a picture gives against the pose that was known without it. In: the evaluation of a frame and the robot's own
-//! prior. Out: both poses, how far apart they are, and whether that was a reason to refuse: for stored answers.
+//! The pose that a picture gives against the pose that was known without it. In: the evaluation of
+//! a frame and the robot's own prior. Out: both poses, how far apart they are, and whether that was
+//! a reason to refuse: for stored answers.
 
 use crate::frame::landmark_checks::FrameEvaluation;
 use map::{
@@ -12,8 +13,8 @@ use map::{
 pub enum PriorSource {
     /// The robot sent it with its frame: a pose beyond the limit is refused.
     Robot,
-    /// The server had it of earlier frames and odometry: it only chooses between two solutions of the picture, so that a wrong one
-    /// does not keep out what corrects it.
+    /// The server had it of earlier frames and odometry: it only chooses between two solutions of
+    /// the picture, so that a wrong one does not keep out what corrects it.
     Server,
 }
 
@@ -24,7 +25,8 @@ pub struct PriorCheck {
     pub source: PriorSource,
     /// `map_from_robot` without the picture.
     pub prior: Pose2Covariance,
-    /// `map_from_robot` by the landmarks of the picture: of several solutions the nearest to the prior, also where it is refused.
+    /// `map_from_robot` by the landmarks of the picture: of several solutions the nearest to the
+    /// prior, also where it is refused.
     pub seen: Option<Pose2Covariance>,
     /// Squared Mahalanobis distance of the two, under the sum of their covariances.
     pub distance2: Option<f64>,
@@ -34,7 +36,8 @@ pub struct PriorCheck {
     pub is_refused: bool,
 }
 
-/// The check of a frame; `None` where no pose was known before it. `limit` is that of the robot's prior.
+/// The check of a frame; `None` where no pose was known before it. `limit` is that of the robot's
+/// prior.
 pub fn prior_check(
     evaluation: &FrameEvaluation,
     of_robot: Option<&Pose2Covariance>,

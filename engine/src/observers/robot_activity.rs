@@ -1,6 +1,6 @@
-//! What each robot does. In: answers of its frames, its other messages, and what was refused of all, each with its time. Out:
-//! counts since the start of the server, the reasons of refusals, and how long ago the last of each was. Knows no clock and
-//! no transport.
+//! What each robot does. In: answers of its frames, its other messages, and what was refused of
+//! all, each with its time. Out: counts since the start of the server, the reasons of refusals, and
+//! how long ago the last of each was. Knows no clock and no transport.
 
 mod inputs;
 
@@ -33,7 +33,8 @@ pub struct RobotActivity {
     pub last_recognised: Option<Duration>,
     /// Time since the last frame that gave a fix.
     pub last_fix: Option<Duration>,
-    /// Answered frames in a second, over the last [`RATE_SECONDS`] whole seconds, or all since its first message.
+    /// Answered frames in a second, over the last [`RATE_SECONDS`] whole seconds, or all since its
+    /// first message.
     pub frames_per_s: f64,
 }
 
@@ -108,7 +109,8 @@ impl Record {
     }
 }
 
-/// The activity of all robots, at most [`MAX_ROBOTS`]; a further one replaces the one that has been silent the longest.
+/// The activity of all robots, at most [`MAX_ROBOTS`]; a further one replaces the one that has been
+/// silent the longest.
 #[derive(Debug, Default)]
 pub struct RobotActivities(BTreeMap<Name, Record>);
 
@@ -135,7 +137,8 @@ impl RobotActivities {
         }
     }
 
-    /// An input was refused. How many were for this reason since the log was told of it, where it is to be told again.
+    /// An input was refused. How many were for this reason since the log was told of it, where it
+    /// is to be told again.
     pub fn refused(&mut self, robot: &Name, input: Input, refused: Refused<'_>, now: Instant) -> Option<u64> {
         self.record(robot, input, now).inputs.refused(input, refused, now)
     }

@@ -1,5 +1,6 @@
-//! Names under which robots send messages without being registered. In: refused messages, with their time. Out: the list of
-//! names for a person who may register them, and which ones are new, for the log. Knows no clock and no transport.
+//! Names under which robots send messages without being registered. In: refused messages, with
+//! their time. Out: the list of names for a person who may register them, and which ones are new,
+//! for the log. Knows no clock and no transport.
 
 use protos::Name;
 use std::{
@@ -46,7 +47,8 @@ pub struct UnknownRobots {
 }
 
 impl UnknownRobots {
-    /// Notes a message that was refused because its robot is not registered; true if its name is to be logged.
+    /// Notes a message that was refused because its robot is not registered; true if its name is to
+    /// be logged.
     pub fn refused(&mut self, robot: &Name, camera: Option<&Name>, now: Instant) -> bool {
         if let Some(record) = self.records.get_mut(robot) {
             record.messages += 1;

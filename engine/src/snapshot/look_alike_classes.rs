@@ -1,7 +1,7 @@
-//! Look-alike classes. Thresholds fitted with negatives refuse a quad that fits several landmarks. Here thresholds are fitted
-//! again without negatives, so that a quad may match every landmark of its class. In: all learnt models.
-//! Out: models with lifted thresholds and the class of each. For relocalisation and for guided recognition; matching by
-//! these models is never a recognition.
+//! Look-alike classes. Thresholds fitted with negatives refuse a quad that fits several landmarks.
+//! Here thresholds are fitted again without negatives, so that a quad may match every landmark of
+//! its class. In: all learnt models. Out: models with lifted thresholds and the class of each. For
+//! relocalisation and for guided recognition; matching by these models is never a recognition.
 
 use super::stored_model::StoredModel;
 use std::{collections::BTreeMap, sync::Arc};
@@ -52,8 +52,8 @@ pub fn look_alike_classes(
     LookAlikeClasses { models: ModelSet::new(lifted, p).unwrap_or_default(), classes, by_icons }
 }
 
-/// The connected components of "one accepts the other": nothing that looks like a member is left out, though the ends of a
-/// long chain may differ.
+/// The connected components of "one accepts the other": nothing that looks like a member is left
+/// out, though the ends of a long chain may differ.
 fn connected(models: &[Arc<LandmarkModel>], p: &Params) -> BTreeMap<LandmarkId, Arc<Vec<LandmarkId>>> {
     let icons: Vec<Vec<IconFeatures>> = models.iter().map(|m| m.features(&p.recognise)).collect();
     let accepts = |a: usize, b: usize| unlikeness_of(&models[a], &icons[b], p) < models[a].likeness.tau;

@@ -39,7 +39,8 @@ pub struct MapSnapshot {
     pub look_alikes: Arc<LookAlikeClasses>,
     /// Every learnt model that can be read and fits the parameters, inactive ones included.
     pub learnt: BTreeMap<LandmarkId, StoredModel>,
-    /// Models that are stored but must not be used, and why: damaged, or learnt under other parameters.
+    /// Models that are stored but must not be used, and why: damaged, or learnt under other
+    /// parameters.
     pub unusable_models: BTreeMap<LandmarkId, String>,
     /// The walls: laser segments (map frame, m), free side on the left.
     pub walls: Arc<Vec<LaserSegment>>,
@@ -143,8 +144,8 @@ pub struct LandmarkInfo {
     pub place: Option<LandmarkPlace>,
     /// How far its place is trusted: a quarantined landmark corrects no pose.
     pub health: LandmarkHealth,
-    /// Revision of the stored row and time of its last edit, ms since the Unix epoch: an equal pair and an equal health mean
-    /// an equal row.
+    /// Revision of the stored row and time of its last edit, ms since the Unix epoch: an equal pair
+    /// and an equal health mean an equal row.
     pub stored: (i64, i64),
 }
 

@@ -1,4 +1,5 @@
-//! Versions of maps as the workers read them. Everybody imports this module; it imports none of the engine's others.
+//! Versions of maps as the workers read them. Everybody imports this module; it imports none of the
+//! engine's others.
 
 pub mod look_alike_classes;
 pub mod map_snapshot;

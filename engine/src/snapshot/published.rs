@@ -1,5 +1,5 @@
-//! The current version of every map, swapped whole. Only the publication publishes, and only after a transaction is
-//! committed; a reader keeps the `Arc` it took, so an answer rests on one version.
+//! The current version of every map, swapped whole. Only the publication publishes, and only after
+//! a transaction is committed; a reader keeps the `Arc` it took, so an answer rests on one version.
 
 use super::map_snapshot::MapSnapshot;
 use arc_swap::ArcSwap;
@@ -98,8 +98,9 @@ impl Snapshots {
         self.announce(change);
     }
 
-    /// Replaces `from` by `map`, the same version with more derived data; nothing if `from` is not current any more. A map
-    /// that was deleted and made again may have the same name and version: the version alone does not tell.
+    /// Replaces `from` by `map`, the same version with more derived data; nothing if `from` is not
+    /// current any more. A map that was deleted and made again may have the same name and version:
+    /// the version alone does not tell.
     pub fn publish_derived(&self, from: &Arc<MapSnapshot>, map: &Arc<MapSnapshot>) {
         self.world.rcu(|world| {
             let mut world = World::clone(world);
@@ -124,7 +125,8 @@ impl Snapshots {
         self.announce(MapChange { map: map.to_owned(), version: None, is_draft });
     }
 
-    /// Registers a robot on a map, or takes it off with `None`. For the publication, after the commit.
+    /// Registers a robot on a map, or takes it off with `None`. For the publication, after the
+    /// commit.
     pub fn set_robot(&self, robot: &str, map: Option<&str>) {
         self.world.rcu(|world| {
             let mut world = World::clone(world);

@@ -1,6 +1,7 @@
-//! Whether the parts of a server still get their work done, beside whether they run ([`crate::vitals::Pulse`]). A part that
-//! works for others beats at each piece of work, and rests between them; a part that is probed beats whenever a probe went
-//! through. In: beats, and ticks of a clock. Out: for how long each part has been still.
+//! Whether the parts of a server still get their work done, beside whether they run
+//! ([`crate::vitals::Pulse`]). A part that works for others beats at each piece of work, and rests
+//! between them; a part that is probed beats whenever a probe went through. In: beats, and ticks of
+//! a clock. Out: for how long each part has been still.
 
 use std::{
     sync::{

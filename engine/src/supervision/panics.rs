@@ -1,5 +1,6 @@
-//! Caught panics, counted by the edge that caught them. An edge is where work of one kind begins: a frame, a write, a
-//! message, a request. A panic ends that piece of work; the process and all other work go on.
+//! Caught panics, counted by the edge that caught them. An edge is where work of one kind begins: a
+//! frame, a write, a message, a request. A panic ends that piece of work; the process and all other
+//! work go on.
 
 use super::threads::{Lost, panic_text};
 use std::{
@@ -87,7 +88,8 @@ impl Panics {
         follows: &str,
         work: impl FnOnce() -> T,
     ) -> Option<T> {
-        // Unwind safety: shared state behind an edge is changed in single steps under a lock, or replaced as a whole.
+        // Unwind safety: shared state behind an edge is changed in single steps under a lock, or
+        // replaced as a whole.
         catch_unwind(AssertUnwindSafe(work))
             .inspect_err(|cause| self.caught(edge, cause.as_ref(), what, follows))
             .ok()

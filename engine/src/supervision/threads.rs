@@ -1,15 +1,16 @@
-//! Threads by what they work for. In: a class and work. Out: a thread whose priority is that of its class, so that the
-//! processor goes to robots first.
+//! Threads by what they work for. In: a class and work. Out: a thread whose priority is that of its
+//! class, so that the processor goes to robots first.
 //!
 //! 1. [`Class::Answers`]: frames, scans and what is sent to robots.
 //! 2. [`Class::Requests`]: what a person or a robot asked for without a deadline.
 //! 3. [`Class::Background`]: lessons, mapping, gathering and what is derived from maps.
 //!
-//! On Linux the niceness of a thread is its own (`man 2 setpriority`, "C library/kernel differences"), and a thread may
-//! always lower its priority. It cannot raise it again, so such work never runs on threads that others take over, like those
-//! of the runtime. A thread inherits the niceness of the one that starts it: [`wait_for`] gives asynchronous work back to the
-//! runtime, so that no thread of a pool is begun by a thread of low priority. Elsewhere than on Linux all classes have one
-//! priority.
+//! On Linux the niceness of a thread is its own (`man 2 setpriority`, "C library/kernel
+//! differences"), and a thread may always lower its priority. It cannot raise it again, so such
+//! work never runs on threads that others take over, like those of the runtime. A thread inherits
+//! the niceness of the one that starts it: [`wait_for`] gives asynchronous work back to the
+//! runtime, so that no thread of a pool is begun by a thread of low priority. Elsewhere than on
+//! Linux all classes have one priority.
 
 use std::{
     any::Any,
@@ -39,8 +40,9 @@ pub enum Class {
 }
 
 impl Class {
-    /// What is added to the niceness of the process. A step of 5 is a third of the processor time where both have work; 10
-    /// leaves background work a tenth, so that it comes to an end beside other programs, too.
+    /// What is added to the niceness of the process. A step of 5 is a third of the processor time
+    /// where both have work; 10 leaves background work a tenth, so that it comes to an end beside
+    /// other programs, too.
     pub const fn niceness(self) -> i32 {
         match self {
             Self::Answers => 0,
@@ -96,8 +98,8 @@ pub fn spawn<T: Send + 'static>(
     })
 }
 
-/// Runs work on a thread of its own, and waits for it without holding up the runtime. The work goes on where nobody waits any
-/// more.
+/// Runs work on a thread of its own, and waits for it without holding up the runtime. The work goes
+/// on where nobody waits any more.
 pub async fn run<T: Send + 'static>(
     class: Class,
     work: impl FnOnce() -> T + Send + 'static,
@@ -116,8 +118,8 @@ pub async fn run<T: Send + 'static>(
     }
 }
 
-/// Waits on a thread of [`run`] for asynchronous work, which is done by the runtime's own threads. `None`: it panicked, or the
-/// runtime has ended.
+/// Waits on a thread of [`run`] for asynchronous work, which is done by the runtime's own threads.
+/// `None`: it panicked, or the runtime has ended.
 pub fn wait_for<T: Send + 'static>(
     runtime: &Handle,
     work: impl Future<Output = T> + Send + 'static,
@@ -144,7 +146,8 @@ fn lower(class: Class) {
     }
 }
 
-/// Milliseconds from the start of the process to the last frame that was answered, plus 1; 0 before the first.
+/// Milliseconds from the start of the process to the last frame that was answered, plus 1; 0 before
+/// the first.
 static LAST_FRAME_MS: AtomicU64 = AtomicU64::new(0);
 static STARTED: LazyLock<Instant> = LazyLock::new(Instant::now);
 
@@ -154,8 +157,8 @@ pub(crate) fn note_frame(now: Instant) {
     LAST_FRAME_MS.fetch_max(ms + 1, Ordering::Relaxed);
 }
 
-/// Whether a frame was answered within [`SERVING`]. While that is so, lessons leave half of the threads that they may have to
-/// robots.
+/// Whether a frame was answered within [`SERVING`]. While that is so, lessons leave half of the
+/// threads that they may have to robots.
 pub fn robots_are_served(now: Instant) -> bool {
     let ms = now.saturating_duration_since(*STARTED).as_millis() as u64;
     match LAST_FRAME_MS.load(Ordering::Relaxed) {

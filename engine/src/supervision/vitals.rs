@@ -1,6 +1,7 @@
-//! Which permanent parts of the server run: the writer, the workers, the outbox and the tasks beside them. Each holds a
-//! [`Pulse`] while it runs. A part that ends before the server is told to stop has failed. Then the server is not ready any
-//! more, and [`Vitals::failed`] gives the reason to whoever ends the process.
+//! Which permanent parts of the server run: the writer, the workers, the outbox and the tasks
+//! beside them. Each holds a [`Pulse`] while it runs. A part that ends before the server is told to
+//! stop has failed. Then the server is not ready any more, and [`Vitals::failed`] gives the reason
+//! to whoever ends the process.
 
 use super::{
     heartbeats::{Heartbeat, Heartbeats, STALLED},
@@ -78,7 +79,8 @@ impl Vitals {
         Pulse { vitals: self.clone(), part: part.into(), is_told: false }
     }
 
-    /// Registers a part that says by itself whether it runs. [`Vitals::failure`] and [`Vitals::watch`] probe it.
+    /// Registers a part that says by itself whether it runs. [`Vitals::failure`] and
+    /// [`Vitals::watch`] probe it.
     pub fn probe(&self, part: &'static str, runs: impl Fn() -> bool + Send + Sync + 'static) {
         self.probes.lock().unwrap_or_else(PoisonError::into_inner).push((part, Box::new(runs)));
     }
@@ -124,7 +126,8 @@ impl Vitals {
         }
     }
 
-    /// Probes the parts that have a probe, and looks for parts that are still, until one has failed.
+    /// Probes the parts that have a probe, and looks for parts that are still, until one has
+    /// failed.
     pub async fn watch(self: Arc<Self>) {
         let (mut looked, mut stalled) = (Instant::now(), None);
         while self.failure().is_none() {
@@ -148,8 +151,8 @@ impl Vitals {
         }
     }
 
-    /// Records that the stored version of a map could not be published: an earlier one stays in use until a later version can
-    /// be.
+    /// Records that the stored version of a map could not be published: an earlier one stays in use
+    /// until a later version can be.
     pub fn unpublished(&self, map: &str, reason: &str) {
         let mut all = self.unpublished.lock().unwrap_or_else(PoisonError::into_inner);
         all.insert(map.to_owned(), reason.to_owned());

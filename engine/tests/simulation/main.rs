@@ -1,8 +1,10 @@
-//! The way of frames under a simulated network, clock and workers: the real intake, slots, numbering, epochs, deadlines and
-//! snapshots, driven by steps that follow from a seed. After every step a model says what must hold ([`world`]).
+//! The way of frames under a simulated network, clock and workers: the real intake, slots,
+//! numbering, epochs, deadlines and snapshots, driven by steps that follow from a seed. After every
+//! step a model says what must hold ([`world`]).
 //!
-//! `WAYMARK_SEED=n` runs one seed with its steps printed, `WAYMARK_SEEDS=n` so many (2000). The store's half of the simulation
-//! (keys, revisions, commits) is `simulation` of the server's publication.
+//! `WAYMARK_SEED=n` runs one seed with its steps printed, `WAYMARK_SEEDS=n` so many (2000). The
+//! store's half of the simulation (keys, revisions, commits) is `simulation` of the server's
+//! publication.
 
 mod random;
 mod robot;

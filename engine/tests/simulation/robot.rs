@@ -1,4 +1,5 @@
-//! A robot: its program restarts, its link breaks, its clock jumps. In: what the seed decides. Out: messages for the network.
+//! A robot: its program restarts, its link breaks, its clock jumps. In: what the seed decides. Out:
+//! messages for the network.
 
 use super::random::Random;
 use engine::slots::SlotKey;

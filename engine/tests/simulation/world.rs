@@ -183,7 +183,8 @@ impl World {
         self.now += Duration::from_millis(ms as u64);
     }
 
-    /// A robot sends a frame: it is lost, delayed, or arrives twice. Delays differ, so messages overtake.
+    /// A robot sends a frame: it is lost, delayed, or arrives twice. Delays differ, so messages
+    /// overtake.
     fn send(&mut self) {
         let which = self.random.below(ROBOTS);
         let packet = self.robots[which].frame(&mut self.random);

@@ -1,5 +1,6 @@
-//! CARMEN logs: `FLASER` and `ROBOTLASER1` lines; all others, and scans of no beam, are ignored. In: lines. Out: scans with the laser's
-//! pose (by odometry, or corrected), which is also taken as the robot's.
+//! CARMEN logs: `FLASER` and `ROBOTLASER1` lines; all others, and scans of no beam, are ignored.
+//! In: lines. Out: scans with the laser's pose (by odometry, or corrected), which is also taken as
+//! the robot's.
 
 use super::{
     entry::{LaserDefaults, LogEntry},
@@ -39,8 +40,7 @@ fn flaser(words: &mut LineTokens<'_>, laser: &LaserDefaults) -> Result<Option<Lo
     Ok(Some(LogEntry { odom: pose, truth: Some(pose), time_s, scan }))
 }
 
-/// `ROBOTLASER1 type start fan step max accuracy mode n ranges.. m remissions.. laser(x y theta) robot(x y theta)
-/// ..`.
+/// `ROBOTLASER1 type start fan step max accuracy mode n ranges.. m remissions.. laser(x y theta) robot(x y theta) ..`.
 fn robotlaser(words: &mut LineTokens<'_>) -> Result<Option<LogEntry>, BadLine> {
     words.number("laser type")?;
     let start = words.number("start angle")?;

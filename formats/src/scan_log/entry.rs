@@ -46,8 +46,8 @@ pub struct ScanLog {
 }
 
 impl ScanLog {
-    /// Recorded time without pauses, seconds. `None` if entries have no times, or wrong ones: a mean speed over 5
-    /// m/s.
+    /// Recorded time without pauses, seconds. `None` if entries have no times, or wrong ones: a
+    /// mean speed over 5 m/s.
     pub fn duration_s(&self) -> Option<f64> {
         let times: Option<Vec<f64>> = self.records.iter().map(|r| r.time_s).collect();
         let steps = |t: &[f64]| Some((t[1] - t[0]).abs()).filter(|d| *d <= MAX_PAUSE_S);

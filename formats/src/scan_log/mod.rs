@@ -1,4 +1,5 @@
-//! Logs of laser scans with odometry, from files: CARMEN, numbered scans, and the project's own format.
+//! Logs of laser scans with odometry, from files: CARMEN, numbered scans, and the project's own
+//! format.
 
 mod carmen;
 mod entry;
@@ -19,8 +20,8 @@ enum Format {
     Numbered(numbered::Numbered),
 }
 
-/// Reads a log of any known format; `.gz` is unpacked. A last line that cannot be used, as of a log that was cut while it
-/// was written, is left out and told; any other one is an error.
+/// Reads a log of any known format; `.gz` is unpacked. A last line that cannot be used, as of a log
+/// that was cut while it was written, is left out and told; any other one is an error.
 pub fn read(path: &Path, laser: &LaserDefaults) -> Result<ScanLog, ReadError> {
     let mut format: Option<Format> = None;
     let mut recording = ScanLog::default();

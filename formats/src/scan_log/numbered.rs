@@ -1,5 +1,6 @@
-//! Numbered scans, the form of the Intel recording with raw odometry: `i dx dy dtheta r0 r1 ..`, the odometry from
-//! scan i to scan i + 1 in the robot's frame, then the ranges over the fan, right to left.
+//! Numbered scans, the form of the Intel recording with raw odometry: `i dx dy dtheta r0 r1 ..`,
+//! the odometry from scan i to scan i + 1 in the robot's frame, then the ranges over the fan, right
+//! to left.
 
 use super::{
     entry::{LaserDefaults, LogEntry},

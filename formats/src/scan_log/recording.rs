@@ -1,7 +1,8 @@
-//! The project's own scan logs: JSON lines. The first line describes the laser, each other one scan:
+//! The project's own scan logs: JSON lines. The first line describes the laser, each other one
+//! scan:
 //! `{"waymark_recording":1,"robot_from_laser":[x,y,theta],"first_bearing_rad":..,"bearing_step_rad":..,"max_range_m":..}`
-//! `{"t_s":12.5,"odom":[x,y,theta],"ranges_m":[..],"truth":[x,y,theta]}` (`null` in ranges: no return; truth if
-//! known).
+//! `{"t_s":12.5,"odom":[x,y,theta],"ranges_m":[..],"truth":[x,y,theta]}` (`null` in ranges: no
+//! return; truth if known).
 
 use super::{entry::LogEntry, text::BadLine};
 use map::{laser::Scan, pose2::Pose2};

@@ -93,7 +93,8 @@ impl<'a> LineTokens<'a> {
         Ok(pose)
     }
 
-    /// The next `n` tokens as ranges, metres. Infinite ones, and those that are no number, are beams without a return.
+    /// The next `n` tokens as ranges, metres. Infinite ones, and those that are no number, are
+    /// beams without a return.
     pub fn ranges(&mut self, n: usize) -> Result<Vec<f32>, BadLine> {
         let range = |i: usize| {
             let word = self.word(&format!("range {i}"))?;

@@ -90,7 +90,8 @@ pub enum WallFileError {
 /// What a file itself does not say.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ImportOptions {
-    /// Walls of a grid shorter than this are left out, metres, but for those that alone explain some cells.
+    /// Walls of a grid shorter than this are left out, metres, but for those that alone explain
+    /// some cells.
     pub min_length_m: f64,
     /// Metres of a unit of an SVG floor plan; without it the plan's physical size counts.
     pub metres_per_unit: Option<f64>,
@@ -178,8 +179,9 @@ fn geojson_file(text: &str) -> Result<Imported, WallFileError> {
     Ok(imported)
 }
 
-/// Reads the walls of `.yaml` (`map_server`; or its picture), `.json` (map file or GeoJSON), `.geojson`, `.svg` and `.svgz`
-/// (floor plan), or else of a vector map. Errors: a file without any wall, too.
+/// Reads the walls of `.yaml` (`map_server`; or its picture), `.json` (map file or GeoJSON),
+/// `.geojson`, `.svg` and `.svgz` (floor plan), or else of a vector map. Errors: a file without any
+/// wall, too.
 pub fn import(path: &Path, options: &ImportOptions) -> Result<Imported, WallFileError> {
     let of = |segments| Imported::of(MapFile { segments, ..MapFile::default() });
     let of_grid = |yaml: &Path| -> Result<Imported, WallFileError> {
@@ -213,8 +215,8 @@ pub fn import(path: &Path, options: &ImportOptions) -> Result<Imported, WallFile
     Ok(imported)
 }
 
-/// Reads the walls of one file by its bytes, as [`import`] does. `kind` is the extension of its name. A grid is two files:
-/// [`WallFileError::TwoFiles`].
+/// Reads the walls of one file by its bytes, as [`import`] does. `kind` is the extension of its
+/// name. A grid is two files: [`WallFileError::TwoFiles`].
 pub fn import_bytes(kind: &str, bytes: &[u8], options: &ImportOptions) -> Result<Imported, WallFileError> {
     let kind = kind.to_lowercase();
     if GRIDS.contains(&kind.as_str()) {
@@ -234,8 +236,8 @@ pub fn read(path: &Path) -> Result<MapFile, WallFileError> {
     Ok(import(path, &ImportOptions { min_length_m: 0.0, ..ImportOptions::default() })?.map)
 }
 
-/// Writes a map as `.yaml` (with a `.pgm` beside it, cells of `resolution_m`), `.txt` (vector map), `.geojson` or
-/// `.json`.
+/// Writes a map as `.yaml` (with a `.pgm` beside it, cells of `resolution_m`), `.txt` (vector map),
+/// `.geojson` or `.json`.
 pub fn write(map: &MapFile, path: &Path, resolution_m: f64) -> Result<(), WallFileError> {
     match extension(path).as_str() {
         "yaml" | "yml" if !RESOLUTION_M.contains(&resolution_m) => {

@@ -1,7 +1,7 @@
 //! The border of free floor in a grid, as closed chains of edges between cells.
 //!
-//! In: a grid and its wall cells. Out: for each edge where it lies, where the wall behind it begins, and which way the
-//! free side is.
+//! In: a grid and its wall cells. Out: for each edge where it lies, where the wall behind it
+//! begins, and which way the free side is.
 
 use super::{
     evidence::Evidence,
@@ -9,7 +9,8 @@ use super::{
 };
 use nalgebra::{Point2, Vector2};
 
-/// A wall may begin this far behind the free floor: pictures that were smoothed have a band between.
+/// A wall may begin this far behind the free floor: pictures that were smoothed have a band
+/// between.
 const BEHIND_M: f64 = 0.1;
 /// The same in cells, at least.
 const BEHIND_CELLS: f64 = 2.0;
@@ -25,7 +26,8 @@ pub(super) struct BorderEdge {
     pub(super) has_wall: bool,
 }
 
-/// The chains of a grid. The free side is on the left all along, and each chain ends where it begins.
+/// The chains of a grid. The free side is on the left all along, and each chain ends where it
+/// begins.
 pub(super) fn chains(grid: &OccupancyGrid, evidence: &Evidence) -> Vec<Vec<BorderEdge>> {
     let mut border = Border::of(grid);
     let depth = (BEHIND_M / grid.resolution_m).max(BEHIND_CELLS).floor() as usize;
@@ -78,7 +80,8 @@ impl Border {
         let (mut at, mut heading) = (start, 0);
         let mut chain = Vec::new();
         loop {
-            // To the left first: cells that touch at a corner are one wall, and the border stays on its side.
+            // To the left first: cells that touch at a corner are one wall, and the border stays on
+            // its side.
             let next = [1, 0, 3, 2]
                 .map(|turn| (heading + turn) % 4)
                 .into_iter()

@@ -7,19 +7,22 @@ use super::{
     map_file::Wall,
 };
 
-/// A wall explains the cells whose middles lie this near, metres (or a cell's side, where that is more).
+/// A wall explains the cells whose middles lie this near, metres (or a cell's side, where that is
+/// more).
 pub(super) const EXPLAINED_M: f64 = 0.2;
 /// A cell is grey if its probability is this much above that of cells never seen.
 const GREY_MARGIN: f64 = 0.02;
 
-/// The wall cells of a grid: the occupied ones, and grey ones, which are darker than the map's unknown.
+/// The wall cells of a grid: the occupied ones, and grey ones, which are darker than the map's
+/// unknown.
 #[derive(Debug, Clone)]
 pub(super) struct Evidence {
     pub(super) width: usize,
     pub(super) height: usize,
     /// By cell.
     pub(super) is_wall: Vec<bool>,
-    /// Those of them within [`EXPLAINED_M`] of free floor: what a laser can see. Insides of blocks are not in it.
+    /// Those of them within [`EXPLAINED_M`] of free floor: what a laser can see. Insides of blocks
+    /// are not in it.
     pub(super) is_reachable: Vec<bool>,
     /// How many of them are not occupied.
     pub(super) grey: usize,
@@ -59,8 +62,9 @@ pub(super) fn reach_cells(resolution_m: f64) -> f64 {
     (EXPLAINED_M / resolution_m).max(1.0)
 }
 
-/// The probability that the picture gives to cells never seen: the most frequent one among those that are neither free
-/// nor occupied, if half of them have it. Otherwise none was left out, and all of those are grey walls.
+/// The probability that the picture gives to cells never seen: the most frequent one among those
+/// that are neither free nor occupied, if half of them have it. Otherwise none was left out, and
+/// all of those are grey walls.
 fn unknown_probability(grid: &OccupancyGrid) -> Option<f64> {
     let mut counts = [0_usize; 256];
     for (level, state) in grid.levels.iter().zip(&grid.cells) {
@@ -103,8 +107,8 @@ pub(super) fn near((width, height): (usize, usize), is_marked: &[bool], reach: f
     is_near
 }
 
-/// Calls `mark` with every cell whose middle lies within `reach` cells of the segment from `a` to `b` (in cells), some
-/// of them more than once.
+/// Calls `mark` with every cell whose middle lies within `reach` cells of the segment from `a` to
+/// `b` (in cells), some of them more than once.
 pub(super) fn for_cells_beside(
     (width, height): (usize, usize),
     [a, b]: [[f64; 2]; 2],

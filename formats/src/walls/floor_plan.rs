@@ -1,9 +1,10 @@
-//! Walls from a floor plan in SVG: paths, lines, polylines, polygons, rectangles, circles and ellipses, with their
-//! transforms, units and styles resolved.
+//! Walls from a floor plan in SVG: paths, lines, polylines, polygons, rectangles, circles and
+//! ellipses, with their transforms, units and styles resolved.
 //!
-//! In: the text of a file and its scale. Out: walls in metres, the origin at the lower left corner of the page, y up. A
-//! plan does not say on which side the floor is, so each line becomes two walls, one for each side. What nobody sees is no
-//! wall: the page's background, transparent shapes, and what a clip path cuts off.
+//! In: the text of a file and its scale. Out: walls in metres, the origin at the lower left corner
+//! of the page, y up. A plan does not say on which side the floor is, so each line becomes two
+//! walls, one for each side. What nobody sees is no wall: the page's background, transparent
+//! shapes, and what a clip path cuts off.
 
 mod clip;
 mod visible;
@@ -59,8 +60,8 @@ pub enum PlanError {
     TooMany,
 }
 
-/// The walls of a file's text. `metres_per_unit` is the length of one user unit (that of the `viewBox`); without it the
-/// document's own physical size counts, as drawn at 1:1.
+/// The walls of a file's text. `metres_per_unit` is the length of one user unit (that of the
+/// `viewBox`); without it the document's own physical size counts, as drawn at 1:1.
 pub(super) fn walls(text: &str, metres_per_unit: Option<f64>) -> Result<Vec<Wall>, PlanError> {
     if let Some(scale) = metres_per_unit.filter(|s| !SCALE_M.contains(s)) {
         return Err(PlanError::Scale(scale));
@@ -193,7 +194,8 @@ impl Page {
 fn add_curve(chords: &mut Vec<[[f64; 2]; 2]>, at: &mut [f64; 2], others: &[[f64; 2]]) {
     let mut controls = vec![*at];
     controls.extend(others);
-    // Second differences bound how far n chords lie from the curve: degree (degree - 1) / 8 n^2 times the largest.
+    // Second differences bound how far n chords lie from the curve: degree (degree - 1) / 8 n^2
+    // times the largest.
     let degree = others.len() as f64;
     let bend = controls
         .windows(3)

@@ -1,6 +1,7 @@
-//! Walls from and to a GeoJSON file in map metres, or in degrees (RFC 7946), which are projected to metres: lines are walls as drawn, polygons are rooms, whose walls face
-//! inwards, and their holes (columns, blocks), whose walls face outwards. Points, and properties of any kind, are
-//! passed over, but for the covariance of a wall.
+//! Walls from and to a GeoJSON file in map metres, or in degrees (RFC 7946), which are projected to
+//! metres: lines are walls as drawn, polygons are rooms, whose walls face inwards, and their holes
+//! (columns, blocks), whose walls face outwards. Points, and properties of any kind, are passed
+//! over, but for the covariance of a wall.
 
 mod degrees;
 
@@ -16,7 +17,8 @@ pub(super) const MAX_BYTES: u64 = 64 << 20;
 const MAX_DEPTH: usize = 8;
 /// The member that says in which frame the coordinates of a written file are.
 const FRAME: (&str, &str) = ("waymark:frame", "map metres");
-/// The property of a wall with the covariance of its direction and offset about its middle: rad^2, rad m, m^2.
+/// The property of a wall with the covariance of its direction and offset about its middle: rad^2,
+/// rad m, m^2.
 const COVARIANCE: &str = "waymark:covariance";
 
 /// Why a file has no walls.

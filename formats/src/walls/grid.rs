@@ -86,8 +86,8 @@ impl OccupancyGrid {
         self.levels.push(probability.map_or(NO_PROBABILITY, |p| (p.clamp(0.0, 1.0) * STEPS).round() as u8));
     }
 
-    /// Probability of an obstacle in column `x` of row `y`, to 1/254, as the picture has it, whatever the thresholds;
-    /// `None` outside and where the picture says nothing.
+    /// Probability of an obstacle in column `x` of row `y`, to 1/254, as the picture has it,
+    /// whatever the thresholds; `None` outside and where the picture says nothing.
     pub fn probability(&self, x: i64, y: i64) -> Option<f64> {
         let level = self.inside(x, y).then(|| self.levels[y as usize * self.width + x as usize]);
         level.filter(|l| *l != NO_PROBABILITY).map(|l| f64::from(l) / STEPS)
@@ -105,7 +105,8 @@ impl OccupancyGrid {
         [p.x / self.resolution_m, p.y / self.resolution_m]
     }
 
-    /// Draws walls: occupied along them, free where the free sides reach without crossing one, unknown elsewhere.
+    /// Draws walls: occupied along them, free where the free sides reach without crossing one,
+    /// unknown elsewhere.
     pub fn of_walls(walls: &[Wall], resolution_m: f64) -> Result<Self, GridError> {
         let ends = || walls.iter().flat_map(|w| [w.a, w.b]);
         if walls.is_empty() {

@@ -53,7 +53,8 @@ impl Wall {
         Self { a, b, covariance: None, hits: None }
     }
 
-    /// A wall with the covariance of its direction and offset about its middle (rad^2, rad m, m^2), if known.
+    /// A wall with the covariance of its direction and offset about its middle (rad^2, rad m, m^2),
+    /// if known.
     pub fn about_middle(
         a: [f64; 2],
         b: [f64; 2],
@@ -65,7 +66,8 @@ impl Wall {
         Ok(Self { hits: None, ..Self::of(&made) })
     }
 
-    /// The covariance of its direction and offset about its middle: rad^2, rad m, m^2. `None` if unknown.
+    /// The covariance of its direction and offset about its middle: rad^2, rad m, m^2. `None` if
+    /// unknown.
     pub fn covariance_about_middle(&self) -> Option<[f64; 3]> {
         self.covariance?;
         let c = self.segment().ok()?.covariance_about_middle();

@@ -1,5 +1,5 @@
-//! Walls from and to files of other programs: ROS occupancy grids, vector maps, GeoJSON, and the project's map file;
-//! and from SVG floor plans.
+//! Walls from and to files of other programs: ROS occupancy grids, vector maps, GeoJSON, and the
+//! project's map file; and from SVG floor plans.
 
 mod any;
 mod border;

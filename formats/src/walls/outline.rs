@@ -1,8 +1,9 @@
-//! From an occupancy grid to straight walls: the border of the free floor is followed, cut where it bends, and every
-//! piece with walls behind it is fitted with a line.
+//! From an occupancy grid to straight walls: the border of the free floor is followed, cut where it
+//! bends, and every piece with walls behind it is fitted with a line.
 //!
-//! In: a grid. Out: walls in map metres, the free side on their left. Borders between free and unknown cells are walls
-//! where they close a gap in one; elsewhere they are where the laser's sight ended.
+//! In: a grid. Out: walls in map metres, the free side on their left. Borders between free and
+//! unknown cells are walls where they close a gap in one; elsewhere they are where the laser's
+//! sight ended.
 
 use super::{
     border::{self, BorderEdge},
@@ -13,20 +14,21 @@ use super::{
 use map::segments::MIN_SEGMENT_M;
 use nalgebra::{Matrix2, Point2, Vector2};
 
-/// The border may leave the chord of a piece by this much, metres, and at least so many cells: a stair of cells is a
-/// straight wall.
+/// The border may leave the chord of a piece by this much, metres, and at least so many cells: a
+/// stair of cells is a straight wall.
 const CUT_M: f64 = 0.08;
 const CUT_CELLS: f64 = 1.2;
 /// Longest part of a border that is cut in one go: the time of cutting may grow with its square.
 const MAX_CHAIN: usize = 1 << 13;
 /// Longest part of a wall without any wall cell, metres.
 const GAP_M: f64 = 0.5;
-/// A short piece is kept if it alone explains so many wall cells; fewer are noise of the mapping. Chosen on the maps
-/// willow-2010 and willow-full of `maps-ros-grid`: 1 gives a fifth more walls, 8 loses legs of tables.
+/// A short piece is kept if it alone explains so many wall cells; fewer are noise of the mapping.
+/// Chosen on the maps willow-2010 and willow-full of `maps-ros-grid`: 1 gives a fifth more walls, 8
+/// loses legs of tables.
 const MIN_EXPLAINED_CELLS: usize = 3;
 
-/// The walls of a grid. Pieces shorter than `min_length_m` are left out unless they explain wall cells that no
-/// longer one does.
+/// The walls of a grid. Pieces shorter than `min_length_m` are left out unless they explain wall
+/// cells that no longer one does.
 pub(super) fn walls(grid: &OccupancyGrid, evidence: &Evidence, min_length_m: f64) -> Vec<Wall> {
     let cut = (CUT_M / grid.resolution_m).max(CUT_CELLS);
     let gap = (GAP_M / grid.resolution_m).ceil() as usize;
@@ -77,7 +79,8 @@ fn with_walls(piece: &[BorderEdge], gap: usize) -> impl Iterator<Item = &[Border
     runs.into_iter().map(|(i, j)| &piece[i..=j])
 }
 
-/// The line through the faces of the wall's cells; both ends on it, half an edge beyond the outermost middles.
+/// The line through the faces of the wall's cells; both ends on it, half an edge beyond the
+/// outermost middles.
 fn fitted(edges: &[BorderEdge]) -> Option<Line> {
     let faces: Vec<Vector2<f64>> = edges.iter().filter(|e| e.has_wall).map(|e| e.middle.coords).collect();
     let (first, last) = (faces.first()?, faces.last()?);
@@ -95,7 +98,8 @@ fn fitted(edges: &[BorderEdge]) -> Option<Line> {
     Some([foot(first, -0.5), foot(last, 0.5)])
 }
 
-/// The lines of at least `min_length` cells, and of the others those that explain what longer ones do not.
+/// The lines of at least `min_length` cells, and of the others those that explain what longer ones
+/// do not.
 fn needed(grid: &OccupancyGrid, evidence: &Evidence, mut lines: Vec<Line>, min_length: f64) -> Vec<Line> {
     let length = |[a, b]: &Line| (b - a).norm();
     lines.sort_by(|a, b| length(b).total_cmp(&length(a)));

@@ -1,6 +1,7 @@
-//! Pictures of grid maps: PGM and PPM (text and binary, 8 and 16 bit), PNG, BMP and JPEG, with limits checked before any
-//! pixel is decoded. WebP and TIFF, which `nav2_map_server` reads as well, would be two more decoders with their own
-//! dependencies, for files that any program saves as PNG.
+//! Pictures of grid maps: PGM and PPM (text and binary, 8 and 16 bit), PNG, BMP and JPEG, with
+//! limits checked before any pixel is decoded. WebP and TIFF, which `nav2_map_server` reads as
+//! well, would be two more decoders with their own dependencies, for files that any program saves
+//! as PNG.
 
 use super::grid::{GridError, MAX_CELLS};
 use image::{ColorType, DynamicImage, ImageDecoder as _, ImageFormat, ImageReader, Limits};

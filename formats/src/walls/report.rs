@@ -1,4 +1,5 @@
-//! What an import took from a file, and what it left: figures, one sentence where it left much, and a picture.
+//! What an import took from a file, and what it left: figures, one sentence where it left much, and
+//! a picture.
 
 use super::{
     evidence::{Evidence, explained, near, reach_cells},
@@ -35,8 +36,8 @@ pub struct ImportReport {
     pub note: Option<String>,
 }
 
-/// How much of a grid its walls explain. A wall explains the cells within 0.2 m of it (a cell's side, where that is
-/// more).
+/// How much of a grid its walls explain. A wall explains the cells within 0.2 m of it (a cell's
+/// side, where that is more).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GridReport {
     /// Cells above `occupied_thresh`.
@@ -47,8 +48,8 @@ pub struct GridReport {
     pub free: usize,
     /// Unknown cells, without the grey ones.
     pub unknown: usize,
-    /// Occupied and grey cells within 0.2 m of free ones: those that walls are to explain. Insides of blocks and what
-    /// lies behind unknown floor are not among them.
+    /// Occupied and grey cells within 0.2 m of free ones: those that walls are to explain. Insides
+    /// of blocks and what lies behind unknown floor are not among them.
     pub wall_cells: usize,
     /// Those of them that a wall explains.
     pub wall_cells_explained: usize,
@@ -64,7 +65,8 @@ impl GridReport {
         if self.wall_cells == 0 { 1.0 } else { self.wall_cells_explained as f64 / self.wall_cells as f64 }
     }
 
-    /// One sentence where there are no wall cells, or walls explain less than [`MIN_EXPLAINED`] of them.
+    /// One sentence where there are no wall cells, or walls explain less than [`MIN_EXPLAINED`] of
+    /// them.
     pub fn warning(&self) -> Option<String> {
         if self.wall_cells == 0 {
             let sentence =
@@ -224,7 +226,8 @@ mod tests {
         let half = [Wall::between([2.0, 2.4], [1.0, 2.4])];
         let report = imported(&half).report(&half);
         assert_eq!((report.occupied, report.free, report.unknown, report.grey), (80, 160, 0, 0));
-        // Two rows of ten, and beyond the end two more cells of each row, the second of the upper row too far.
+        // Two rows of ten, and beyond the end two more cells of each row, the second of the upper
+        // row too far.
         assert_eq!((report.wall_cells, report.wall_cells_explained, report.occupied_explained), (80, 23, 23));
         assert!((report.length_on_wall_cells - 1.0).abs() < 1e-9);
         let warning = report.warning().unwrap();

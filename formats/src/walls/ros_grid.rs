@@ -27,7 +27,8 @@ pub struct Underlay {
     pub height: usize,
     /// Side of a pixel, metres.
     pub resolution_m: f64,
-    /// `map_from_picture`: pose of the lower left corner of the lower left pixel, x to the right, y up.
+    /// `map_from_picture`: pose of the lower left corner of the lower left pixel, x to the right, y
+    /// up.
     pub origin: Pose2,
 }
 
@@ -58,8 +59,8 @@ pub(super) fn read(yaml: &Path) -> Result<(OccupancyGrid, Underlay), GridError> 
     Ok((grid(&meta, &picture), underlay))
 }
 
-/// Where the picture is: beside the YAML file, at an absolute path, or under the home folder (`~/`), as `nav2_map_server`
-/// takes it.
+/// Where the picture is: beside the YAML file, at an absolute path, or under the home folder
+/// (`~/`), as `nav2_map_server` takes it.
 fn picture_path(yaml: &Path, image: &str) -> PathBuf {
     let home = image.strip_prefix("~/").zip(std::env::var_os("HOME"));
     match home {
@@ -79,8 +80,9 @@ fn grid(meta: &GridMeta, picture: &Picture) -> OccupancyGrid {
     grid
 }
 
-/// What a pixel says, as `nav2_map_server` reads it, and its probability before the thresholds. Departs from it in one
-/// thing: `Raw` has probabilities alone there, and gets states by the thresholds here.
+/// What a pixel says, as `nav2_map_server` reads it, and its probability before the thresholds.
+/// Departs from it in one thing: `Raw` has probabilities alone there, and gets states by the
+/// thresholds here.
 fn cell(meta: &GridMeta, pixel: Pixel) -> (CellState, Option<f64>) {
     let brightness = match (meta.mode, pixel.opacity) {
         // Opacity is averaged with red, green and blue.

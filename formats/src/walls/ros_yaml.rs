@@ -1,4 +1,5 @@
-//! The YAML file of a `map_server` map: which picture, where it lies, and what its grey levels mean.
+//! The YAML file of a `map_server` map: which picture, where it lies, and what its grey levels
+//! mean.
 
 use super::grid::GridError;
 use map::pose2::Pose2;

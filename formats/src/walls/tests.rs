@@ -11,7 +11,8 @@ fn walls_of(grid: &OccupancyGrid, min_length_m: f64) -> Vec<Wall> {
     outline::walls(grid, &Evidence::of(grid), min_length_m)
 }
 
-/// A grid from rows of text, the top row first: `#` occupied, `+` grey, `.` free, anything else unknown.
+/// A grid from rows of text, the top row first: `#` occupied, `+` grey, `.` free, anything else
+/// unknown.
 fn drawn(rows: &[&str], resolution_m: f64) -> OccupancyGrid {
     let mut grid = OccupancyGrid::empty((rows[0].len(), rows.len()), resolution_m, Pose2::default());
     for cell in rows.iter().rev().flat_map(|row| row.bytes()) {
@@ -121,7 +122,8 @@ fn a_picture_is_read_by_the_yaml_beside_it() {
 
 #[test]
 fn grey_cells_and_gaps_belong_to_a_wall_and_far_unknown_does_not() {
-    // Half of the wall was seen seldom, three cells of it never; right of it the laser saw nothing for two metres.
+    // Half of the wall was seen seldom, three cells of it never; right of it the laser saw nothing
+    // for two metres.
     let long = format!("{}{}{}{}", "#".repeat(20), " ".repeat(3), "+".repeat(20), " ".repeat(60));
     let (free, unknown) = (".".repeat(long.len()), " ".repeat(long.len()));
     let grid = drawn(&[&unknown, &unknown, &long, &free, &free, &unknown], 0.05);

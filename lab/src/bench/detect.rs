@@ -1,5 +1,5 @@
-//! `waymark-lab bench detect`: processor time from frame to segments and to quads, beside OpenCV on the same
-//! pictures.
+//! `waymark-lab bench detect`: processor time from frame to segments and to quads, beside OpenCV on
+//! the same pictures.
 
 use super::{
     frames::Frames,
@@ -28,7 +28,8 @@ const PAPER: &str = "frame to quads, the paper's grouping";
 const COLOUR_EDGES: &str = "edges, in colour";
 const COLOUR_QUADS: &str = "frame to quads, in colour";
 
-/// Waymark's operation, what it is compared with (a peer's, or another of Waymark's), and the largest ratio aimed at, if any.
+/// Waymark's operation, what it is compared with (a peer's, or another of Waymark's), and the
+/// largest ratio aimed at, if any.
 const RATIOS: [(&str, &str, Option<f64>); 7] = [
     (QUADS, "LSD", Some(0.25)),
     (QUADS, "ArUco", Some(0.6)),
@@ -42,7 +43,8 @@ const RATIOS: [(&str, &str, Option<f64>); 7] = [
 /// `waymark-lab bench detect`.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// Pictures or folders of them; left out, the open indoor sets beside the project, or rendered corridors.
+    /// Pictures or folders of them; left out, the open indoor sets beside the project, or rendered
+    /// corridors.
     images: Vec<PathBuf>,
     /// Where the open sets lie.
     #[arg(long, env = "WAYMARK_DATA", value_name = "DIR")]
@@ -69,7 +71,8 @@ pub(crate) struct Args {
     parameters: ParameterArgs,
 }
 
-/// Processor time of one thread, ms: median over the pictures of each picture's median and of its least.
+/// Processor time of one thread, ms: median over the pictures of each picture's median and of its
+/// least.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 struct Cost {
     median_ms: f64,
@@ -199,8 +202,8 @@ fn peers(args: &Args, frames: &[Picture], folder: &std::path::Path) -> Option<Pe
     }
 }
 
-/// Times Waymark's operations on one picture in grey, each after a warm-up run; on its colours, too, if it has any.
-/// Returns the number of quads.
+/// Times Waymark's operations on one picture in grey, each after a warm-up run; on its colours,
+/// too, if it has any. Returns the number of quads.
 fn time_ours(
     picture: &Picture,
     params: &DetectParams,

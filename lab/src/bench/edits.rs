@@ -1,6 +1,7 @@
-//! Latency of one change of a large map over HTTP, until the server acknowledges it, while a robot's frames are answered: a
-//! landmark moved, a landmark quarantined, a lesson. Derived data that follows later is timed apart. Then how long it takes
-//! to make as many landmarks once more, one request at a time and in one request, and what a backup of the map costs.
+//! Latency of one change of a large map over HTTP, until the server acknowledges it, while a
+//! robot's frames are answered: a landmark moved, a landmark quarantined, a lesson. Derived data
+//! that follows later is timed apart. Then how long it takes to make as many landmarks once more,
+//! one request at a time and in one request, and what a backup of the map costs.
 
 mod backup_cost;
 mod large_map;

@@ -1,5 +1,6 @@
-//! The cost of the server's own layers where everything is encrypted: a frame and its answer beside an echo of zenoh, and a
-//! `GET` beside a bare handler of axum. Both peers run in this process with certificates of the same authority.
+//! The cost of the server's own layers where everything is encrypted: a frame and its answer beside
+//! an echo of zenoh, and a `GET` beside a bare handler of axum. Both peers run in this process with
+//! certificates of the same authority.
 
 mod bare_http;
 mod echo;

@@ -1,5 +1,5 @@
-//! Pictures to time detection on, all 640 x 480, in colour where they have it: robots' and visitors' photographs where
-//! the data is at hand, else rendered views.
+//! Pictures to time detection on, all 640 x 480, in colour where they have it: robots' and
+//! visitors' photographs where the data is at hand, else rendered views.
 
 use anyhow::Context as _;
 use cli::pictures;
@@ -22,7 +22,8 @@ pub(super) struct Frames {
 }
 
 impl Frames {
-    /// `count` pictures, evenly over the named files and folders; without any, over the open sets, or rendered.
+    /// `count` pictures, evenly over the named files and folders; without any, over the open sets,
+    /// or rendered.
     pub(super) fn new(
         named: &[PathBuf],
         data: Option<&Path>,

@@ -1,6 +1,7 @@
-//! A server under load: in a process of its own, encrypted, while it also learns. The robots are a second process. In: how
-//! many robots send how often. Out: shares of the frames, percentiles of the time from the intended sending of a frame to
-//! its answer, processor time and memory of both processes, and whether the server's counters add up with what was sent.
+//! A server under load: in a process of its own, encrypted, while it also learns. The robots are a
+//! second process. In: how many robots send how often. Out: shares of the frames, percentiles of
+//! the time from the intended sending of a frame to its answer, processor time and memory of both
+//! processes, and whether the server's counters add up with what was sent.
 
 mod generator;
 mod plan;
@@ -32,11 +33,12 @@ pub(super) struct Args {
     /// Length of a phase.
     #[arg(long, default_value_t = 60, value_parser = clap::value_parser!(u32).range(5..=7200))]
     seconds: u32,
-    /// Overload: between two phases as usual, half of the robots send so much more that all together send so many times as
-    /// much as usual.
+    /// Overload: between two phases as usual, half of the robots send so much more that all
+    /// together send so many times as much as usual.
     #[arg(long)]
     factor: Option<f64>,
-    /// Soak: so many minutes, with robots that come and go, refused messages and changes of the map mixed in.
+    /// Soak: so many minutes, with robots that come and go, refused messages and changes of the map
+    /// mixed in.
     #[arg(long, conflicts_with = "factor")]
     minutes: Option<u32>,
     /// Landmarks of the lesson that runs all the time; 0: none.
@@ -45,8 +47,8 @@ pub(super) struct Args {
     /// Distinct frames along the drive.
     #[arg(long, default_value_t = 64, value_parser = clap::value_parser!(u32).range(2..=1000))]
     frames: u32,
-    /// When frames are searched for all landmarks, the server's setting `search_frames`: otherwise expected landmarks alone
-    /// answer them.
+    /// When frames are searched for all landmarks, the server's setting `search_frames`: otherwise
+    /// expected landmarks alone answer them.
     #[arg(long, default_value = "unless_busy", value_parser = ["every", "unless_busy", "scheduled"])]
     search_frames: String,
     /// Age beyond which no work begins on a frame, ms.

@@ -1,6 +1,6 @@
-//! OpenCV as peer: a Python program that reads the number of a picture and answers with a line of JSON, for example
-//! the times of its detectors. A missing Python or OpenCV, or no answer, is a reason to run without it, never a
-//! failure.
+//! OpenCV as peer: a Python program that reads the number of a picture and answers with a line of
+//! JSON, for example the times of its detectors. A missing Python or OpenCV, or no answer, is a
+//! reason to run without it, never a failure.
 
 use serde::{Deserialize, de::DeserializeOwned};
 use std::{
@@ -40,7 +40,8 @@ pub(crate) struct Python {
 }
 
 impl Python {
-    /// Starts `program` with arguments and returns its first line, parsed. The error is the reason, for people.
+    /// Starts `program` with arguments and returns its first line, parsed. The error is the reason,
+    /// for people.
     pub(crate) fn start<T: DeserializeOwned>(
         python: &Path,
         program: &str,
@@ -108,7 +109,8 @@ pub(super) struct Peers {
 }
 
 impl Peers {
-    /// Writes the frames to `folder` and starts `python` on them. The error is the reason, for people.
+    /// Writes the frames to `folder` and starts `python` on them. The error is the reason, for
+    /// people.
     pub(super) fn start(python: &Path, frames: &[GrayImage], folder: &Path) -> Result<Self, String> {
         let files = written(frames, folder, "frame")?;
         let (python, Greeting { version }) = Python::start(python, PROGRAM, &files)?;

@@ -1,5 +1,5 @@
-//! `waymark-lab bench`: time of each stage of the pipeline on this machine, one core, on rendered frames of the
-//! corridor. It asserts nothing; the figures go to docs/BENCHMARKS.md.
+//! `waymark-lab bench`: time of each stage of the pipeline on this machine, one core, on rendered
+//! frames of the corridor. It asserts nothing; the figures go to docs/BENCHMARKS.md.
 
 use crate::evaluate::statistics;
 use cli::{screen, stopwatch::Stopwatch};
@@ -125,7 +125,8 @@ pub(super) fn run(args: &PipelineArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The corridor's posters and enough others, learnt from generated views; the mean cost of a lesson.
+/// The corridor's posters and enough others, learnt from generated views; the mean cost of a
+/// lesson.
 fn models(building: &Building, args: &PipelineArgs, params: &Params) -> anyhow::Result<(ModelSet, f64)> {
     let own: Vec<GrayImage> = building
         .posters()

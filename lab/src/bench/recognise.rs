@@ -1,5 +1,5 @@
-//! `waymark-lab bench recognise`: from quad to verdict among few and many landmarks; whole frames, global and
-//! guided, beside OpenCV's SIFT; memory a landmark; recall of the short list; a lesson.
+//! `waymark-lab bench recognise`: from quad to verdict among few and many landmarks; whole frames,
+//! global and guided, beside OpenCV's SIFT; memory a landmark; recall of the short list; a lesson.
 
 pub(super) mod landmarks;
 mod queries;
@@ -28,8 +28,8 @@ pub(crate) struct Args {
     /// Sizes of the maps.
     #[arg(long, value_delimiter = ',', default_values_t = [100, 1000, 10_000], value_parser = clap::value_parser!(u32).range(1..=100_000))]
     landmarks: Vec<u32>,
-    /// Landmarks that are taught as a server teaches them; the others have icons and points of their own and the
-    /// thresholds of these.
+    /// Landmarks that are taught as a server teaches them; the others have icons and points of
+    /// their own and the thresholds of these.
     #[arg(long, default_value_t = 60, value_parser = clap::value_parser!(u32).range(24..=1000))]
     taught: u32,
     /// Quads of landmarks that are timed, and as many of distractors.

@@ -18,7 +18,8 @@ pub(crate) struct Args {
     /// As for `waymark map import`.
     #[arg(long, default_value_t = 0.3)]
     min_length_m: f64,
-    /// Draw every map into this folder, as SVG: its cells, its walls, and in red what they do not explain.
+    /// Draw every map into this folder, as SVG: its cells, its walls, and in red what they do not
+    /// explain.
     #[arg(long, value_name = "DIR")]
     draw: Option<PathBuf>,
     /// One JSON object per map instead of the table.

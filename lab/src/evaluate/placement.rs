@@ -1,6 +1,6 @@
-//! `waymark-lab evaluate placement`: landmarks placed on walls and ceilings from views of known robot poses,
-//! compared with the truth (method 11): generated rooms with corners of known noise, the rendered corridor with
-//! detected corners, and objects that hang on no wall.
+//! `waymark-lab evaluate placement`: landmarks placed on walls and ceilings from views of known
+//! robot poses, compared with the truth (method 11): generated rooms with corners of known noise,
+//! the rendered corridor with detected corners, and objects that hang on no wall.
 
 mod rendered;
 mod rooms;
@@ -22,7 +22,8 @@ pub(crate) struct Args {
     /// Views of each landmark that are fused.
     #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u32).range(2..=64))]
     views: u32,
-    /// Rendered corridors with posters and lamps in which the detector finds the corners; 0 for none.
+    /// Rendered corridors with posters and lamps in which the detector finds the corners; 0 for
+    /// none.
     #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(0..=1_000))]
     corridors: u32,
     /// Seed of all that is drawn.

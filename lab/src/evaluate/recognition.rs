@@ -1,6 +1,6 @@
-//! `waymark-lab evaluate recognition`: teaches a server of its own from a labelled set over HTTP, then sends the
-//! other pictures over zenoh. Counts right, wrong and missed names and distractors refused and accepted; measures
-//! time.
+//! `waymark-lab evaluate recognition`: teaches a server of its own from a labelled set over HTTP,
+//! then sends the other pictures over zenoh. Counts right, wrong and missed names and distractors
+//! refused and accepted; measures time.
 
 use super::{
     statistics::median,
@@ -22,7 +22,8 @@ use vision::{
     recognise::DistanceKind,
 };
 
-/// An answer belongs to a labelled quad from this overlap on, or if it lies inside it (an inner border).
+/// An answer belongs to a labelled quad from this overlap on, or if it lies inside it (an inner
+/// border).
 const IOU_SAME: f64 = 0.5;
 const INNER_SHARE: f64 = 0.9;
 const MAP: &str = "evaluation";

@@ -1,5 +1,5 @@
-//! The rendered sets: pictures of `sim` with exact truth, written as a folder in the evaluation format, so that
-//! they are used like any other set.
+//! The rendered sets: pictures of `sim` with exact truth, written as a folder in the evaluation
+//! format, so that they are used like any other set.
 
 use anyhow::Context as _;
 use cli::{pictures, scratch, screen};
@@ -20,8 +20,8 @@ const SCENES: &str = "scenes";
 /// Pictures that hang in scenes are reduced to about this many pixels a side.
 const HUNG_SIDE_PX: usize = 256;
 
-/// The folder of a set. For `corridor` or `scenes` views are rendered: into `keep`, or into a temporary folder that
-/// lasts as long as the second value.
+/// The folder of a set. For `corridor` or `scenes` views are rendered: into `keep`, or into a
+/// temporary folder that lasts as long as the second value.
 pub(crate) fn folder(
     set: &Path,
     keep: Option<&Path>,

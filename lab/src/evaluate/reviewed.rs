@@ -1,6 +1,7 @@
-//! Reviewed lists: quads in a set's pictures that the set does not label, each judged by a person: real ones
-//! (signs, switches, windows), and false ones. An evaluation counts detections on real ones apart from other false
-//! ones; the detector's networks learn from both. The lists are in `lab/reviewed`, one file a set, named after it.
+//! Reviewed lists: quads in a set's pictures that the set does not label, each judged by a person:
+//! real ones (signs, switches, windows), and false ones. An evaluation counts detections on real
+//! ones apart from other false ones; the detector's networks learn from both. The lists are in
+//! `lab/reviewed`, one file a set, named after it.
 
 use anyhow::Context as _;
 use serde::Deserialize;
@@ -45,7 +46,8 @@ struct List {
 }
 
 impl Reviewed {
-    /// The list in `file`; by default the list that comes with the program, empty if there is none for the set.
+    /// The list in `file`; by default the list that comes with the program, empty if there is none
+    /// for the set.
     pub(crate) fn of(set: &str, file: Option<&Path>) -> anyhow::Result<Self> {
         if let Some(path) = file {
             let text =

@@ -1,6 +1,7 @@
-//! `waymark-lab evaluate roll`: a camera mounted at twelve rolls, with the code of the server's workers. Rendered frames
-//! of a corridor whose posters are taught from one level photograph each; names and poses with the camera's mounting,
-//! names and camera poses without one, and expected landmarks found without a detection.
+//! `waymark-lab evaluate roll`: a camera mounted at twelve rolls, with the code of the server's
+//! workers. Rendered frames of a corridor whose posters are taught from one level photograph each;
+//! names and poses with the camera's mounting, names and camera poses without one, and expected
+//! landmarks found without a detection.
 
 use super::{
     experiment::{mixed, of_each, say},
@@ -43,7 +44,8 @@ use vision::{
 
 /// Rolls of the camera.
 const ROLLS: u32 = 12;
-/// Views generated from each photograph, and how many of their icons are negatives of the other landmarks.
+/// Views generated from each photograph, and how many of their icons are negatives of the other
+/// landmarks.
 const GENERATED: usize = 30;
 const NEGATIVES: usize = 10;
 /// A name is right if its border overlaps the landmark's by this much.

@@ -1,4 +1,5 @@
-//! Numbers about numbers: quantiles, and 95 % confidence intervals of a share and of anything computed from images.
+//! Numbers about numbers: quantiles, and 95 % confidence intervals of a share and of anything
+//! computed from images.
 
 use serde::Serialize;
 
@@ -40,8 +41,9 @@ pub(crate) fn wilson(hits: usize, of: usize) -> Interval {
     Interval((centre - half).max(0.0), (centre + half).min(1.0))
 }
 
-/// Exact one-sided upper bound at 95 % (Clopper and Pearson) of a share of which `hits` of `of` trials are hits: the share at
-/// which as few hits occur in one case of twenty. 1 where nothing was tried.
+/// Exact one-sided upper bound at 95 % (Clopper and Pearson) of a share of which `hits` of `of`
+/// trials are hits: the share at which as few hits occur in one case of twenty. 1 where nothing was
+/// tried.
 pub(crate) fn upper_bound(hits: usize, of: usize) -> f64 {
     if hits >= of {
         return 1.0;
@@ -66,8 +68,9 @@ fn at_most(hits: usize, of: usize, share: f64) -> f64 {
     sum
 }
 
-/// Interval of a figure of several images by the percentile bootstrap: images are drawn with repetition, 1000 times, a
-/// fixed seed. None when some resampling has no such figure, or there is one image at most.
+/// Interval of a figure of several images by the percentile bootstrap: images are drawn with
+/// repetition, 1000 times, a fixed seed. None when some resampling has no such figure, or there is
+/// one image at most.
 pub(crate) fn bootstrap<T>(images: &[T], figure: impl Fn(&[&T]) -> Option<f64>) -> Option<Interval> {
     if images.len() < 2 {
         return None;
@@ -128,7 +131,8 @@ mod tests {
 
     #[test]
     fn exact_bounds_as_in_the_tables() {
-        // Trials that show 1e-4, with 0, 1, 2, 3 and 5 hits (chi-squared quantiles over 2e-4), and 1e-3 with none.
+        // Trials that show 1e-4, with 0, 1, 2, 3 and 5 hits (chi-squared quantiles over 2e-4), and
+        // 1e-3 with none.
         for (hits, of, bound) in [
             (0, 29_956, 1e-4),
             (1, 47_437, 1e-4),

@@ -1,4 +1,5 @@
-//! The evaluation format: a folder with `truth.json` and pictures (see docs/EVALUATION.md), read and checked.
+//! The evaluation format: a folder with `truth.json` and pictures (see docs/EVALUATION.md), read
+//! and checked.
 
 use super::reviewed::{Reviewed, ReviewedQuad};
 use serde::Deserialize;

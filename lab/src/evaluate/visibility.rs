@@ -1,6 +1,6 @@
-//! `waymark-lab evaluate visibility`: visibility areas in closed form against brute force, their sizes against
-//! counting, and the time of areas and of gaze selection; for landmarks on walls and for tilted ones. Needs neither
-//! server nor data.
+//! `waymark-lab evaluate visibility`: visibility areas in closed form against brute force, their
+//! sizes against counting, and the time of areas and of gaze selection; for landmarks on walls and
+//! for tilted ones. Needs neither server nor data.
 
 use cli::{clock::Clock, screen};
 use map::{
@@ -19,8 +19,8 @@ const HALL: usize = 1000;
 /// `waymark-lab evaluate visibility`.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// Random maps: a landmark on its wall among a dozen obstacles; and as many with it under a ceiling, on the
-    /// floor or leaning.
+    /// Random maps: a landmark on its wall among a dozen obstacles; and as many with it under a
+    /// ceiling, on the floor or leaning.
     #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     maps: u32,
     /// Points compared, over all maps of a kind.
@@ -180,8 +180,8 @@ fn plan(random: &mut Random) -> anyhow::Result<Plan> {
     Ok(Plan { place, obstacles, viewer })
 }
 
-/// The same with the landmark under the ceiling, on the floor or leaning, off its wall, and a camera that can be
-/// aimed at it.
+/// The same with the landmark under the ceiling, on the floor or leaning, off its wall, and a
+/// camera that can be aimed at it.
 fn tilted_plan(random: &mut Random) -> anyhow::Result<Plan> {
     let mut made = plan(random)?;
     let tilt_rad = match random.next_u64() % 4 {
@@ -210,8 +210,8 @@ fn counted_m2(plan: &Plan, p: &VisibilityParams, reach_m: f64) -> f64 {
     (0..SIDE * SIDE).filter(sees).count() as f64 * cell * cell
 }
 
-/// A hall with a thousand landmarks in rows: median and worst milliseconds of gaze selection, and landmarks in its
-/// result.
+/// A hall with a thousand landmarks in rows: median and worst milliseconds of gaze selection, and
+/// landmarks in its result.
 fn gaze_ms(seed: u64) -> anyhow::Result<([f64; 2], usize)> {
     let (viewer, p) = (PanTiltCamera::default(), VisibilityParams::default());
     let size = LandmarkSize { width_m: 0.6, height_m: 0.84 };

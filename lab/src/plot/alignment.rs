@@ -1,4 +1,5 @@
-//! Template alignment: the corners of a quad that is a little off, before and after, and the icons along them.
+//! Template alignment: the corners of a quad that is a little off, before and after, and the icons
+//! along them.
 
 use super::{
     landmark::{Landmark, oblique},
@@ -21,8 +22,8 @@ use vision::{
     },
 };
 
-/// How far each corner is moved before alignment, as shares of the mean side: as an edge of a frame, a shadow or a mat
-/// that was taken for the border moves them.
+/// How far each corner is moved before alignment, as shares of the mean side: as an edge of a
+/// frame, a shadow or a mat that was taken for the border moves them.
 const OFF: [[f64; 2]; 4] = [[0.07, -0.05], [0.09, 0.04], [-0.06, 0.08], [0.03, -0.09]];
 /// Enlargement of the image.
 const FACTOR: usize = 2;
@@ -97,7 +98,8 @@ fn quads(seen: &sim::exhibit::Exhibit, before_px: &Corners, after: &Alignment) -
     picture
 }
 
-/// How far the grey levels of two icons of equal mean and deviation are apart: black where they agree.
+/// How far the grey levels of two icons of equal mean and deviation are apart: black where they
+/// agree.
 fn difference(a: &Icon, b: &Icon) -> Picture {
     let normal = |icon: &Icon| {
         let n = icon.pixels.len() as f32;

@@ -1,5 +1,5 @@
-//! The distances of an icon bucket by bucket: correlation of grey levels (C^r) and of gradients, for the landmark, for
-//! the landmark behind something plain, and for another picture.
+//! The distances of an icon bucket by bucket: correlation of grey levels (C^r) and of gradients,
+//! for the landmark, for the landmark behind something plain, and for another picture.
 
 use super::{
     landmark::{Landmark, Taught, oblique, plain},

@@ -1,4 +1,5 @@
-//! The training views of a landmark in the plane of their two leading modes, and the icons that stand for them.
+//! The training views of a landmark in the plane of their two leading modes, and the icons that
+//! stand for them.
 
 use super::{
     landmark::Landmark,

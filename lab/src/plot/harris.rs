@@ -1,4 +1,5 @@
-//! Harris points of an icon and of an exemplar, and the counterparts that the partial Hausdorff distance rests on.
+//! Harris points of an icon and of an exemplar, and the counterparts that the partial Hausdorff
+//! distance rests on.
 
 use super::{
     landmark::{Landmark, oblique},

@@ -1,4 +1,5 @@
-//! From the quad to the icon: the square of grey levels that is compared, and the exemplar that it is compared with.
+//! From the quad to the icon: the square of grey levels that is compared, and the exemplar that it
+//! is compared with.
 
 use super::{
     landmark::{Landmark, oblique},

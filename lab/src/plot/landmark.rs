@@ -1,5 +1,6 @@
-//! The rendered landmark that a stage of recognition is drawn on: a poster on a plastered wall, taught from one
-//! photograph, and other views of it. With the exact corners: what detection adds is drawn elsewhere.
+//! The rendered landmark that a stage of recognition is drawn on: a poster on a plastered wall,
+//! taught from one photograph, and other views of it. With the exact corners: what detection adds
+//! is drawn elsewhere.
 
 use super::Args;
 use crate::evaluate::experiment::lesson::points_of;
@@ -100,7 +101,8 @@ impl Landmark {
         Ok(Taught { photograph, views, model: models.swap_remove(0) })
     }
 
-    /// Learns each of `all` from its photograph, number i is landmark i; the others are what it must be told from.
+    /// Learns each of `all` from its photograph, number i is landmark i; the others are what it
+    /// must be told from.
     pub(crate) fn together(all: &[Self], p: &Params) -> anyhow::Result<Vec<LandmarkModel>> {
         let photographs = all.iter().map(Self::photograph).collect::<anyhow::Result<Vec<_>>>()?;
         let views = all.iter().zip(&photographs).map(|(l, seen)| l.views(seen, p));

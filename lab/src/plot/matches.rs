@@ -1,5 +1,5 @@
-//! Tentative matches of a patch with the taught points, those that agree on a homography, and what every other taught
-//! point says where the homography puts it.
+//! Tentative matches of a patch with the taught points, those that agree on a homography, and what
+//! every other taught point says where the homography puts it.
 
 use super::{
     landmark::{Landmark, oblique},

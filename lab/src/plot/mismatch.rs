@@ -1,5 +1,6 @@
-//! The mismatch map: which windows of an aligned picture show something else than the learnt icon, and which cells
-//! show nothing. For a quarter that was replaced, and for one that is occluded by something plain.
+//! The mismatch map: which windows of an aligned picture show something else than the learnt icon,
+//! and which cells show nothing. For a quarter that was replaced, and for one that is occluded by
+//! something plain.
 
 use super::{
     landmark::{Landmark, Taught, oblique, plain},

@@ -1,6 +1,7 @@
-//! `waymark-lab plot`: pictures of the stages of recognition, drawn from what `vision` itself works out of a rendered
-//! landmark or of a picture of one's own. Those of docs/method are made so, and a test draws them again
-//! (`lab/tests/lab/plot.rs`). Stages of the detector are drawn by `waymark detect --draw`.
+//! `waymark-lab plot`: pictures of the stages of recognition, drawn from what `vision` itself works
+//! out of a rendered landmark or of a picture of one's own. Those of docs/method are made so, and a
+//! test draws them again (`lab/tests/lab/plot.rs`). Stages of the detector are drawn by
+//! `waymark detect --draw`.
 
 mod panels;
 mod landmark;
@@ -34,21 +35,28 @@ pub(crate) struct Args {
 /// A stage of recognition.
 #[derive(Debug, Clone, Copy, clap::ValueEnum)]
 enum Stage {
-    /// A quad in the image, its icon, and the exemplar that it is compared with (page 4 of docs/method).
+    /// A quad in the image, its icon, and the exemplar that it is compared with (page 4 of
+    /// docs/method).
     Icon,
-    /// Harris points of icon and exemplar, and the counterparts that the Hausdorff distance rests on (5, 6.2).
+    /// Harris points of icon and exemplar, and the counterparts that the Hausdorff distance rests
+    /// on (5, 6.2).
     Harris,
-    /// Correlation of grey levels and of gradients by bucket: the landmark, a part covered, another picture (6.1, 6.3).
+    /// Correlation of grey levels and of gradients by bucket: the landmark, a part covered, another
+    /// picture (6.1, 6.3).
     Buckets,
-    /// Training views in the plane of their two leading modes, and the exemplars that stand for them (7.2, 7.3).
+    /// Training views in the plane of their two leading modes, and the exemplars that stand for
+    /// them (7.2, 7.3).
     Exemplars,
     /// A quad that is a little off, before and after template alignment (6.3.2).
     Alignment,
-    /// Where an aligned picture shows something else: a quarter replaced, and a part covered (25.7).
+    /// Where an aligned picture shows something else: a quarter replaced, and a part covered
+    /// (25.7).
     Mismatch,
-    /// The patch of a quad with its margin, its keypoints, and which of them are taught (25.1 to 25.3).
+    /// The patch of a quad with its margin, its keypoints, and which of them are taught (25.1 to
+    /// 25.3).
     Patch,
-    /// Matches with the taught points, which of them agree, and what every other taught point says (25.5, 25.6).
+    /// Matches with the taught points, which of them agree, and what every other taught point says
+    /// (25.5, 25.6).
     Matches,
 }
 

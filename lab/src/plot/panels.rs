@@ -78,7 +78,8 @@ pub(crate) fn cut(image: &GrayImage, [left, top, width, height]: [usize; 4]) -> 
     GrayImage::from_fn(width, height, |u, v| image.at(left + u, top + v))
 }
 
-/// Left, top, width and height of the box around corners, wider by `margin` on all sides, within an image.
+/// Left, top, width and height of the box around corners, wider by `margin` on all sides, within an
+/// image.
 pub(crate) fn around(corners: &Corners, margin: f64, image: &GrayImage) -> [usize; 4] {
     let span = |axis: usize, size: usize| {
         let values = corners.points().map(|c| c[axis]);

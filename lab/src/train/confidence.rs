@@ -1,5 +1,6 @@
-//! `waymark-lab train confidence`: fits the weights of the confidence to answers whose truth is known: those of
-//! `waymark-lab evaluate confidence`, on another set. Answers in, a source file out.
+//! `waymark-lab train confidence`: fits the weights of the confidence to answers whose truth is
+//! known: those of `waymark-lab evaluate confidence`, on another set. Answers in, a source file
+//! out.
 
 use super::confidence_fit::{Answer, fit};
 use super::provenance::Provenance;
@@ -25,7 +26,8 @@ pub(crate) struct ConfidenceArgs {
     /// Quads, of which about four in ten are named.
     #[arg(long, default_value_t = 12_000, value_parser = clap::value_parser!(u32).range(1000..=1_000_000))]
     quads: u32,
-    /// Write the weights as the source file `vision/src/recognise/decision/confidence_weights.rs` here.
+    /// Write the weights as the source file `vision/src/recognise/decision/confidence_weights.rs`
+    /// here.
     #[arg(long, value_name = "FILE")]
     rust: Option<PathBuf>,
     #[command(flatten)]

@@ -1,5 +1,5 @@
-//! Answers whose truth is known in, the weights of the confidence out: logistic regression with a small ridge, in
-//! which no measure may raise the confidence of an answer by being worse.
+//! Answers whose truth is known in, the weights of the confidence out: logistic regression with a
+//! small ridge, in which no measure may raise the confidence of an answer by being worse.
 
 use nalgebra::{SMatrix, SVector};
 use vision::recognise::decision::{confidence::chance, measures::MEASURES};
@@ -88,8 +88,8 @@ mod tests {
     use super::*;
     use vision::random::Random;
 
-    /// Answers whose chance of being right is a logistic curve of the first and third measure; the fifth has the
-    /// wrong sign.
+    /// Answers whose chance of being right is a logistic curve of the first and third measure; the
+    /// fifth has the wrong sign.
     fn answers(count: usize) -> (Vec<Answer>, [f64; WEIGHTS]) {
         let mut weights = [0.0; WEIGHTS];
         (weights[0], weights[2], weights[4], weights[MEASURES]) = (-5.0, -3.0, 1.0, 4.0);

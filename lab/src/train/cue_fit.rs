@@ -1,7 +1,7 @@
-//! Weights of the cues from labelled photographs (method 2): pairs of segments that lie on opposite sides of a
-//! labelled quad against all others that pass the gates. Logistic regression with weights of at least zero, both
-//! classes with the same total weight. Every photograph is scored by a fit without its fifth of the photographs.
-//! Reads no files.
+//! Weights of the cues from labelled photographs (method 2): pairs of segments that lie on opposite
+//! sides of a labelled quad against all others that pass the gates. Logistic regression with
+//! weights of at least zero, both classes with the same total weight. Every photograph is scored by
+//! a fit without its fifth of the photographs. Reads no files.
 
 use nalgebra::Point2;
 use vision::{
@@ -54,8 +54,8 @@ pub(crate) struct LabelledPair {
     pub(crate) photograph: usize,
 }
 
-/// Parameters of [`vision::paper::relaxation::similarity::pairs`] that keep every pair that passes the gates,
-/// whatever its score.
+/// Parameters of [`vision::paper::relaxation::similarity::pairs`] that keep every pair that passes
+/// the gates, whatever its score.
 pub(crate) fn ungraded(p: &SimilarityParams) -> SimilarityParams {
     SimilarityParams {
         min_score: 0.0,
@@ -64,8 +64,9 @@ pub(crate) fn ungraded(p: &SimilarityParams) -> SimilarityParams {
     }
 }
 
-/// Labels candidate pairs by labelled quads. A pair along another border of a labelled object (`IoU` of half with
-/// it), or along one of `others` (real quads that do not count), is left out: it is neither.
+/// Labels candidate pairs by labelled quads. A pair along another border of a labelled object
+/// (`IoU` of half with it), or along one of `others` (real quads that do not count), is left out:
+/// it is neither.
 pub(crate) fn label_pairs(
     segments: &[EdgeSegment],
     pairs: &[SegmentPair],
@@ -88,8 +89,8 @@ fn opposite_sides(k: &EdgeSegment, l: &EdgeSegment, corners: &[Point2<f64>; 4]) 
     (0..4).any(|i| on_side(k, corners, i) && on_side(l, corners, (i + 2) % 4))
 }
 
-/// Whether a segment covers most of a side: ends near its line, by 2 % of the quad's size or 3 px, and at least 60
-/// % of its length.
+/// Whether a segment covers most of a side: ends near its line, by 2 % of the quad's size or 3 px,
+/// and at least 60 % of its length.
 fn on_side(s: &EdgeSegment, corners: &[Point2<f64>; 4], side: usize) -> bool {
     let (from, to) = (corners[side], corners[(side + 1) % 4]);
     let (along, length) = ((to - from).normalize(), (to - from).norm());
@@ -110,11 +111,13 @@ pub(crate) struct FittedSimilarity {
     pub(crate) counts: [usize; 2],
     /// Mean cues of both.
     pub(crate) mean_cues: [[f64; 6]; 2],
-    /// Share of comparisons in which a pair of opposite sides scores above another pair, with the previous weights.
+    /// Share of comparisons in which a pair of opposite sides scores above another pair, with the
+    /// previous weights.
     pub(crate) order_before: f64,
     /// The same with fitted weights, each pair scored by a fit without its part of the photographs.
     pub(crate) order_after: f64,
-    /// Share of the other pairs above the smallest score that keeps [`RECALL_SHARE`], before and (held out) after.
+    /// Share of the other pairs above the smallest score that keeps [`RECALL_SHARE`], before and
+    /// (held out) after.
     pub(crate) passing: [f64; 2],
 }
 
@@ -163,8 +166,9 @@ fn score(cues: &[f64; 6], weights: &[f64; 6]) -> f64 {
     cues.iter().zip(weights).map(|(c, w)| c * w).sum()
 }
 
-/// Weights that sum to 1: coefficients of a logistic regression, none below zero, by Newton steps on one coefficient
-/// after the other. The function is convex and each step lowers a bound on it, so it converges from anywhere.
+/// Weights that sum to 1: coefficients of a logistic regression, none below zero, by Newton steps
+/// on one coefficient after the other. The function is convex and each step lowers a bound on it,
+/// so it converges from anywhere.
 fn weights(pairs: &[LabelledPair]) -> Result<[f64; 6], CueFitError> {
     let opposite = pairs.iter().filter(|s| s.opposite).count();
     let others = pairs.len() - opposite;
@@ -228,7 +232,8 @@ fn passing(scored: &[(f64, bool)]) -> f64 {
     passed as f64 / all.max(1) as f64
 }
 
-/// Area under the ROC curve: probability that a pair of opposite sides scores above another pair, ties counting half.
+/// Area under the ROC curve: probability that a pair of opposite sides scores above another pair,
+/// ties counting half.
 fn order(scored: &[(f64, bool)]) -> f64 {
     let mut sorted = scored.to_vec();
     sorted.sort_by(|a, b| a.0.total_cmp(&b.0));

@@ -1,5 +1,5 @@
-//! Training data of the detector's networks: the detector runs over labelled pictures, and its lines and quads are
-//! compared with the labels.
+//! Training data of the detector's networks: the detector runs over labelled pictures, and its
+//! lines and quads are compared with the labels.
 
 use super::network_training::{ChoiceExample, LabelledExample};
 use crate::evaluate::truth::{Truth, TruthImage};
@@ -47,8 +47,8 @@ pub(super) struct Set {
 }
 
 impl Set {
-    /// Deals the images to `parts` parts of about the same size. If landmarks are taught, images of one landmark
-    /// stay in one part.
+    /// Deals the images to `parts` parts of about the same size. If landmarks are taught, images of
+    /// one landmark stay in one part.
     pub(super) fn new(truth: Truth, weight: f64, parts: usize) -> Self {
         let parts = if truth.teach.is_empty() {
             (0..truth.images.len()).map(|i| i % parts.max(1)).collect()
@@ -64,7 +64,8 @@ impl Set {
     }
 }
 
-/// Parts of images such that no landmark is in two: the largest groups first, each to the part that has fewest.
+/// Parts of images such that no landmark is in two: the largest groups first, each to the part that
+/// has fewest.
 fn dealt(images: &[TruthImage], parts: usize) -> Vec<usize> {
     let mut group: Vec<usize> = (0..images.len()).collect();
     let mut first: BTreeMap<&str, usize> = BTreeMap::new();
@@ -102,7 +103,8 @@ impl Data {
     pub(super) fn gather(sets: &[Set], params: &DetectParams, min_side_px: f64) -> anyhow::Result<Self> {
         let mut data = Self::default();
         let mut params = params.clone();
-        // Non-maximum suppression by rank runs first, as in the detector; the examples left overlap little.
+        // Non-maximum suppression by rank runs first, as in the detector; the examples left overlap
+        // little.
         params.quads.sure_probability = SURE;
         for set in sets {
             let progress = screen::progress(set.images().count(), "searching");
@@ -153,7 +155,8 @@ impl Data {
     }
 }
 
-/// The lines beside each side of the quad found on a label, with their distance from the labelled side.
+/// The lines beside each side of the quad found on a label, with their distance from the labelled
+/// side.
 fn sides(g: &Gradients, found: &[Quad], label: &Corners, group: usize, weight: f64) -> Vec<ChoiceExample> {
     let overlap = |q: &Quad| polygon::iou(label.points(), q.corners_px.points());
     let best = found.iter().map(|q| (overlap(q), q)).reduce(|a, b| if b.0 > a.0 { b } else { a });
@@ -184,8 +187,9 @@ fn aligned(label: &Corners, to: &[Point2<f64>; 4]) -> [Point2<f64>; 4] {
     *label.rotated(shift).points()
 }
 
-/// Whether a detected quad is a labelled object; `None` if the labels do not say: it overlaps a label loosely, lies
-/// off the labels of an incomplete picture, or on another real quad that is no border of a label.
+/// Whether a detected quad is a labelled object; `None` if the labels do not say: it overlaps a
+/// label loosely, lies off the labels of an incomplete picture, or on another real quad that is no
+/// border of a label.
 fn is_object(found: &Corners, image: &TruthImage) -> Option<bool> {
     let overlap = |o: &Corners| polygon::iou(o.points(), found.points());
     if image.false_quads.iter().any(|q| overlap(q) >= OBJECT[0]) {
@@ -252,7 +256,8 @@ mod tests {
         let inner = Corners::try_from([[12.0, 12.0], [89.0, 12.0], [89.0, 89.0], [12.0, 89.0]]).unwrap();
         assert_eq!((is_object(&inner, &image(true, true)), is_object(&inner, &bordered)), (None, Some(true)));
         assert_eq!(is_object(&card(602.0, 100.0), &image(true, false)), Some(false));
-        // No label: loosely on a quad that does not count, and off the labels of an incomplete picture.
+        // No label: loosely on a quad that does not count, and off the labels of an incomplete
+        // picture.
         assert_eq!(is_object(&card(20.0, 100.0), &image(false, true)), None);
         assert_eq!(is_object(&card(200.0, 50.0), &image(true, false)), None);
     }

@@ -1,5 +1,5 @@
-//! `waymark-lab train detector`: trains border model and quad classifier from labelled pictures. Labels in,
-//! parameters out; `held_out` has the figures on held-out pictures.
+//! `waymark-lab train detector`: trains border model and quad classifier from labelled pictures.
+//! Labels in, parameters out; `held_out` has the figures on held-out pictures.
 
 use super::network_training::{ChoiceExample, LabelledExample, TrainParams, train_choice, train_classifier};
 use super::{
@@ -20,8 +20,8 @@ use vision::detect::{DetectParams, border_model::network::Network};
 /// `waymark-lab train detector`.
 #[derive(Debug, clap::Args)]
 pub(crate) struct DetectorArgs {
-    /// Folders in the evaluation format, folders with a reviewed list (see docs/EVALUATION.md), or `corridor` for
-    /// rendered views, besides the rendered scenes.
+    /// Folders in the evaluation format, folders with a reviewed list (see docs/EVALUATION.md), or
+    /// `corridor` for rendered views, besides the rendered scenes.
     sets: Vec<PathBuf>,
     /// Rendered scenes to learn from; 0 for none.
     #[arg(long, default_value_t = 600, value_parser = clap::value_parser!(u32).range(0..=10_000))]
@@ -32,7 +32,8 @@ pub(crate) struct DetectorArgs {
     /// Weight of the labels of a set; default 1. May be repeated.
     #[arg(long, value_name = "SET=TIMES", value_parser = named_weight)]
     weight: Vec<(String, f64)>,
-    /// Sides of labelled quads with a shorter side than this, in pixels of the working image, are not learnt from.
+    /// Sides of labelled quads with a shorter side than this, in pixels of the working image, are
+    /// not learnt from.
     #[arg(long, default_value_t = 18.0)]
     min_side_px: f64,
     /// Parts that the images are dealt to; each is held out once.
@@ -50,8 +51,8 @@ pub(crate) struct DetectorArgs {
     /// Write the networks as parameters here, for --params.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Write the networks as the source file `vision/src/detect/border_model/network_weights.rs` here; run `cargo
-    /// fmt` after.
+    /// Write the networks as the source file `vision/src/detect/border_model/network_weights.rs`
+    /// here; run `cargo fmt` after.
     #[arg(long, value_name = "FILE")]
     rust: Option<PathBuf>,
     /// Rendered views to learn from, where `corridor` is among the sets.
@@ -214,8 +215,8 @@ struct Fit<'a> {
 }
 
 impl Fit<'_> {
-    /// Both networks from all but one part of the data. The classifier sees quads as the new border model places
-    /// them.
+    /// Both networks from all but one part of the data. The classifier sees quads as the new border
+    /// model places them.
     fn networks(&self, sides: &[ChoiceExample], without: Option<usize>) -> anyhow::Result<held_out::Part> {
         let learnt: Vec<ChoiceExample> = sides.iter().filter(|r| Some(r.group) != without).cloned().collect();
         let border_model = train_choice(&learnt, &self.how[0]).context("the border model")?;

@@ -1,5 +1,5 @@
-//! Figures of networks on pictures that they were not trained on: choice of sides, classification of quads,
-//! detection with them. Networks and sets in, figures out.
+//! Figures of networks on pictures that they were not trained on: choice of sides, classification
+//! of quads, detection with them. Networks and sets in, figures out.
 
 use super::{
     data::{Data, Set},
@@ -16,13 +16,14 @@ use cli::{pictures, screen};
 use serde::Serialize;
 use vision::detect::{DetectParams, border_model::network::Network};
 
-/// A first choice is right if its error exceeds that of the best line by at most this, px of the working image.
+/// A first choice is right if its error exceeds that of the best line by at most this, px of the
+/// working image.
 const RIGHT_PX: f64 = 1.5;
 /// Quads with a shorter side do not count.
 const MIN_SIDE_PX: f64 = 20.0;
 
-/// Border model and quad classifier, the part of the data held out from them, and all quads as the border model
-/// places them.
+/// Border model and quad classifier, the part of the data held out from them, and all quads as the
+/// border model places them.
 #[derive(Debug)]
 pub(super) struct Part {
     pub(super) held_out: Option<usize>,

@@ -1,8 +1,8 @@
-//! Trains the detector's small networks: labelled measurements in, a `Network` out. Same data, same seed: same
-//! weights. The caller decides which measurements go in.
+//! Trains the detector's small networks: labelled measurements in, a `Network` out. Same data, same
+//! seed: same weights. The caller decides which measurements go in.
 //!
-//! Two tasks: the right one of several candidates (conditional logit), and whether an example is one (logistic).
-//! Full batches, Adam, weights kept small by a ridge.
+//! Two tasks: the right one of several candidates (conditional logit), and whether an example is
+//! one (logistic). Full batches, Adam, weights kept small by a ridge.
 
 use vision::{
     detect::border_model::{
@@ -14,10 +14,11 @@ use vision::{
 
 /// Scaled measurements are clipped at this many deviations, as in [`Network::output`].
 const CLIP: f64 = 4.0;
-/// Adam: decay of the means of the gradient and of its square, and the term that keeps the quotient finite.
+/// Adam: decay of the means of the gradient and of its square, and the term that keeps the quotient
+/// finite.
 const ADAM: [f64; 3] = [0.9, 0.99, 1e-8];
-/// Standard deviations of the initial weights into and out of the hidden units, the former over the root of their
-/// number.
+/// Standard deviations of the initial weights into and out of the hidden units, the former over the
+/// root of their number.
 const FIRST: [f64; 2] = [0.6, 0.3];
 /// A measurement that varies less is scaled by 1.
 const MIN_DEVIATION: f64 = 1e-9;
@@ -60,7 +61,8 @@ pub(crate) struct TrainParams {
     pub(crate) rate: f64,
     /// Half of it weighs the squares of all weights but biases, against the sum of the losses.
     pub(crate) ridge: f64,
-    /// Additional distance at which a candidate's target probability is 1/e of the best one's. Above 0.
+    /// Additional distance at which a candidate's target probability is 1/e of the best one's.
+    /// Above 0.
     pub(crate) reach: f64,
     /// Seed of the hidden units' initial weights.
     pub(crate) seed: u64,
@@ -202,7 +204,8 @@ fn spread(tasks: &[Task], width: usize) -> (Vec<f64>, Vec<f64>) {
     (mean, deviation)
 }
 
-/// All weights in one list: linear, then of every hidden unit its row, bias and output, then the bias.
+/// All weights in one list: linear, then of every hidden unit its row, bias and output, then the
+/// bias.
 struct Weights {
     width: usize,
     hidden: usize,

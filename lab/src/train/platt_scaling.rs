@@ -1,5 +1,6 @@
-//! Calibrates a network's probability on examples that it was not trained on (Platt scaling). Outputs with labels
-//! in, a linear function of the output out. The order of examples does not change.
+//! Calibrates a network's probability on examples that it was not trained on (Platt scaling).
+//! Outputs with labels in, a linear function of the output out. The order of examples does not
+//! change.
 
 use super::network_training::{LabelledExample, TrainError};
 use vision::detect::border_model::network::Network;
@@ -21,7 +22,8 @@ pub(crate) struct PlattScaling {
 }
 
 impl PlattScaling {
-    /// Maximum-likelihood fit to held-out examples, each counted by its weight. `outputs` and `examples` correspond.
+    /// Maximum-likelihood fit to held-out examples, each counted by its weight. `outputs` and
+    /// `examples` correspond.
     pub(crate) fn fit(outputs: &[f64], examples: &[LabelledExample]) -> Result<Self, TrainError> {
         let pairs = || outputs.iter().zip(examples);
         if let Some(i) = pairs().position(|(o, e)| !o.is_finite() || !e.weight.is_finite() || e.weight <= 0.0)

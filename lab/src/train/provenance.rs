@@ -1,5 +1,6 @@
-//! Provenance of learnt weights: the command as it was run, the commit, and a digest of every folder of pictures.
-//! Written at the head of the generated source, so that the weights can be reproduced.
+//! Provenance of learnt weights: the command as it was run, the commit, and a digest of every
+//! folder of pictures. Written at the head of the generated source, so that the weights can be
+//! reproduced.
 
 use sha2::{Digest as _, Sha256};
 use std::{
@@ -21,7 +22,8 @@ pub(super) struct Provenance {
 }
 
 impl Provenance {
-    /// Of this process; `sets` are the folders that were learnt from (rendered ones follow from the command).
+    /// Of this process; `sets` are the folders that were learnt from (rendered ones follow from the
+    /// command).
     pub(super) fn of_this_run(sets: &[PathBuf]) -> std::io::Result<Self> {
         let folders = sets.iter().filter(|set| set.is_dir());
         let name = |set: &Path| set.file_name().unwrap_or(set.as_os_str()).to_string_lossy().into_owned();
@@ -66,7 +68,8 @@ fn commit() -> Option<String> {
     Some(if is_clean { head } else { format!("{head}, with changes") })
 }
 
-/// SHA-256 of one line "relative-path sha256-of-file" for each file, sorted, each ending with a newline.
+/// SHA-256 of one line "relative-path sha256-of-file" for each file, sorted, each ending with a
+/// newline.
 fn digest(folder: &Path) -> std::io::Result<String> {
     let (mut lines, mut open) = (Vec::new(), vec![folder.to_owned()]);
     while let Some(path) = open.pop() {

@@ -1,5 +1,5 @@
-//! Claim: every command of `waymark-lab` explains its options, one that does not exist is refused, and speed is
-//! measured without data and without Python.
+//! Claim: every command of `waymark-lab` explains its options, one that does not exist is refused,
+//! and speed is measured without data and without Python.
 
 use crate::{LONGEST, PROGRAM, lab};
 use serde_json::Value;

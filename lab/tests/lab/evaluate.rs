@@ -1,5 +1,5 @@
-//! Claim: the figures of `waymark-lab evaluate` are what a recount by other means gives, and a folder without truth
-//! is refused by name.
+//! Claim: the figures of `waymark-lab evaluate` are what a recount by other means gives, and a
+//! folder without truth is refused by name.
 
 use crate::{LONGEST, lab};
 use serde_json::Value;
@@ -31,7 +31,8 @@ fn inside(quad: &Quad, x: f64, y: f64) -> bool {
     })
 }
 
-/// Areas of a, of b and of what they share, by counting points: nothing of the program's own geometry.
+/// Areas of a, of b and of what they share, by counting points: nothing of the program's own
+/// geometry.
 fn areas(a: &Quad, b: &Quad) -> [f64; 3] {
     let spread = |axis: usize| {
         let values = || a.iter().chain(b).map(|c| c[axis]);
@@ -166,7 +167,8 @@ fn labels_decide_what_is_found_and_what_is_false() {
     let building = Arc::new(Building::corridor(6));
     let views = scenes::views(&building, &LessonParams { views: 1, ..LessonParams::default() });
     let mut set = scenes::write_set(folder.path(), &building, &views[..3], &[], 20.0);
-    // Without any label everything found is false; where labels are not complete nothing can be false.
+    // Without any label everything found is false; where labels are not complete nothing can be
+    // false.
     for image in &mut set.images {
         image.quads.clear();
     }

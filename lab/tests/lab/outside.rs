@@ -1,5 +1,6 @@
-//! Claim: the figures of `waymark-lab evaluate outside` follow from labels and poses: a wrong label makes a wrong name,
-//! a pose that is moved makes an error of that length, and what a world does not state is absent.
+//! Claim: the figures of `waymark-lab evaluate outside` follow from labels and poses: a wrong label
+//! makes a wrong name, a pose that is moved makes an error of that length, and what a world does
+//! not state is absent.
 
 use crate::lab;
 use serde_json::{Value, json};

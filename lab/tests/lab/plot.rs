@@ -1,5 +1,5 @@
-//! Claim: every picture of a stage of recognition in docs/method is what the program draws of it now, and shows
-//! something.
+//! Claim: every picture of a stage of recognition in docs/method is what the program draws of it
+//! now, and shows something.
 
 use crate::lab;
 use image::{ImageReader, RgbImage};
@@ -15,7 +15,8 @@ const MIN_COLOURS: usize = 40;
 const WIDTHS_PX: std::ops::RangeInclusive<u32> = 640..=1320;
 /// Largest file.
 const MAX_BYTES: u64 = 200_000;
-/// Pixels that may differ, of a million: processors may round the last bit of a sine or an exponential differently.
+/// Pixels that may differ, of a million: processors may round the last bit of a sine or an
+/// exponential differently.
 const MAX_DIFFERENT: usize = 100;
 
 fn read(path: &Path) -> RgbImage {

@@ -1,5 +1,6 @@
-//! Claim: photographs of paintings on real walls are found and recognised, none as another. A floor against
-//! regressions, far below the figures of docs/EVALUATION.md; skipped, with the reason, without the pictures.
+//! Claim: photographs of paintings on real walls are found and recognised, none as another. A floor
+//! against regressions, far below the figures of docs/EVALUATION.md; skipped, with the reason,
+//! without the pictures.
 
 use crate::lab;
 use serde_json::{Value, json};
@@ -36,8 +37,8 @@ fn museum() -> Option<PathBuf> {
     there.then_some(folder.canonicalize().ok()?)
 }
 
-/// A folder in the evaluation format with some photographs of walls, and the known paintings on them to
-/// teach from.
+/// A folder in the evaluation format with some photographs of walls, and the known paintings on
+/// them to teach from.
 fn excerpt(museum: &Path) -> (TempDir, usize) {
     let text = fs::read(museum.join("truth.json")).expect("truth.json");
     let mut truth: Value = serde_json::from_slice(&text).expect("JSON");

@@ -1,5 +1,5 @@
-//! Claim: `waymark-lab train similarity` writes weights that the detector takes, and refuses sets it cannot learn
-//! from.
+//! Claim: `waymark-lab train similarity` writes weights that the detector takes, and refuses sets
+//! it cannot learn from.
 
 use crate::lab;
 use serde_json::{Value, json};

@@ -1,4 +1,5 @@
-//! Robot pose, systematic odometry errors and nuisance parameters in one Gaussian: prediction and Kalman update.
+//! Robot pose, systematic odometry errors and nuisance parameters in one Gaussian: prediction and
+//! Kalman update.
 
 use crate::{
     fuse::params::FuseParams,
@@ -7,8 +8,8 @@ use crate::{
 };
 use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, Matrix3x2, Vector2, Vector3};
 
-/// Most nuisance parameters of landmarks and extrinsics in the state, and as many of walls; the one unused for
-/// longest is dropped first.
+/// Most nuisance parameters of landmarks and extrinsics in the state, and as many of walls; the one
+/// unused for longest is dropped first.
 pub const MAX_NUISANCES: usize = 12;
 /// Size of the pose's block.
 const POSE: usize = 3;
@@ -25,7 +26,8 @@ struct Carried {
     used: u64,
 }
 
-/// Systematic odometry errors: true distance = (1 + scale) x measured; true heading = measured + drift x distance.
+/// Systematic odometry errors: true distance = (1 + scale) x measured; true heading = measured +
+/// drift x distance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SystematicOdometryError {
     /// Scale (share) and drift (rad/m).
@@ -42,7 +44,8 @@ impl SystematicOdometryError {
     }
 }
 
-/// The state: pose, odometry errors, nuisance parameters (true minus assumed) in the order of `carried`.
+/// The state: pose, odometry errors, nuisance parameters (true minus assumed) in the order of
+/// `carried`.
 #[derive(Debug, Clone)]
 pub(super) struct Belief {
     pub(super) pose: Pose2,
@@ -68,7 +71,8 @@ impl Belief {
         for (k, nuisance) in fix.nuisances.iter().enumerate() {
             let at = ROBOT + BLOCK * k;
             belief.covariance.view_mut((at, at), (BLOCK, BLOCK)).copy_from(&nuisance.covariance);
-            // estimate - true = ... + J (true - assumed), and the error of an assumed 0 is -(true - assumed).
+            // estimate - true = ... + J (true - assumed), and the error of an assumed 0 is -(true -
+            // assumed).
             let cross = -nuisance.jacobian * nuisance.covariance;
             belief.covariance.view_mut((0, at), (POSE, BLOCK)).copy_from(&cross);
             belief.covariance.view_mut((at, 0), (BLOCK, POSE)).copy_from(&cross.transpose());
@@ -82,7 +86,8 @@ impl Belief {
         SystematicOdometryError { errors: self.odometry, covariance }
     }
 
-    /// Prediction by a `measured` motion, corrected by the systematic odometry errors, with additional `noise`.
+    /// Prediction by a `measured` motion, corrected by the systematic odometry errors, with
+    /// additional `noise`.
     pub(super) fn predict(&mut self, measured: &Pose2, noise: &Matrix3<f64>, p: &FuseParams) {
         let (length_m, scale) = (measured.position().norm(), 1.0 + self.odometry.x);
         let turn_rad = measured.theta_rad + self.odometry.y * length_m;
@@ -105,8 +110,8 @@ impl Belief {
         self.covariance[(4, 4)] += p.turn_bias_drift_rad_per_m.powi(2) * length_m;
     }
 
-    /// Kalman update. Gives the squared Mahalanobis distance of the innovation; `None` when its covariance is
-    /// singular.
+    /// Kalman update. Gives the squared Mahalanobis distance of the innovation; `None` when its
+    /// covariance is singular.
     pub(super) fn correct(&mut self, fix: &Fix, now: u64) -> Option<f64> {
         let mut at = Vec::with_capacity(fix.nuisances.len());
         for nuisance in &fix.nuisances {
@@ -133,11 +138,13 @@ impl Belief {
         self.pose = self.pose.plus(&Vector3::new(step[0], step[1], step[2]));
         self.odometry += Vector2::new(step[3], step[4]);
         self.errors += step.rows(ROBOT, n - ROBOT);
-        // Joseph's form, multiplied out: stays positive whatever the gain, and costs n^2 instead of n^3.
+        // Joseph's form, multiplied out: stays positive whatever the gain, and costs n^2 instead of
+        // n^3.
         let s = DMatrix::from_iterator(3, 3, s.iter().copied());
         let taken = &gain * cross.transpose();
         self.covariance -= &taken + taken.transpose() - &gain * s * gain.transpose();
-        // Rounding leaves a little asymmetry that this form, unlike Joseph's, does not shrink with the rest.
+        // Rounding leaves a little asymmetry that this form, unlike Joseph's, does not shrink with
+        // the rest.
         self.covariance = 0.5 * (&self.covariance + self.covariance.transpose());
         self.forget();
         Some(innovation.dot(&(inverse * innovation)))

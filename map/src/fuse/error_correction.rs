@@ -1,5 +1,5 @@
-//! Applies error models to motions and fixes: subtracts the bias and inflates the covariance (method 15: "reported
-//! covariance inflated to the learnt one").
+//! Applies error models to motions and fixes: subtracts the bias and inflates the covariance
+//! (method 15: "reported covariance inflated to the learnt one").
 
 use crate::{
     fuse::params::FuseParams,
@@ -13,7 +13,8 @@ use std::borrow::Cow;
 /// Variance beyond which a fix does not determine a direction (of position: 1 m^2).
 const UNKNOWN: f64 = 1.0;
 
-/// A measured motion and its noise, in the frame where it starts, corrected by the error model of odometry.
+/// A measured motion and its noise, in the frame where it starts, corrected by the error model of
+/// odometry.
 pub(super) fn motion(
     measured: &Pose2,
     noise: &Matrix3<f64>,
@@ -45,8 +46,8 @@ pub(super) fn fix<'a>(fix: &'a Fix, at: &Pose2, advice: &ModalityAdvice) -> Cow<
     trusted.noise += more;
     let mut lasting = more;
     if fault.bias != Vector3::zeros() {
-        // The bias contains the errors of walls or places as observed from this cell. The rest belongs to the cell and
-        // says nothing about the same walls observed from elsewhere.
+        // The bias contains the errors of walls or places as observed from this cell. The rest
+        // belongs to the cell and says nothing about the same walls observed from elsewhere.
         lasting += fix
             .nuisances
             .iter()

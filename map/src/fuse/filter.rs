@@ -1,5 +1,5 @@
-//! The filter: a belief with its counts of contradictions and the sources used lately. Predicts, corrects, starts,
-//! loses the pose.
+//! The filter: a belief with its counts of contradictions and the sources used lately. Predicts,
+//! corrects, starts, loses the pose.
 
 use crate::{
     fuse::{
@@ -15,7 +15,8 @@ use crate::{
 use nalgebra::Matrix3;
 use vision::model::LandmarkId;
 
-/// Most sources (landmarks, the laser) whose last use is remembered; the one unused for longest is dropped first.
+/// Most sources (landmarks, the laser) whose last use is remembered; the one unused for longest is
+/// dropped first.
 pub const MAX_SOURCES: usize = 32;
 
 /// Fixes that contradict the belief and agree with one another.
@@ -49,8 +50,8 @@ pub(super) struct Filter {
     odometry: Option<Pose2>,
     /// Systematic odometry errors known before the present belief.
     learnt: Option<SystematicOdometryError>,
-    /// Each source with the odometry of its last applied fix, the latest last. One entry for each source: scans
-    /// between two observations of a landmark do not make the second one new.
+    /// Each source with the odometry of its last applied fix, the latest last. One entry for each
+    /// source: scans between two observations of a landmark do not make the second one new.
     used: Vec<(Source, Pose2)>,
     /// Fixes by landmarks applied.
     pub corrections: u64,
@@ -179,7 +180,8 @@ impl Filter {
             }
         } else if !matches!(outcome, FixOutcome::GatedOut { .. }) {
             match fix.modality {
-                // A scan is matched around the belief, so its fit says nothing against contradicting landmarks.
+                // A scan is matched around the belief, so its fit says nothing against
+                // contradicting landmarks.
                 FixSource::Laser => {
                     self.laser_corrections += 1;
                     self.laser_doubts = 0;
@@ -202,7 +204,8 @@ impl Filter {
         self.used.drain(..gone);
     }
 
-    /// Whether all sources were used from the same pose: the errors of corners and ranges are largely the same there.
+    /// Whether all sources were used from the same pose: the errors of corners and ranges are
+    /// largely the same there.
     fn is_repeated(&self, sources: &[Source], p: &FuseParams) -> bool {
         let Some(now) = &self.odometry else { return false };
         let still = |before: &Pose2| {
@@ -213,7 +216,8 @@ impl Filter {
         !sources.is_empty() && sources.iter().all(used)
     }
 
-    /// Counts a contradiction. Enough of them that agree and rest on several landmarks replace the belief.
+    /// Counts a contradiction. Enough of them that agree and rest on several landmarks replace the
+    /// belief.
     fn contradict(&mut self, fix: &Fix, distance2: f64, p: &FuseParams) -> FixOutcome {
         if fix.modality == FixSource::Laser {
             self.laser_doubts = self.laser_doubts.saturating_add(1);

@@ -100,8 +100,9 @@ impl Fuser {
         self.apply_odometry_after(at_ns, odom_from_robot, 0.0)
     }
 
-    /// Applies an odometry reading that was received `elapsed_s` after the one before it. The longer of stamped and
-    /// received time counts, so that a slightly wrong stamp is not taken for a jump.
+    /// Applies an odometry reading that was received `elapsed_s` after the one before it. The
+    /// longer of stamped and received time counts, so that a slightly wrong stamp is not taken for
+    /// a jump.
     pub fn apply_odometry_after(
         &mut self,
         at_ns: i64,
@@ -121,9 +122,10 @@ impl Fuser {
         Ok(OdometryOutcome::Moved)
     }
 
-    /// Starts the window again after the robot's clock was set: `odom_from_robot` was received `elapsed_s` after the
-    /// last reading and has the new time `at_ns`. Odometry carries the pose along, unless the robot cannot have moved
-    /// so far. Replayable events and waiting fixes are forgotten.
+    /// Starts the window again after the robot's clock was set: `odom_from_robot` was received
+    /// `elapsed_s` after the last reading and has the new time `at_ns`. Odometry carries the pose
+    /// along, unless the robot cannot have moved so far. Replayable events and waiting fixes are
+    /// forgotten.
     pub fn set_clock(
         &mut self,
         at_ns: i64,
@@ -140,8 +142,8 @@ impl Fuser {
         Ok(OdometryOutcome::Moved)
     }
 
-    /// Removes the odometry reading of this time, which proved wrong. Odometry is cumulative, so the next reading
-    /// contains its motion. No effect if the reading cannot be replayed any more.
+    /// Removes the odometry reading of this time, which proved wrong. Odometry is cumulative, so
+    /// the next reading contains its motion. No effect if the reading cannot be replayed any more.
     pub fn retract(&mut self, at_ns: i64) {
         let found = self.events.iter().position(|(t, e)| *t == at_ns && matches!(e, Event::Odometry(_)));
         let Some(place) = found else { return };
@@ -152,7 +154,8 @@ impl Fuser {
         }
     }
 
-    /// The pose by an odometry reading that is newer than that of [`Self::pose`] although its time is not.
+    /// The pose by an odometry reading that is newer than that of [`Self::pose`] although its time
+    /// is not.
     pub fn pose_by(&self, at_ns: i64, odom_from_robot: &Pose2) -> Option<FusedPose> {
         let mut filter = self.now.clone();
         filter.predict(odom_from_robot, &self.rules);

@@ -24,21 +24,23 @@ pub enum OdometryOutcome {
     Moved,
     /// Ignored: older than the window, or a second reading of the same time.
     TooOld,
-    /// The robot cannot have moved so far: the odometry frame is another one. The pose is unknown until the next fix.
+    /// The robot cannot have moved so far: the odometry frame is another one. The pose is unknown
+    /// until the next fix.
     Jumped,
 }
 
 /// What a fix may do to the pose, by how its landmarks were recognised.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum FixRole {
-    /// Recognised without the pose: the fix may start the pose, correct it, contradict it, and replace it together
-    /// with others that agree.
+    /// Recognised without the pose: the fix may start the pose, correct it, contradict it, and
+    /// replace it together with others that agree.
     #[default]
     Independent,
-    /// Recognised where the pose expects them ([`crate::guided`]): the fix only corrects. It neither counts as a
-    /// contradiction nor ends one, since it was searched for around the pose.
+    /// Recognised where the pose expects them ([`crate::guided`]): the fix only corrects. It
+    /// neither counts as a contradiction nor ends one, since it was searched for around the pose.
     Guided,
-    /// The caller has decided that the pose is wrong ([`crate::guided::Schedule`]): the fix replaces it.
+    /// The caller has decided that the pose is wrong ([`crate::guided::Schedule`]): the fix
+    /// replaces it.
     Replacing,
 }
 
@@ -64,7 +66,8 @@ pub enum FixOutcome {
         /// Number of consecutive contradictions.
         in_a_row: u32,
     },
-    /// It replaced the pose: the last of consecutive contradictions that agree, or [`FixRole::Replacing`].
+    /// It replaced the pose: the last of consecutive contradictions that agree, or
+    /// [`FixRole::Replacing`].
     Reset,
     /// Nothing new: the same landmarks, or the laser, from the same pose.
     Repeated,

@@ -8,7 +8,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct FuseParams {
-    /// Odometry: standard deviation along the motion after 1 m, metres; grows with the square root of the distance.
+    /// Odometry: standard deviation along the motion after 1 m, metres; grows with the square root
+    /// of the distance.
     pub along_m: f64,
     /// Odometry: standard deviation across the motion after 1 m, metres.
     pub across_m: f64,
@@ -18,8 +19,8 @@ pub struct FuseParams {
     pub turn_per_turn_rad: f64,
     /// Standard deviation of the scale error of an unknown robot, share.
     ///
-    /// Not in method 15: worn wheels and loads make a share of odometry's error the same every metre. As noise it
-    /// would return after every landmark.
+    /// Not in method 15: worn wheels and loads make a share of odometry's error the same every
+    /// metre. As noise it would return after every landmark.
     pub scale_sigma: f64,
     /// Standard deviation of the heading drift of an unknown robot, rad/m.
     pub turn_bias_sigma_rad_per_m: f64,
@@ -35,11 +36,11 @@ pub struct FuseParams {
     pub reset_count: u32,
     /// if they rest on this many landmarks: a single wrong identity can be as steady as the truth.
     ///
-    /// Departs from method 15, where five fixes gated out mark their source as failed: odometry drifts, landmarks do
-    /// not, so agreeing landmarks win.
+    /// Departs from method 15, where five fixes gated out mark their source as failed: odometry
+    /// drifts, landmarks do not, so agreeing landmarks win.
     pub reset_landmarks: usize,
-    /// A further fix by the same landmarks, or a further scan, counts only after this motion, metres: from the same
-    /// pose its errors are the same.
+    /// A further fix by the same landmarks, or a further scan, counts only after this motion,
+    /// metres: from the same pose its errors are the same.
     ///
     /// Departs from method 15, which applies every fix.
     pub min_move_m: f64,
@@ -72,8 +73,8 @@ impl Default for FuseParams {
 }
 
 impl FuseParams {
-    /// Covariance of a motion, in the frame where it starts. Linear in the distance, so that cutting a motion into
-    /// pieces changes nothing.
+    /// Covariance of a motion, in the frame where it starts. Linear in the distance, so that
+    /// cutting a motion into pieces changes nothing.
     pub fn motion_noise(&self, motion: &Pose2) -> Matrix3<f64> {
         let (metres, radians) = (motion.position().norm(), motion.theta_rad.abs());
         let turn = self.turn_rad.powi(2) * metres + self.turn_per_turn_rad.powi(2) * radians;
@@ -87,7 +88,8 @@ impl FuseParams {
         noise
     }
 
-    /// Variances (along, across, heading) of one metre straight on for an unknown robot: noise and systematic errors.
+    /// Variances (along, across, heading) of one metre straight on for an unknown robot: noise and
+    /// systematic errors.
     pub(crate) fn metre_variances(&self) -> Vector3<f64> {
         let turn = self.turn_rad.powi(2) + self.turn_bias_sigma_rad_per_m.powi(2);
         // Random heading along the metre adds a third of its variance across.

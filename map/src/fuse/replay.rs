@@ -56,8 +56,8 @@ pub(super) fn apply(
     }
 }
 
-/// Moves the filter on to `at_ns`, between its last odometry and the next one among the `later` events. `None` if
-/// there is no later odometry.
+/// Moves the filter on to `at_ns`, between its last odometry and the next one among the `later`
+/// events. `None` if there is no later odometry.
 pub(super) fn reach(
     filter: &mut Filter,
     filter_ns: &mut Option<i64>,

@@ -1,4 +1,5 @@
-//! Batch least squares, simulated drives with drawn places and extrinsics, late arrivals, contradictions, bounds.
+//! Batch least squares, simulated drives with drawn places and extrinsics, late arrivals,
+//! contradictions, bounds.
 
 mod corridor_drive;
 mod laser_drive;
@@ -19,7 +20,8 @@ use vision::{model::LandmarkId, random::Random};
 
 pub(super) const SECOND: i64 = 1_000_000_000;
 
-/// A fix as `localise` gives it: `noise_m` new in every frame, and the landmark's place within `place_m`.
+/// A fix as `localise` gives it: `noise_m` new in every frame, and the landmark's place within
+/// `place_m`.
 pub(super) fn fix(landmark: u64, pose: Pose2, noise_m: f64, place_m: f64) -> Fix {
     let noise = Matrix3::from_diagonal(&Vector3::new(noise_m, noise_m, 0.2 * noise_m).map(|v| v * v));
     let p = place_m * place_m;
@@ -74,9 +76,9 @@ fn there_is_no_pose_before_the_first_fix_or_a_given_start() {
 
 #[test]
 fn equals_batch_least_squares() {
-    // Oracle: all poses, both places and odometry's errors in one weighted least-squares problem. Errors are a
-    // millionth of their sigma, so that every derivative is taken at the same point and the two must agree to
-    // rounding.
+    // Oracle: all poses, both places and odometry's errors in one weighted least-squares problem.
+    // Errors are a millionth of their sigma, so that every derivative is taken at the same point
+    // and the two must agree to rounding.
     let mut random = Random::new(1);
     let p = FuseParams { scale_drift: 0.0, turn_bias_drift_rad_per_m: 0.0, ..eager() };
     let steps = 6;
@@ -154,7 +156,8 @@ fn a_hundred_fixes_do_not_undercut_the_covariance_of_the_place() {
     assert!(fuser.pose().unwrap().pose.covariance[(0, 0)].sqrt() < 0.029);
 }
 
-/// A simulated drive: the truth, odometry drawn from its own model, fixes with drawn places. NEES at the end.
+/// A simulated drive: the truth, odometry drawn from its own model, fixes with drawn places. NEES
+/// at the end.
 fn drive_at_random(random: &mut Random) -> f64 {
     let p = FuseParams::default();
     let places: Vec<Vector3<f64>> =

@@ -1,5 +1,6 @@
-//! Expected information gain of an observation: half the logarithm of the ratio of the pose covariance's determinants
-//! before and after it, by the predicted covariance of the corners (method 13.5, 14).
+//! Expected information gain of an observation: half the logarithm of the ratio of the pose
+//! covariance's determinants before and after it, by the predicted covariance of the corners
+//! (method 13.5, 14).
 
 use crate::{
     extrinsics::CameraExtrinsics,

@@ -64,8 +64,9 @@ fn two(saliency: [f64; 2]) -> Vec<(LandmarkPlace, VisibilityMap, f64, f64)> {
 
 #[test]
 fn the_choice_flips_where_the_products_are_equal() {
-    // By hand: on y = 3.2 the nearest boundary is the far disc, tangent to the wall: of diameter D, centre (x, D/2).
-    // With saliencies 1 and 0.8 the choice flips where (R - |q - c0|) = 0.8 (R - |q - c1|).
+    // By hand: on y = 3.2 the nearest boundary is the far disc, tangent to the wall: of diameter D,
+    // centre (x, D/2). With saliencies 1 and 0.8 the choice flips where (R - |q - c0|) = 0.8
+    // (R - |q - c1|).
     let p = GazeParams { full_margin_m: 10.0, ..GazeParams::default() };
     let candidates = two([1.0, 0.8]);
     let r = 0.5 * 512.0 * 0.6 / 75.0;
@@ -130,7 +131,8 @@ fn a_sign_under_the_ceiling_is_a_target_inside_its_area() {
     let ask = |pose: &Pose2Covariance| {
         rank(pose, &[target], &viewer, &PanTiltUnit::default(), &GazeParams::default()).unwrap()
     };
-    // By hand: 1.3 m above the camera, 1.3 m away from every side, it is up and oblique by 45 degrees.
+    // By hand: 1.3 m above the camera, 1.3 m away from every side, it is up and oblique by 45
+    // degrees.
     for theta in [0.0, 1.0, 2.0, -2.5_f64] {
         let [choice] = ask(&at(1.3 * theta.cos(), 1.3 * theta.sin(), 0.4, SURE))[..] else {
             panic!("{theta}")
@@ -199,7 +201,8 @@ fn the_gain_is_that_of_a_real_fix() {
 
 #[test]
 fn information_prefers_the_oblique_view() {
-    // At the same distance, one straight ahead of its wall and one at 45 degrees, with the same turn of the camera.
+    // At the same distance, one straight ahead of its wall and one at 45 degrees, with the same
+    // turn of the camera.
     let p = GazeParams { criterion: Criterion::Information, ..GazeParams::default() };
     let straight =
         LandmarkPlace::by_hand(Vector3::new(2.4, 0.0, 1.5), PI, SIZE, PlaceSigmas::default()).unwrap();

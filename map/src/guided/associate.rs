@@ -1,17 +1,18 @@
-//! Data association of the observations of an image with expected landmarks: individual gates, then joint
-//! compatibility (JCBB, Neira and Tardos 2001) under one error of pose, extrinsics and intrinsics that all
-//! observations share.
+//! Data association of the observations of an image with expected landmarks: individual gates, then
+//! joint compatibility (JCBB, Neira and Tardos 2001) under one error of pose, extrinsics and
+//! intrinsics that all observations share.
 //!
-//! In: [`Expectations`] and observations, each with its candidate landmarks, all members of its look-alike class
-//! included. Out: for each observation one landmark, several, or none. One is given only if every assignment whose
-//! score comes within [`AssociateParams::margin_nats`] of the best gives it.
+//! In: [`Expectations`] and observations, each with its candidate landmarks, all members of its
+//! look-alike class included. Out: for each observation one landmark, several, or none. One is
+//! given only if every assignment whose score comes within [`AssociateParams::margin_nats`] of the
+//! best gives it.
 //!
-//! The score of an assignment is the logarithm of its likelihood over that of an image without these landmarks:
-//! picture evidence, prior odds, and the density of the corners. Picture evidence has a floor of its own, which
-//! neither prior odds nor a good fit of the corners can make up for.
+//! The score of an assignment is the logarithm of its likelihood over that of an image without
+//! these landmarks: picture evidence, prior odds, and the density of the corners. Picture evidence
+//! has a floor of its own, which neither prior odds nor a good fit of the corners can make up for.
 //!
-//! The search is depth first with a bound on the score and visits at most [`MAX_NODES`] assignments. The order of
-//! observations, candidates and landmarks does not change the result.
+//! The search is depth first with a bound on the score and visits at most [`MAX_NODES`]
+//! assignments. The order of observations, candidates and landmarks does not change the result.
 
 mod params;
 mod observation;

@@ -1,12 +1,14 @@
-//! Predicts landmarks in an image from a prior pose, with the covariance of every corner and the visible part of
-//! each.
+//! Predicts landmarks in an image from a prior pose, with the covariance of every corner and the
+//! visible part of each.
 //!
-//! In: prior pose with covariance, camera, landmarks with their places, obstacles. Out: [`Expectations`], by landmark
-//! number. Corners are in the pixels of the image as it comes, lens distortion included.
+//! In: prior pose with covariance, camera, landmarks with their places, obstacles. Out:
+//! [`Expectations`], by landmark number. Corners are in the pixels of the image as it comes, lens
+//! distortion included.
 //!
-//! The covariance is first order in pose, place, extrinsics and intrinsics, plus the error of linearisation in the
-//! pose: the second moment of the linearisation error over fixed draws of the pose. Errors of prior and map are
-//! taken as independent, which is cautious where the prior rests on the same landmarks.
+//! The covariance is first order in pose, place, extrinsics and intrinsics, plus the error of
+//! linearisation in the pose: the second moment of the linearisation error over fixed draws of the
+//! pose. Errors of prior and map are taken as independent, which is cautious where the prior rests
+//! on the same landmarks.
 
 mod params;
 mod view;
@@ -31,12 +33,13 @@ use crate::{
 use std::collections::BTreeSet;
 use vision::{frame::MAX_SIDE_PX, geometry::polygon};
 
-/// Where each landmark is expected in the image from a prior pose. Landmarks behind the camera, outside of the image,
-/// viewed from behind, or farther than [`ExpectParams::max_range_m`] are left out; of two with one number the first
-/// counts.
+/// Where each landmark is expected in the image from a prior pose. Landmarks behind the camera,
+/// outside of the image, viewed from behind, or farther than [`ExpectParams::max_range_m`] are left
+/// out; of two with one number the first counts.
 ///
-/// Landmarks with a corner behind the camera plane, or where the lens cannot be modelled, are left out, too: their
-/// corners have no pixel. A place that is out of range of its type is an error where it is near enough to matter.
+/// Landmarks with a corner behind the camera plane, or where the lens cannot be modelled, are left
+/// out, too: their corners have no pixel. A place that is out of range of its type is an error
+/// where it is near enough to matter.
 pub fn expect(
     prior: &Pose2Covariance,
     view: &CameraView<'_>,

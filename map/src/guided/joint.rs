@@ -1,12 +1,14 @@
-//! The error that all observations of one frame share (pose, extrinsics, intrinsics), conditioned on observations one
-//! by one. The sum of the squared distances of the steps is the joint Mahalanobis distance of all innovations under
-//! their full covariance: Neira and Tardos 2001, computed without the stacked matrix.
+//! The error that all observations of one frame share (pose, extrinsics, intrinsics), conditioned
+//! on observations one by one. The sum of the squared distances of the steps is the joint
+//! Mahalanobis distance of all innovations under their full covariance: Neira and Tardos 2001,
+//! computed without the stacked matrix.
 
 use nalgebra::{SMatrix, SVector};
 
 /// Coordinates of four corners.
 const CORNERS: usize = 8;
-/// Common errors: pose (x, y, theta), extrinsics (rotation, translation), intrinsics (focal share, cx, cy).
+/// Common errors: pose (x, y, theta), extrinsics (rotation, translation), intrinsics (focal share,
+/// cx, cy).
 pub(super) const COMMON: usize = 12;
 
 pub(super) type CornerVector = SVector<f64, CORNERS>;
@@ -17,7 +19,8 @@ pub(super) type CommonMatrix = SMatrix<f64, COMMON, COMMON>;
 
 /// Most linearisations of one update; with a good prior one is enough.
 const MAX_ITERATIONS: usize = 5;
-/// An update is linear enough when what its derivative leaves over is less than this share of a standard deviation.
+/// An update is linear enough when what its derivative leaves over is less than this share of a
+/// standard deviation.
 const LINEAR_SIGMAS: f64 = 0.1;
 
 /// Predicted corners as a function of the common error.
@@ -49,9 +52,10 @@ impl CommonError {
         Self { mean: CommonVector::zeros(), covariance: *covariance }
     }
 
-    /// Conditions on observed corners with covariance `own` of the errors that are not shared: an iterated extended
-    /// Kalman update, so that a neighbour of the right landmark is not ruled out by linearisation alone. `None` if
-    /// it does not converge, the covariance is singular, or a number is not finite.
+    /// Conditions on observed corners with covariance `own` of the errors that are not shared: an
+    /// iterated extended Kalman update, so that a neighbour of the right landmark is not ruled out
+    /// by linearisation alone. `None` if it does not converge, the covariance is singular, or a
+    /// number is not finite.
     pub(super) fn update(
         &self,
         predicted: &impl Prediction,

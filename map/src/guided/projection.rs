@@ -1,4 +1,5 @@
-//! Corners of a landmark in an image as it comes, lens included, with their derivatives; the part that the image shows.
+//! Corners of a landmark in an image as it comes, lens included, with their derivatives; the part
+//! that the image shows.
 
 use super::joint::{ByCommon, CornerVector};
 use crate::{extrinsics::CameraExtrinsics, localise::predict, place::LandmarkPlace, pose2::Pose2};
@@ -65,7 +66,8 @@ pub(super) fn derivatives(
     Some((by_common, by_place))
 }
 
-/// Image corners from a pose, px. `None` when one is behind the camera or beyond what the lens model describes.
+/// Image corners from a pose, px. `None` when one is behind the camera or beyond what the lens
+/// model describes.
 pub(super) fn corners(pose: &Pose2, place: &LandmarkPlace, camera: &Camera<'_>) -> Option<[Point2<f64>; 4]> {
     project(&camera.camera_from_map(pose), &corners_m(place), camera.intrinsics)
 }

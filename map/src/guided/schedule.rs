@@ -1,18 +1,21 @@
-//! When the whole map must be searched although a pose is known, how far that pose is trusted, and when a global
-//! observation replaces it. A state machine over frames: no clock, no images.
+//! When the whole map must be searched although a pose is known, how far that pose is trusted, and
+//! when a global observation replaces it. A state machine over frames: no clock, no images.
 //!
-//! For each frame: [`Schedule::plan`] before recognition, [`GuidedReport::global_reason`] after guided recognition of
-//! the same frame, [`Schedule::finish`] at the end. What `finish` decides says how the frame's global fix goes to the
-//! fuser, [`Schedule::guided_corrects`] whether its guided fix does.
+//! For each frame: [`Schedule::plan`] before recognition, [`GuidedReport::global_reason`] after
+//! guided recognition of the same frame, [`Schedule::finish`] at the end. What `finish` decides
+//! says how the frame's global fix goes to the fuser, [`Schedule::guided_corrects`] whether its
+//! guided fix does.
 //!
-//! Only fixes from landmarks that were recognised in the whole map, without the pose, support a pose. Guided
-//! observations support nothing: in a row of identical doors they fit a pose that is wrong by one door as well as the
-//! right one. So they correct only a pose that has had support; otherwise they would make a wrong pose more certain.
+//! Only fixes from landmarks that were recognised in the whole map, without the pose, support a
+//! pose. Guided observations support nothing: in a row of identical doors they fit a pose that is
+//! wrong by one door as well as the right one. So they correct only a pose that has had support;
+//! otherwise they would make a wrong pose more certain.
 //!
-//! A pose with no support yet is replaced after [`ScheduleParams::unsupported_reset_fixes`] contradicting fixes that
-//! agree with one another. A pose that [`ScheduleParams::established_landmarks`] different landmarks support needs
-//! [`ScheduleParams::reset_fixes`] and two witnesses: two contradicting landmarks, or one and an expected landmark
-//! that is missing. One landmark that was moved must not move robots.
+//! A pose with no support yet is replaced after [`ScheduleParams::unsupported_reset_fixes`]
+//! contradicting fixes that agree with one another. A pose that
+//! [`ScheduleParams::established_landmarks`] different landmarks support needs
+//! [`ScheduleParams::reset_fixes`] and two witnesses: two contradicting landmarks, or one and an
+//! expected landmark that is missing. One landmark that was moved must not move robots.
 
 mod params;
 mod report;
@@ -85,21 +88,22 @@ impl Schedule {
         }
     }
 
-    /// Whether the guided fix of the last frame may go to the fuser (as `FixRole::Guided`): the pose has had support
-    /// and the frame does not contradict it.
+    /// Whether the guided fix of the last frame may go to the fuser (as `FixRole::Guided`): the
+    /// pose has had support and the frame does not contradict it.
     pub fn guided_corrects(&self) -> bool {
         self.was_supported && self.contradiction.is_none() && !self.was_replaced
     }
 
-    /// The pose was found by relocalisation from several observations of these landmarks: that is support.
+    /// The pose was found by relocalisation from several observations of these landmarks: that is
+    /// support.
     pub fn relocalised(&mut self, landmarks: &[LandmarkId]) {
         self.forget();
         self.has_pose = true;
         self.supported(landmarks);
     }
 
-    /// What to do with the next frame of a camera, taken near `prior`. Cameras are numbered by the caller; of more
-    /// than [`MAX_CAMERAS`] the others are searched every time.
+    /// What to do with the next frame of a camera, taken near `prior`. Cameras are numbered by the
+    /// caller; of more than [`MAX_CAMERAS`] the others are searched every time.
     pub fn plan(&self, camera: u32, prior: Option<&Pose2Covariance>) -> FramePlan {
         let p = &self.params;
         let Some(prior) = prior else {

@@ -1,15 +1,19 @@
-//! Which share of a landmark walls leave in view of a camera: lines of sight to a grid of points on its face.
+//! Which share of a landmark walls leave in view of a camera: lines of sight to a grid of points on
+//! its face.
 
 use crate::{place::LandmarkPlace, visibility::Obstacle};
 use nalgebra::{Point2, Point3, Vector2};
 
-/// Points of the grid along each side; they lie at these shares of width and height from the middle.
+/// Points of the grid along each side; they lie at these shares of width and height from the
+/// middle.
 const GRID: [f64; 3] = [-0.4, 0.0, 0.4];
-/// A crossing nearer than this to the camera or the landmark, as a share of the line of sight, hides nothing.
+/// A crossing nearer than this to the camera or the landmark, as a share of the line of sight,
+/// hides nothing.
 const END_SHARE: f64 = 1e-6;
 
-/// Share of the landmark's face, 0 to 1, to which no obstacle blocks the line of sight from `camera` (map frame,
-/// metres). The face is moved `standoff_m` off its wall, so that its own wall does not hide it.
+/// Share of the landmark's face, 0 to 1, to which no obstacle blocks the line of sight from
+/// `camera` (map frame, metres). The face is moved `standoff_m` off its wall, so that its own wall
+/// does not hide it.
 pub(super) fn unoccluded_share(
     camera: &Point3<f64>,
     place: &LandmarkPlace,

@@ -1,4 +1,5 @@
-//! A corridor with twelve identical doors and one poster, drawn with the errors that map, extrinsics and prior state.
+//! A corridor with twelve identical doors and one poster, drawn with the errors that map,
+//! extrinsics and prior state.
 
 mod associate;
 mod doors;

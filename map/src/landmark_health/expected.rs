@@ -36,8 +36,8 @@ pub struct MountedCamera<'a> {
     pub image_px: [f64; 2],
 }
 
-/// The landmarks that should be visible as a whole, not obliquely and well inside the image, everywhere within the
-/// uncertainty of the pose; by number.
+/// The landmarks that should be visible as a whole, not obliquely and well inside the image,
+/// everywhere within the uncertainty of the pose; by number.
 pub fn expected(
     pose: &Pose2Covariance,
     camera: &MountedCamera<'_>,

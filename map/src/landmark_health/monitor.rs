@@ -49,8 +49,8 @@ impl HealthMonitor {
         Self { params, landmarks: BTreeMap::new(), frames: 0 }
     }
 
-    /// Drops all evidence, since the robot's pose was wrong or the map is another one. Gives the landmarks whose
-    /// flags were raised by it.
+    /// Drops all evidence, since the robot's pose was wrong or the map is another one. Gives the
+    /// landmarks whose flags were raised by it.
     pub fn clear(&mut self) -> Vec<HealthChange> {
         let cleared = std::mem::take(&mut self.landmarks);
         let raised =
@@ -60,8 +60,9 @@ impl HealthMonitor {
             .collect()
     }
 
-    /// Adds one frame taken from `from`: place checks of the observed landmarks, and the expected landmarks that were
-    /// missed. `health` gives the present health of a landmark. Gives the changes, by landmark.
+    /// Adds one frame taken from `from`: place checks of the observed landmarks, and the expected
+    /// landmarks that were missed. `health` gives the present health of a landmark. Gives the
+    /// changes, by landmark.
     pub fn frame(
         &mut self,
         from: Point2<f64>,

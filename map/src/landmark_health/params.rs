@@ -7,13 +7,14 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct HealthParams {
-    /// Squared Mahalanobis distance beyond which a landmark is observed elsewhere: 99.9 % of chi2 with 3 degrees of
-    /// freedom.
+    /// Squared Mahalanobis distance beyond which a landmark is observed elsewhere: 99.9 % of chi2
+    /// with 3 degrees of freedom.
     pub moved_chi2: f64,
-    /// An observation confirms a place only if a displacement of this much would be detected, metres.
+    /// An observation confirms a place only if a displacement of this much would be detected,
+    /// metres.
     pub told_m: f64,
-    /// Supporting landmarks of a pose that may flag at once. With a single one either landmark may have moved: a
-    /// third must agree first.
+    /// Supporting landmarks of a pose that may flag at once. With a single one either landmark may
+    /// have moved: a third must agree first.
     pub supporters: usize,
     /// Observations elsewhere count together within this distance of the same place, metres.
     pub agree_m: f64,

@@ -30,8 +30,8 @@ pub enum PlaceVerdict {
         /// Number of other landmarks that support the pose.
         supporters: usize,
     },
-    /// It agrees with the pose, but from too far to detect a displacement. The pose is certain enough without it;
-    /// many such observations would pull the pose along.
+    /// It agrees with the pose, but from too far to detect a displacement. The pose is certain
+    /// enough without it; many such observations would pull the pose along.
     Unsure,
     /// The pose has no other supporting landmark, or the observation gave no fix.
     Undecided,
@@ -46,7 +46,8 @@ pub struct PlaceCheck {
     pub verdict: PlaceVerdict,
 }
 
-/// Checks an observed landmark by the robot's pose without it. `supporters` are the landmarks that support the pose.
+/// Checks an observed landmark by the robot's pose without it. `supporters` are the landmarks that
+/// support the pose.
 pub fn check_place(
     observation: &LandmarkObservation<'_>,
     mounting: &CameraExtrinsics,
@@ -117,8 +118,9 @@ fn apparent(
     (Pose2::new(t.x, t.y, normal.y.atan2(normal.x)), (t - place.translation.vector).norm())
 }
 
-/// The observations of one frame that may correct the pose: without unsure ones, and without those observed
-/// elsewhere, unless no other is left. Then they stay and the fusion decides, since the pose may be wrong.
+/// The observations of one frame that may correct the pose: without unsure ones, and without those
+/// observed elsewhere, unless no other is left. Then they stay and the fusion decides, since the
+/// pose may be wrong.
 pub fn drop_unreliable<'a>(
     observations: &[LandmarkObservation<'a>],
     checks: &[PlaceCheck],

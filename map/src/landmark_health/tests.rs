@@ -78,7 +78,8 @@ fn only_a_moved_landmark_is_observed_elsewhere() {
 
 #[test]
 fn a_distant_observation_is_unsure() {
-    // Straight ahead at 6 m, heading known to half a degree: a shift along the wall is half hidden in the heading.
+    // Straight ahead at 6 m, heading known to half a degree: a shift along the wall is half hidden
+    // in the heading.
     let place = LandmarkPlace { x_m: 7.2, ..poster(0.5, 1.5) };
     let sure =
         Pose2Covariance { covariance: Matrix3::from_diagonal(&Vector3::new(1e-4, 1e-4, 1e-4)), ..robot() };

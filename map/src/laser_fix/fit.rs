@@ -14,8 +14,8 @@ use nalgebra::{Matrix3, Matrix3x2, Point2, SymmetricEigen, Vector2, Vector3};
 
 /// Variance of an undetermined coordinate: (100 m)^2, and about pi^2 for the heading.
 const UNKNOWN: [f64; 3] = [1e4, 1e4, 10.0];
-/// A direction with a larger standard deviation counts as undetermined, metres: there the result is mostly the walls'
-/// own error.
+/// A direction with a larger standard deviation counts as undetermined, metres: there the result is
+/// mostly the walls' own error.
 const LEAST_M: f64 = 1.0;
 /// Metres that weigh as much as one radian.
 const LEVER_M: f64 = 3.0;
@@ -110,8 +110,8 @@ pub(super) fn descend(
     Some(LaserFix { pose, noise, walls: parts, matched, points: count, rms_m: variance.sqrt() })
 }
 
-/// The effect of the walls' own errors on the pose, each propagated through the fit; the largest first. Many points
-/// on one wall do not make its place more certain than the map says.
+/// The effect of the walls' own errors on the pose, each propagated through the fit; the largest
+/// first. Many points on one wall do not make its place more certain than the map says.
 fn by_walls(walls: &WallIndex, points: &[Matched], gain: &Matrix3<f64>) -> Vec<WallPart> {
     let mut order: Vec<usize> = (0..points.len()).collect();
     order.sort_by_key(|&i| points[i].wall);
@@ -121,7 +121,8 @@ fn by_walls(walls: &WallIndex, points: &[Matched], gain: &Matrix3<f64>) -> Vec<W
         let mut pull = Matrix3x2::zeros();
         for &i in group {
             let m = &points[i];
-            // A turn of the wall moves a point by its distance from the middle, an offset by the same everywhere.
+            // A turn of the wall moves a point by its distance from the middle, an offset by the
+            // same everywhere.
             pull += m.j * Vector2::new(m.along_m, 1.0).transpose() * m.weight;
         }
         let wall = &walls.walls[points[first].wall];
@@ -132,8 +133,8 @@ fn by_walls(walls: &WallIndex, points: &[Matched], gain: &Matrix3<f64>) -> Vec<W
     parts
 }
 
-/// The determined part of a covariance, as a projection, and the covariance of the rest: directions beyond
-/// [`LEAST_M`] count as undetermined.
+/// The determined part of a covariance, as a projection, and the covariance of the rest: directions
+/// beyond [`LEAST_M`] count as undetermined.
 fn known(covariance: &Matrix3<f64>) -> (Matrix3<f64>, Matrix3<f64>) {
     let lever = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, LEVER_M));
     let back = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, 1.0 / LEVER_M));
@@ -147,7 +148,8 @@ fn known(covariance: &Matrix3<f64>) -> (Matrix3<f64>, Matrix3<f64>) {
     (back * known * lever, back * unknown * back)
 }
 
-/// Covariance of an information that may be singular: undetermined coordinates have the variance [`UNKNOWN`].
+/// Covariance of an information that may be singular: undetermined coordinates have the variance
+/// [`UNKNOWN`].
 fn spread(information: &Matrix3<f64>) -> Option<Matrix3<f64>> {
     let floor = Matrix3::from_diagonal(&Vector3::from(UNKNOWN).map(|v| 1.0 / v));
     let made = (information + floor).cholesky()?.inverse();

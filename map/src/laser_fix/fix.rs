@@ -12,9 +12,11 @@ const AREA_M: f64 = 10.0;
 /// The robot's pose by one scan.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LaserFix {
-    /// `map_from_robot`, without the prior; the standard deviation is about 100 m where the walls determine nothing.
+    /// `map_from_robot`, without the prior; the standard deviation is about 100 m where the walls
+    /// determine nothing.
     pub pose: Pose2Covariance,
-    /// The part of the covariance that is independent in every scan; the rest is the walls' own error.
+    /// The part of the covariance that is independent in every scan; the rest is the walls' own
+    /// error.
     pub noise: Matrix3<f64>,
     /// The walls that affect it most.
     pub walls: Vec<WallPart>,
@@ -27,8 +29,9 @@ pub struct LaserFix {
 }
 
 impl LaserFix {
-    /// The fix for [`crate::fuse::Fuser::apply_fix`]: it rests on no landmark and cannot start or replace a pose. The
-    /// errors of the most important walls are named one by one, those of all others as one for the place.
+    /// The fix for [`crate::fuse::Fuser::apply_fix`]: it rests on no landmark and cannot start or
+    /// replace a pose. The errors of the most important walls are named one by one, those of all
+    /// others as one for the place.
     pub fn fix(&self) -> Fix {
         let named = self.walls.iter().map(|part| {
             let mut jacobian = Matrix3x6::zeros();
@@ -68,7 +71,8 @@ impl LaserFix {
 /// The effect of one wall's error on a fix.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WallPart {
-    /// Hash of the wall's ends: the same in every scan, and in every version of a map that keeps the wall.
+    /// Hash of the wall's ends: the same in every scan, and in every version of a map that keeps
+    /// the wall.
     pub wall: u64,
     /// Derivative of (x, y, theta) by the wall's (direction, offset) about its middle.
     pub by_wall: Matrix3x2<f64>,

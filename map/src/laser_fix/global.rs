@@ -1,8 +1,8 @@
-//! Localisation in a finished map of walls by one scan without any prior. In: walls and a scan. Out: every pose that matches as
-//! well as the best one, with its covariance, or a refusal.
+//! Localisation in a finished map of walls by one scan without any prior. In: walls and a scan.
+//! Out: every pose that matches as well as the best one, with its covariance, or a refusal.
 //!
-//! Poses on a grid over the map are scored by how many points of the scan have a wall near by; the best are refined as in
-//! [`super::laser_fix`].
+//! Poses on a grid over the map are scored by how many points of the scan have a wall near by; the
+//! best are refined as in [`super::laser_fix`].
 
 use crate::{
     check::OutOfRange,
@@ -61,8 +61,8 @@ struct Start {
     score: usize,
 }
 
-/// The poses of the robot when it took `scan`, best first: one where the walls tell, several where they look alike. `stop` is
-/// asked now and then. Errors name an input that is out of range.
+/// The poses of the robot when it took `scan`, best first: one where the walls tell, several where
+/// they look alike. `stop` is asked now and then. Errors name an input that is out of range.
 pub fn global_laser_fixes(
     walls: &WallIndex,
     scan: &Scan,
@@ -181,7 +181,8 @@ fn scored(
     Some(starts)
 }
 
-/// Position and normal of a few points, the near ones first where there are enough, and spread over the scan.
+/// Position and normal of a few points, the near ones first where there are enough, and spread over
+/// the scan.
 fn scoring_points(cloud: &Cloud) -> Vec<[Vector2<f64>; 2]> {
     let all: Vec<_> = cloud.points.iter().filter_map(|q| Some([q.at.coords, q.normal?])).collect();
     let near: Vec<_> = all.iter().filter(|[at, _]| at.norm() <= SCORING_RANGE_M).copied().collect();
@@ -235,7 +236,8 @@ mod tests {
         let poses = [Pose2::new(1.0, 6.0, 1.4), Pose2::new(5.7, 1.2, 0.3), Pose2::new(16.0, 15.0, 3.0)];
         for (seed, at) in poses.iter().enumerate() {
             let found = search(&ring(), at, seed as u64).unwrap();
-            // Half a turn of a scan looks the same from many places of these corridors: the right one is among the best.
+            // Half a turn of a scan looks the same from many places of these corridors: the right
+            // one is among the best.
             let right = found.iter().filter(|fix| error(fix, at).0 < 0.1 && error(fix, at).1 < 0.05);
             let all: Vec<Pose2> = found.iter().map(|fix| fix.pose.pose).collect();
             assert!(right.count() == 1 && all.len() <= MAX_POSES, "{at:?}: {all:?}");

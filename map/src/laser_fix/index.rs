@@ -1,5 +1,5 @@
-//! An index of a map's walls: the wall nearest to a point, by buckets of the floor. In: segments. Out: the index,
-//! made once for each version of the walls.
+//! An index of a map's walls: the wall nearest to a point, by buckets of the floor. In: segments.
+//! Out: the index, made once for each version of the walls.
 
 use crate::{segments::LaserSegment, walls::local};
 use nalgebra::{Matrix2, Point2, Vector2};
@@ -79,7 +79,8 @@ impl WallIndex {
     fn fill(&mut self) {
         let mut pairs: Vec<(u32, u32)> = Vec::new();
         for (i, wall) in self.walls.iter().enumerate() {
-            // Points half a bucket apart, each with its neighbours: nothing nearer than a bucket is missed.
+            // Points half a bucket apart, each with its neighbours: nothing nearer than a bucket is
+            // missed.
             let steps = (2.0 * wall.length_m / self.bucket_m).ceil() as usize + 1;
             for k in 0..=steps {
                 let p = wall.a + wall.along * (wall.length_m * k as f64 / steps as f64);
@@ -118,8 +119,8 @@ impl WallIndex {
         self.walls.is_empty()
     }
 
-    /// The wall nearest to a point within the radius whose direction differs from the surface by less than `cos_turn`
-    /// says.
+    /// The wall nearest to a point within the radius whose direction differs from the surface by
+    /// less than `cos_turn` says.
     pub(super) fn nearest(
         &self,
         p: &Point2<f64>,

@@ -26,13 +26,15 @@ pub struct LaserFixParams {
     pub outlier_m: f64,
     /// Number of points with a common error; the information is divided by it.
     pub correlated: f64,
-    /// Smallest standard deviations, whatever the number of points: position, metres, and heading, radians.
+    /// Smallest standard deviations, whatever the number of points: position, metres, and heading,
+    /// radians.
     pub floor: [f64; 2],
     /// Least number of points with a wall.
     pub min_points: usize,
     /// Least share of points with a wall, 0 to 1.
     pub min_matched: f64,
-    /// Gate on the squared Mahalanobis distance to the prior: 99.9 % of chi2 with 3 degrees of freedom.
+    /// Gate on the squared Mahalanobis distance to the prior: 99.9 % of chi2 with 3 degrees of
+    /// freedom.
     pub prior_gate: f64,
     /// A prior with a larger standard deviation is tried from several starts, metres,
     pub wide_m: f64,

@@ -17,7 +17,8 @@ use nalgebra::{SymmetricEigen, Vector3};
 /// Most points of a scan; more are thinned evenly.
 const MAX_POINTS: usize = 360;
 
-/// The pose of the robot when it took `scan`, near `prior`. Errors name an input that is out of range.
+/// The pose of the robot when it took `scan`, near `prior`. Errors name an input that is out of
+/// range.
 pub fn laser_fix(
     walls: &WallIndex,
     scan: &Scan,

@@ -63,7 +63,8 @@ fn the_covariance_of_the_pose_is_consistent() {
 
 #[test]
 fn walls_with_wide_covariances_widen_the_fix() {
-    // Oracle: in each draw every wall of the map is off by its covariance about its middle, 3 cm and 3 mrad.
+    // Oracle: in each draw every wall of the map is off by its covariance about its middle, 3 cm
+    // and 3 mrad.
     let sigmas = Vector2::new(0.003, 0.03);
     let about = Matrix2::from_diagonal(&sigmas.component_mul(&sigmas));
     let (mut sum, mut as_by_hand, mut n) = (0.0, 0.0, 0);

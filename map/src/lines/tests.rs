@@ -50,8 +50,8 @@ fn a_room_gives_its_walls() {
         pieces[wall] += 1;
         assert!(s.facing().dot(&(Point2::new(pose.x_m, pose.y_m) - s.a)) > 0.0, "free side");
     }
-    // The pillar hides the middle of the far walls: they come in up to two pieces. The wall behind is out of the fan
-    // but for its ends.
+    // The pillar hides the middle of the far walls: they come in up to two pieces. The wall behind
+    // is out of the fan but for its ends.
     assert!(
         pieces[0] == 1 && pieces[4] == 1 && (1..=2).contains(&pieces[1]) && (1..=2).contains(&pieces[2]),
         "{pieces:?}"
@@ -118,7 +118,8 @@ fn covariance_agrees_with_monte_carlo() {
 
 #[test]
 fn merging_compares_lines_in_common_coordinates() {
-    // Two pieces of one noisy wall, far apart along it, have covariances that only fit in common coordinates.
+    // Two pieces of one noisy wall, far apart along it, have covariances that only fit in common
+    // coordinates.
     let mut random = Random::new(5);
     let mut merged = 0;
     for _ in 0..300 {

@@ -1,9 +1,11 @@
-//! The pose in space of a camera that is held in a hand, from the landmarks of one photograph (method 13.8). In:
-//! observations of landmarks of known place. Out: `map_from_camera` with its covariance, or why there is none.
+//! The pose in space of a camera that is held in a hand, from the landmarks of one photograph
+//! (method 13.8). In: observations of landmarks of known place. Out: `map_from_camera` with its
+//! covariance, or why there is none.
 //!
-//! Nothing is assumed of the mounting: one landmark alone determines the pose, but its direction poorly. Several determine
-//! it together: all corners are fitted at once, with the errors of each landmark's place and of the intrinsics, which
-//! they share, in the weights. A landmark that contradicts at least two others, and most of them, is left out.
+//! Nothing is assumed of the mounting: one landmark alone determines the pose, but its direction
+//! poorly. Several determine it together: all corners are fitted at once, with the errors of each
+//! landmark's place and of the intrinsics, which they share, in the weights. A landmark that
+//! contradicts at least two others, and most of them, is left out.
 
 use crate::{
     check::{self, OutOfRange},
@@ -23,8 +25,9 @@ use vision::{
 
 /// Heights above the floor, metres, at which a camera is accepted.
 const CAMERA_HEIGHT_M: std::ops::RangeInclusive<f64> = 0.0..=5.0;
-/// Largest standard deviation of the position, metres (root of the trace), that is accepted: beyond it the pose says
-/// in which room the camera is, and hardly more. Chosen on photoreal worlds 1 to 14.
+/// Largest standard deviation of the position, metres (root of the trace), that is accepted: beyond
+/// it the pose says in which room the camera is, and hardly more. Chosen on photoreal worlds 1
+/// to 14.
 const MAX_POSITION_SIGMA_M: f64 = 0.15;
 /// Two minima whose chi2 differs by less are ambiguous: see [`vision::pose::AMBIGUOUS_CHI2`].
 const AMBIGUOUS_CHI2: f64 = 16.0;
@@ -38,7 +41,8 @@ const MIN_AGREEING: usize = 2;
 pub struct CameraPose {
     /// Camera coordinates (x right, y down, z forward) to map coordinates, metres.
     pub map_from_camera: Isometry3<f64>,
-    /// Covariance of (rotation vector, position), map frame: corners, place and size of the landmark, intrinsics.
+    /// Covariance of (rotation vector, position), map frame: corners, place and size of the
+    /// landmark, intrinsics.
     pub covariance: Matrix6<f64>,
     /// The landmarks that give the pose.
     pub landmarks: Vec<LandmarkId>,
@@ -49,15 +53,18 @@ pub struct CameraPose {
 pub enum CameraPoseRefusal {
     /// Two poses fit and nothing decides between them.
     Ambiguous,
-    /// Every pose has the camera below the floor or more than 5 m above it: place or size of the landmark is wrong.
+    /// Every pose has the camera below the floor or more than 5 m above it: place or size of the
+    /// landmark is wrong.
     Height,
     /// The landmarks contradict one another.
     Disagree,
-    /// The corners determine the position worse than to 15 cm: too far away, too small, or seen from the front.
+    /// The corners determine the position worse than to 15 cm: too far away, too small, or seen
+    /// from the front.
     Imprecise,
 }
 
-/// The camera's pose from the landmarks of one photograph. Errors name a number that is out of range.
+/// The camera's pose from the landmarks of one photograph. Errors name a number that is out of
+/// range.
 pub fn camera_pose(
     observations: &[LandmarkObservation<'_>],
 ) -> Result<Result<CameraPose, CameraPoseRefusal>, OutOfRange> {
@@ -111,7 +118,8 @@ fn by_one(observation: &LandmarkObservation<'_>) -> Result<CameraPose, CameraPos
     }
 }
 
-/// The pose that fits all landmarks; or why there is none, with the one that fits worst where they disagree.
+/// The pose that fits all landmarks; or why there is none, with the one that fits worst where they
+/// disagree.
 fn by_several(
     observations: &[LandmarkObservation<'_>],
 ) -> Result<CameraPose, (CameraPoseRefusal, Option<usize>)> {
@@ -175,8 +183,8 @@ fn candidate(solution: &PoseSolution, place: &LandmarkPlace) -> Candidate {
     Candidate { pose, covariance }
 }
 
-/// Derivative of (rotation vector, position) of the camera in the map by the left perturbation of `camera_from_other`, the
-/// inverse of its pose up to a fixed transform of the other frame.
+/// Derivative of (rotation vector, position) of the camera in the map by the left perturbation of
+/// `camera_from_other`, the inverse of its pose up to a fixed transform of the other frame.
 fn by_camera_from(camera_from_other: &Isometry3<f64>, map_from_camera: &Isometry3<f64>) -> Matrix6<f64> {
     let turn = map_from_camera.rotation.to_rotation_matrix().into_inner();
     let mut by_seen = Matrix6::zeros();
@@ -186,8 +194,9 @@ fn by_camera_from(camera_from_other: &Isometry3<f64>, map_from_camera: &Isometry
     by_seen
 }
 
-/// Derivative of (rotation vector, position) of the camera by (x, y, theta, z, width, height) of the landmark. A landmark
-/// that is larger by a share puts the camera farther away by that share; width and height count for half each.
+/// Derivative of (rotation vector, position) of the camera by (x, y, theta, z, width, height) of
+/// the landmark. A landmark that is larger by a share puts the camera farther away by that share;
+/// width and height count for half each.
 fn by_place(place: &LandmarkPlace, camera: &Translation3<f64>, centre: &Translation3<f64>) -> Matrix6<f64> {
     let arm = camera.vector - centre.vector;
     let mut by_place = Matrix6::zeros();

@@ -3,7 +3,8 @@
 use nalgebra::{Matrix3, Matrix3x6, SMatrix, Vector3};
 use vision::pose::LandmarkSize;
 
-/// Camera coordinates of a map point by (x, y, theta) of the robot; `from_robot` = point - robot, map axes.
+/// Camera coordinates of a map point by (x, y, theta) of the robot; `from_robot` = point - robot,
+/// map axes.
 pub(super) fn point_by_pose(camera_from_map: &Matrix3<f64>, from_robot: &Vector3<f64>) -> Matrix3<f64> {
     let turn = Vector3::z().cross(from_robot);
     -camera_from_map * Matrix3::from_columns(&[Vector3::x(), Vector3::y(), turn])
@@ -22,8 +23,8 @@ pub(super) fn point_by_place(
     Matrix3x6::from_columns(&[Vector3::x(), Vector3::y(), turn, Vector3::z(), wider, higher])
 }
 
-/// Camera coordinates of a robot point by the mounting's (rotation, translation); `from_camera` = point - camera,
-/// robot axes.
+/// Camera coordinates of a robot point by the mounting's (rotation, translation); `from_camera` =
+/// point - camera, robot axes.
 pub(super) fn point_by_mounting(
     camera_from_robot: &Matrix3<f64>,
     from_camera: &Vector3<f64>,

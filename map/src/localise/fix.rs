@@ -15,27 +15,30 @@ pub struct LandmarkObservation<'a> {
     pub place: &'a LandmarkPlace,
 }
 
-/// A nuisance parameter: an error that several fixes share. A filter that takes it as independent becomes
-/// overconfident.
+/// A nuisance parameter: an error that several fixes share. A filter that takes it as independent
+/// becomes overconfident.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum NuisanceKey {
     /// Place and size of a landmark: (x, y, theta, z, width, height).
     Landmark(LandmarkId),
     /// Extrinsics of the camera: left perturbation (rotation, translation), robot frame.
     Extrinsics,
-    /// Intrinsics of the camera: the first three of six are the errors of the focal length (as a share) and of the
-    /// principal point (px).
+    /// Intrinsics of the camera: the first three of six are the errors of the focal length (as a
+    /// share) and of the principal point (px).
     Camera,
-    /// One wall, by the hash of its ends: the first two of six are the errors of its direction and offset.
+    /// One wall, by the hash of its ends: the first two of six are the errors of its direction and
+    /// offset.
     Wall(u64),
-    /// All other walls of a square of the floor: the first three of six are unit errors of (x, y, theta).
+    /// All other walls of a square of the floor: the first three of six are unit errors of (x, y,
+    /// theta).
     Walls(i32, i32),
-    /// Error of a fix source in a pose cell beyond its claimed covariance, by reference runs: the first three of six
-    /// are unit errors of (x, y, theta).
+    /// Error of a fix source in a pose cell beyond its claimed covariance, by reference runs: the
+    /// first three of six are unit errors of (x, y, theta).
     Area(FixSource, PoseCell),
 }
 
-/// Effect of a nuisance parameter on a fix: `estimated - true pose = jacobian * (true - assumed value)`.
+/// Effect of a nuisance parameter on a fix:
+/// `estimated - true pose = jacobian * (true - assumed value)`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Nuisance {
     /// The nuisance parameter.
@@ -51,7 +54,8 @@ pub struct Nuisance {
 pub enum AmbiguityResolvedBy {
     /// There was one solution only.
     Single,
-    /// The corners and the known extrinsics (camera height, tilt, no roll): the other solution does not fit them.
+    /// The corners and the known extrinsics (camera height, tilt, no roll): the other solution does
+    /// not fit them.
     Image,
     /// The prior pose.
     Prior,
@@ -62,7 +66,8 @@ pub enum AmbiguityResolvedBy {
 pub enum FixSource {
     /// Recognised landmarks.
     Landmarks,
-    /// A scan, matched to the map's walls near a known pose: it corrects a pose and never starts one.
+    /// A scan, matched to the map's walls near a known pose: it corrects a pose and never starts
+    /// one.
     Laser,
 }
 
@@ -90,10 +95,11 @@ pub struct Fix {
 /// Why recognised landmarks gave no pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum FixRefusal {
-    // Departs from method 13.6, which gates |z|, |roll| and |pitch| of the pose in space. These are the same
-    // residuals, weighted by the information of the corners, which is small from afar and large from near.
-    /// Re-projection error above the gate for every floor pose: camera height, tilt or the landmark's place is
-    /// wrong.
+    // Departs from method 13.6, which gates |z|, |roll| and |pitch| of the pose in space. These are
+    // the same residuals, weighted by the information of the corners, which is small from afar and
+    // large from near.
+    /// Re-projection error above the gate for every floor pose: camera height, tilt or the
+    /// landmark's place is wrong.
     ReprojectionError {
         /// Weighted squared residual of the best solution.
         chi2: f64,

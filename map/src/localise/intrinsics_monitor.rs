@@ -1,7 +1,8 @@
 //! Intrinsics monitor: residual statistics of fixes that expose wrong intrinsics (method 16).
 //!
-//! In: each fix with its observations, and each refusal. Out: the error of the focal length, the fit of the corners,
-//! and a suspicion with its value. It changes nothing; a suspect camera must be calibrated again by a person.
+//! In: each fix with its observations, and each refusal. Out: the error of the focal length, the
+//! fit of the corners, and a suspicion with its value. It changes nothing; a suspect camera must be
+//! calibrated again by a person.
 
 use crate::{
     extrinsics::CameraExtrinsics,
@@ -59,8 +60,8 @@ impl Default for IntrinsicsMonitorParams {
     }
 }
 
-/// Evidence of one fix on the focal length: derivative and curvature of half its chi2 by the logarithm of the focal
-/// length, the pose refitted.
+/// Evidence of one fix on the focal length: derivative and curvature of half its chi2 by the
+/// logarithm of the focal length, the pose refitted.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FocalEvidence {
     /// Negative derivative: positive where a longer focal length fits better.
@@ -75,7 +76,8 @@ pub fn focal_evidence(
     mounting: &CameraExtrinsics,
     pose: &Pose2,
 ) -> Option<FocalEvidence> {
-    // Without the stated uncertainty of the intrinsics: it would absorb the error that is estimated here.
+    // Without the stated uncertainty of the intrinsics: it would absorb the error that is estimated
+    // here.
     let problem = Planar::new(observations, mounting).exact_camera();
     let at = problem.linearise(pose)?;
     let weight = problem.weight(&at)?;
@@ -179,7 +181,8 @@ impl IntrinsicsMonitor {
         self.tries = self.tries.saturating_add(1);
         self.chi2 += fix.chi2;
         self.dof += fix.dof as f64;
-        // The evidence of a frame with several landmarks counts for the first: they are observed together.
+        // The evidence of a frame with several landmarks counts for the first: they are observed
+        // together.
         let (Some(evidence), Some(landmark)) = (evidence, fix.landmarks.first()) else { return };
         if self.landmarks.len() >= MAX_WATCHED && !self.landmarks.contains_key(landmark) {
             return;
@@ -211,7 +214,8 @@ impl IntrinsicsMonitor {
         }
     }
 
-    /// Error of the focal length and its standard deviation: mean over landmarks, each limited to a few observations.
+    /// Error of the focal length and its standard deviation: mean over landmarks, each limited to a
+    /// few observations.
     fn focal(&self) -> Option<(f64, f64)> {
         let (mut gradient, mut information) = (0.0, 0.0);
         for sum in self.landmarks.values() {
@@ -264,8 +268,8 @@ mod tests {
 
     const SIZE: LandmarkSize = LandmarkSize { width_m: 0.6, height_m: 0.84 };
 
-    /// State after a robot has observed six posters from many viewpoints by a camera of focal length `true_px`,
-    /// stated as 600. Places and extrinsics have errors by their covariances.
+    /// State after a robot has observed six posters from many viewpoints by a camera of focal
+    /// length `true_px`, stated as 600. Places and extrinsics have errors by their covariances.
     fn monitored(true_px: f64, frames: usize, seed: u64) -> IntrinsicsMonitorState {
         let mut random = Random::new(seed);
         let said = Intrinsics::new(600.0, 600.0, 320.0, 240.0, Distortion::None).unwrap();

@@ -1,6 +1,6 @@
-//! The least-squares problem of one frame: corners of all observations as a function of the robot's floor pose, and
-//! the descent to the nearest minimum (method 13.6 [M] (b)). Nuisance parameters (places, extrinsics, intrinsics)
-//! enter the weights.
+//! The least-squares problem of one frame: corners of all observations as a function of the robot's
+//! floor pose, and the descent to the nearest minimum (method 13.6 [M] (b)). Nuisance parameters
+//! (places, extrinsics, intrinsics) enter the weights.
 
 use crate::{
     extrinsics::CameraExtrinsics,
@@ -22,7 +22,8 @@ pub(super) const MAX_STEPS: usize = 40;
 /// A step below this (metres and radians) ends it.
 const STEP_TOLERANCE: f64 = 1e-10;
 
-/// Residuals and their derivative by the pose; two rows for each corner, eight for each observation.
+/// Residuals and their derivative by the pose; two rows for each corner, eight for each
+/// observation.
 pub(super) struct PoseLinearisation {
     /// Measured minus predicted, px.
     pub residual: DVector<f64>,
@@ -60,7 +61,8 @@ pub(super) struct Planar<'a> {
     observations: &'a [LandmarkObservation<'a>],
     mounting: &'a CameraExtrinsics,
     camera_from_robot: Isometry3<f64>,
-    /// Standard deviations of the camera's intrinsics, if they are stated; all observations are by one camera.
+    /// Standard deviations of the camera's intrinsics, if they are stated; all observations are by
+    /// one camera.
     camera: Option<Vector3<f64>>,
     /// Corners of each landmark, map frame.
     corners_m: Vec<[Vector3<f64>; 4]>,
@@ -106,8 +108,8 @@ impl<'a> Planar<'a> {
         centre(self.observations.iter().map(|s| s.place))
     }
 
-    /// Keys and covariances of the nuisance parameters: each landmark, the extrinsics, then the intrinsics unless
-    /// exact.
+    /// Keys and covariances of the nuisance parameters: each landmark, the extrinsics, then the
+    /// intrinsics unless exact.
     pub(super) fn nuisances(&self) -> Vec<(NuisanceKey, Matrix6<f64>)> {
         let places =
             self.observations.iter().map(|s| (NuisanceKey::Landmark(s.landmark), s.place.covariance));
@@ -126,7 +128,8 @@ impl<'a> Planar<'a> {
             * self.observations[i].place.map_from_landmark()
     }
 
-    /// Robot pose on the floor for a `camera_from_landmark` of observation `i`, and the pose in space.
+    /// Robot pose on the floor for a `camera_from_landmark` of observation `i`, and the pose in
+    /// space.
     pub(super) fn robot_from_observation(
         &self,
         i: usize,
@@ -174,8 +177,8 @@ impl<'a> Planar<'a> {
             by_nuisance.view_mut((8 * i, 6 * n), (8, 6)).copy_from(&predicted.mounting);
             if self.camera.is_some() {
                 for (c, by_camera) in observation.seen.measured.by_camera.iter().enumerate() {
-                    // The residual is measured minus predicted, so the derivative of the measured corner changes its
-                    // sign.
+                    // The residual is measured minus predicted, so the derivative of the measured
+                    // corner changes its sign.
                     by_nuisance.view_mut((8 * i + 2 * c, 6 * (n + 1)), (2, 3)).copy_from(&-by_camera);
                 }
             }

@@ -1,18 +1,23 @@
-//! What the walls of a map say against a pose by landmarks (method 13.8). In: where the camera is, the landmarks that say
-//! so, and the walls. Out: cautions, none of which takes the pose back: walls may be of glass, low, or not in the map.
+//! What the walls of a map say against a pose by landmarks (method 13.8). In: where the camera is,
+//! the landmarks that say so, and the walls. Out: cautions, none of which takes the pose back:
+//! walls may be of glass, low, or not in the map.
 
 use crate::segments::LaserSegment;
 use nalgebra::{Point2, Vector2};
 
-/// Of the way to a landmark, what is not looked at before it, metres: places and walls are known to some centimetres.
+/// Of the way to a landmark, what is not looked at before it, metres: places and walls are known to
+/// some centimetres.
 const BEFORE_LANDMARK_M: f64 = 0.2;
-/// Least distance from the camera at which a wall counts, metres; more where the pose is known worse.
+/// Least distance from the camera at which a wall counts, metres; more where the pose is known
+/// worse.
 const BEFORE_CAMERA_M: f64 = 0.1;
-/// Least distance beyond the walls at which a camera is outside, metres; more where the pose is known worse.
+/// Least distance beyond the walls at which a camera is outside, metres; more where the pose is
+/// known worse.
 const BEYOND_M: f64 = 0.3;
 /// Standard deviations of the pose that count as its error.
 const SIGMAS: f64 = 3.0;
-/// Least area that walls surround, square metres: a map with fewer walls tells nothing of its outside.
+/// Least area that walls surround, square metres: a map with fewer walls tells nothing of its
+/// outside.
 const MIN_AREA_M2: f64 = 4.0;
 
 /// Something that speaks against a pose.
@@ -34,8 +39,8 @@ impl PoseCaution {
     }
 }
 
-/// The cautions of a camera at `at_m`, known to `sigma_m`, by landmarks with these centres (map frame, metres). Empty
-/// without walls.
+/// The cautions of a camera at `at_m`, known to `sigma_m`, by landmarks with these centres (map
+/// frame, metres). Empty without walls.
 pub fn pose_cautions(
     at_m: &Point2<f64>,
     sigma_m: f64,
@@ -68,8 +73,8 @@ fn crosses(p: [Point2<f64>; 2], q: [Point2<f64>; 2]) -> bool {
     splits(p, q) && splits(q, p)
 }
 
-/// Distance by which a point is beyond the convex hull of the walls, at least; negative within. `None` where they surround
-/// too little.
+/// Distance by which a point is beyond the convex hull of the walls, at least; negative within.
+/// `None` where they surround too little.
 fn beyond_m(at_m: &Point2<f64>, walls: &[LaserSegment]) -> Option<f64> {
     let hull = hull(walls.iter().flat_map(|wall| [wall.a, wall.b]).collect());
     let next = |i: usize| hull[(i + 1) % hull.len()];
@@ -148,7 +153,8 @@ mod tests {
 
     #[test]
     fn a_pose_mirrored_by_its_wall_is_outside_of_the_map() {
-        // The landmark hangs on the wall y = 6 and faces the room; somebody said that it faces away.
+        // The landmark hangs on the wall y = 6 and faces the room; somebody said that it faces
+        // away.
         assert_eq!(told([4.5, 8.0], 0.02, [4.0, 6.0]), [PoseCaution::OutsideMap]);
         assert_eq!(told([4.5, 6.2], 0.02, [4.0, 6.0]), [], "walls are known to some centimetres");
         assert_eq!(told([4.5, 6.5], 0.3, [4.0, 6.0]), [], "so badly known that it may be inside");

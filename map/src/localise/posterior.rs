@@ -1,9 +1,9 @@
 //! Mean and covariance of the robot's pose around a minimum, by quadrature over the heading.
 //!
-//! From the front, a plane determines its direction poorly, and chi2 is not quadratic in it. The covariance at the
-//! minimum is then several times too small (mean NEES 10 instead of 3 at 6 m, by the Monte Carlo test of this
-//! module). The robot is turned around the landmarks in steps, its position refitted at each; the weighted samples
-//! give the first two moments.
+//! From the front, a plane determines its direction poorly, and chi2 is not quadratic in it. The
+//! covariance at the minimum is then several times too small (mean NEES 10 instead of 3 at 6 m, by
+//! the Monte Carlo test of this module). The robot is turned around the landmarks in steps, its
+//! position refitted at each; the weighted samples give the first two moments.
 //!
 //! Departs from method 13.6, which takes the covariance to first order.
 
@@ -40,8 +40,9 @@ struct Sample {
     position: Matrix2<f64>,
 }
 
-/// Moments of `exp(-chi2 / 2)` around the minimum `at`, no farther than `limit_rad` (signed turns) on each side: the
-/// border to another minimum. `sigma_rad` is the heading's standard deviation by linearisation.
+/// Moments of `exp(-chi2 / 2)` around the minimum `at`, no farther than `limit_rad` (signed turns)
+/// on each side: the border to another minimum. `sigma_rad` is the heading's standard deviation by
+/// linearisation.
 pub(super) fn moments(
     problem: &Planar<'_>,
     at: &Pose2,

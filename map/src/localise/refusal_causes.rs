@@ -1,6 +1,7 @@
-//! Which number explains that landmarks fit no floor pose (method 13.7). In: the observations of a refused fix, extrinsics,
-//! an optional prior pose. Out: the numbers that make them fit if they are changed, each by itself: the size of a landmark,
-//! the height or the tilt of the camera; with the value that fits best and its standard deviation.
+//! Which number explains that landmarks fit no floor pose (method 13.7). In: the observations of a
+//! refused fix, extrinsics, an optional prior pose. Out: the numbers that make them fit if they are
+//! changed, each by itself: the size of a landmark, the height or the tilt of the camera; with the
+//! value that fits best and its standard deviation.
 
 use crate::{
     extrinsics::CameraExtrinsics,
@@ -40,8 +41,8 @@ pub enum FixQuantity {
     CameraHeight,
     /// Angle of the camera's axis above the horizon, radians.
     CameraTilt,
-    /// The extrinsics as a whole, or the landmark's place: no other quantity alone explains the corners. The value is the root
-    /// mean square of the re-projection error, pixels.
+    /// The extrinsics as a whole, or the landmark's place: no other quantity alone explains the
+    /// corners. The value is the root mean square of the re-projection error, pixels.
     Mounting,
 }
 
@@ -58,8 +59,9 @@ pub struct RefusalCause {
     pub sigma: f64,
 }
 
-/// The causes of a refusal by re-projection error, the likeliest first. Causes that cannot be told apart are all there: one
-/// landmark of another size at another distance looks the same at another height. A prior pose tells them apart.
+/// The causes of a refusal by re-projection error, the likeliest first. Causes that cannot be told
+/// apart are all there: one landmark of another size at another distance looks the same at another
+/// height. A prior pose tells them apart.
 pub fn refusal_causes(
     observations: &[LandmarkObservation<'_>],
     mounting: &CameraExtrinsics,
@@ -80,8 +82,8 @@ pub fn refusal_causes(
     if causes.is_empty() { search.unexplained().into_iter().collect() } else { causes }
 }
 
-/// What is changed: the size of an observed landmark by the exponential of the value, the camera's height (m) or tilt (rad)
-/// by the value.
+/// What is changed: the size of an observed landmark by the exponential of the value, the camera's
+/// height (m) or tilt (rad) by the value.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Change {
     Size(usize),
@@ -219,7 +221,8 @@ impl Search<'_> {
         starts
     }
 
-    /// Levenberg-Marquardt over the pose and the value; the end, and the standard deviation of the value.
+    /// Levenberg-Marquardt over the pose and the value; the end, and the standard deviation of the
+    /// value.
     fn fit(&self, change: Change, pose: Pose2, value: f64) -> Option<(State, f64)> {
         let (mut pose, mut value) = (pose, value);
         // The weight depends a little on the pose: refresh it once.
@@ -327,7 +330,8 @@ impl Search<'_> {
     }
 }
 
-/// Squared Mahalanobis distance of a pose to the prior; infinite where its covariance is impossible.
+/// Squared Mahalanobis distance of a pose to the prior; infinite where its covariance is
+/// impossible.
 fn distance2(pose: &Pose2, prior: &Pose2Covariance) -> f64 {
     let off = prior.pose.minus(pose);
     prior.covariance.cholesky().map_or(f64::INFINITY, |c| off.dot(&c.solve(&off)))

@@ -13,7 +13,8 @@ use crate::{
 };
 use nalgebra::{DMatrix, Isometry3, Matrix3, Matrix3x6, Rotation3, UnitQuaternion, Vector3};
 
-/// Two minima nearer than this (metres and radians) are one; a descent that comes so near to one stops.
+/// Two minima nearer than this (metres and radians) are one; a descent that comes so near to one
+/// stops.
 const SAME_POSE: f64 = 1e-3;
 /// Points on the way from one minimum to another.
 const PATH_POINTS: usize = 24;
@@ -60,8 +61,8 @@ pub(super) fn solve(
     }
 }
 
-/// Every minimum reachable from the solutions of each observation and their mirror images, by rising chi2. Minima
-/// behind a landmark's wall are left out.
+/// Every minimum reachable from the solutions of each observation and their mirror images, by
+/// rising chi2. Minima behind a landmark's wall are left out.
 pub(super) fn minima(problem: &Planar<'_>, observations: &[LandmarkObservation<'_>]) -> Vec<Minimum> {
     let mut found: Vec<Minimum> = Vec::new();
     for (i, observation) in observations.iter().enumerate() {
@@ -114,7 +115,8 @@ fn mirrored(camera_from_landmark: &Isometry3<f64>) -> Isometry3<f64> {
     Isometry3::from_parts(camera_from_landmark.translation, rotation)
 }
 
-/// Drops minima that a low barrier separates from a better one; sets the borders between the others.
+/// Drops minima that a low barrier separates from a better one; sets the borders between the
+/// others.
 fn merge(problem: &Planar<'_>, found: &mut Vec<Minimum>, barrier: f64) {
     let mut distinct: Vec<Minimum> = Vec::new();
     for mut minimum in found.drain(..) {
@@ -144,7 +146,8 @@ fn narrow(limit_rad: &mut (f64, f64), border_rad: f64) {
     }
 }
 
-/// The highest point on the path from `from` to the worse minimum `to`: its turn, and its rise above `to`.
+/// The highest point on the path from `from` to the worse minimum `to`: its turn, and its rise
+/// above `to`.
 fn pass(problem: &Planar<'_>, from: &Minimum, to: &Minimum) -> (f64, f64) {
     let whole = wrap_rad(to.pose.theta_rad - from.pose.theta_rad);
     let step = whole / PATH_POINTS as f64;

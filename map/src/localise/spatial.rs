@@ -1,6 +1,6 @@
-//! The least-squares problem of one photograph: corners of several landmarks as a function of the camera's pose in space
-//! (method 13.8), and the descent to the nearest minimum. Nuisance parameters (places and sizes of the landmarks,
-//! intrinsics) enter the weights.
+//! The least-squares problem of one photograph: corners of several landmarks as a function of the
+//! camera's pose in space (method 13.8), and the descent to the nearest minimum. Nuisance
+//! parameters (places and sizes of the landmarks, intrinsics) enter the weights.
 
 use crate::{
     gate::{Z_95, chi2_quantile},
@@ -22,7 +22,8 @@ const WEIGHTINGS: usize = 2;
 /// The least-squares problem of one photograph.
 pub(super) struct Spatial<'a> {
     observations: &'a [LandmarkObservation<'a>],
-    /// Standard deviations of the camera's intrinsics, if they are stated; all observations are by one camera.
+    /// Standard deviations of the camera's intrinsics, if they are stated; all observations are by
+    /// one camera.
     camera: Option<Vector3<f64>>,
     /// Corners of each landmark, map frame.
     corners_m: Vec<[Vector3<f64>; 4]>,
@@ -31,8 +32,8 @@ pub(super) struct Spatial<'a> {
 #[derive(Debug, Clone)]
 pub(super) struct SpatialFit {
     pub(super) camera_from_map: Isometry3<f64>,
-    /// Covariance of the left perturbation (rotation vector, translation), camera frame; scaled by chi2 over its 95 %
-    /// quantile where that exceeds 1.
+    /// Covariance of the left perturbation (rotation vector, translation), camera frame; scaled by
+    /// chi2 over its 95 % quantile where that exceeds 1.
     pub(super) covariance: Matrix6<f64>,
     pub(super) chi2: f64,
     /// Squared residual of each observation by itself, in standard deviations.
@@ -61,7 +62,8 @@ impl<'a> Spatial<'a> {
         8 * self.observations.len() - 6
     }
 
-    /// The nearest minimum; `None` where a corner is behind the camera or the pose is not determined.
+    /// The nearest minimum; `None` where a corner is behind the camera or the pose is not
+    /// determined.
     pub(super) fn descend(&self, start: Isometry3<f64>) -> Option<SpatialFit> {
         let mut pose = start;
         for _ in 0..WEIGHTINGS {

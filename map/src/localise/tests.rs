@@ -1,5 +1,5 @@
-//! Exact poses, derivatives against differences, consistent covariance by Monte Carlo, the planar ambiguity,
-//! refusals.
+//! Exact poses, derivatives against differences, consistent covariance by Monte Carlo, the planar
+//! ambiguity, refusals.
 
 mod derivatives;
 mod covariance;

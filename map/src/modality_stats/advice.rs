@@ -4,7 +4,8 @@ use crate::{localise::FixSource, modality_stats::modality::Modality};
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
-/// Error of a modality in a place beyond its claimed covariance. Robot-aligned: along, across (left), heading.
+/// Error of a modality in a place beyond its claimed covariance. Robot-aligned: along, across
+/// (left), heading.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ErrorModel {
     /// Bias to subtract: metres, metres, radians; of odometry for each metre driven.

@@ -1,5 +1,5 @@
-//! Statistics of one modality in one place, as sums: cells and runs add up, and a run is removed by adding the others
-//! again. Robot-aligned: along, across (left), heading.
+//! Statistics of one modality in one place, as sums: cells and runs add up, and a run is removed by
+//! adding the others again. Robot-aligned: along, across (left), heading.
 
 use crate::{
     check::{self, OutOfRange},
@@ -10,7 +10,8 @@ use serde::{Deserialize, Serialize};
 
 /// A place with fewer measurements takes the statistics of its parent.
 pub const MIN_MEASUREMENTS: u64 = 30;
-/// With fewer passages a bias cannot be distinguished from chance: the errors of one passage are correlated.
+/// With fewer passages a bias cannot be distinguished from chance: the errors of one passage are
+/// correlated.
 pub const MIN_VISITS: u64 = 3;
 /// Radians of heading that weigh as much as one metre (method 15, matrix W).
 const METRE_RAD: f64 = 0.1;
@@ -112,7 +113,8 @@ impl ModalityStats {
         self.fixes
     }
 
-    /// Adds a step of the reference trajectory that took `seconds`, with the modality's error if it was available.
+    /// Adds a step of the reference trajectory that took `seconds`, with the modality's error if it
+    /// was available.
     pub(super) fn step(&mut self, seconds: f64, error: Option<&Vector3<f64>>) {
         self.steps += 1;
         self.seconds += seconds;
@@ -153,8 +155,9 @@ impl ModalityStats {
         }
     }
 
-    /// Weighted mean squared error over availability (method 15): `J = tr(W (Sigma + mu mu^T)) / availability`, W =
-    /// diag(1, 1, 1 / (0.1 rad)^2). Infinite if the modality was never available.
+    /// Weighted mean squared error over availability (method 15):
+    /// `J = tr(W (Sigma + mu mu^T)) / availability`, W = diag(1, 1, 1 / (0.1 rad)^2). Infinite if
+    /// the modality was never available.
     pub fn score(&self) -> f64 {
         if self.available == 0 {
             return f64::INFINITY;
@@ -164,8 +167,8 @@ impl ModalityStats {
         squares * self.steps as f64 / self.available as f64
     }
 
-    /// The error model. A bias counts only in sums over `cells`, after enough passages, and if significant (method
-    /// 15); `None` for `cells` gives no bias.
+    /// The error model. A bias counts only in sums over `cells`, after enough passages, and if
+    /// significant (method 15); `None` for `cells` gives no bias.
     pub(super) fn fault(&self, cells: Option<u64>) -> ErrorModel {
         let mut fault = ErrorModel::default();
         if self.fixes < MIN_MEASUREMENTS {
@@ -179,7 +182,8 @@ impl ModalityStats {
                 let visits = self.visits as f64;
                 let mean = self.means[k] / visits;
                 let scatter = (self.mean_squares[k] / visits - mean * mean).max(0.0) / (passages - 1.0);
-                // Few passages determine their own scatter badly: an approximation of Student's quantile.
+                // Few passages determine their own scatter badly: an approximation of Student's
+                // quantile.
                 let sigmas = BIAS_SIGMAS * (1.0 + 2.0 / (passages - 1.0));
                 if mean * mean > sigmas * sigmas * scatter {
                     fault.bias[k] = mean;

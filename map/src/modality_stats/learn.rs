@@ -1,9 +1,9 @@
-//! From a reference run to statistics: the errors of every modality's own position, and of single measurements
-//! against their claimed covariance, by pose cell.
+//! From a reference run to statistics: the errors of every modality's own position, and of single
+//! measurements against their claimed covariance, by pose cell.
 //!
-//! In: odometry and fixes of a robot, the reference trajectory. Out: statistics by cell. Each modality covers the
-//! whole trajectory by itself, from the start of the reference ("loose coupling", method 15), so that its drift is
-//! not hidden by the other one.
+//! In: odometry and fixes of a robot, the reference trajectory. Out: statistics by cell. Each
+//! modality covers the whole trajectory by itself, from the start of the reference ("loose
+//! coupling", method 15), so that its drift is not hidden by the other one.
 
 use crate::{
     fuse::{FuseParams, Fuser},
@@ -28,7 +28,8 @@ const STEP_RAD: f64 = 0.05;
 const NEWS_M: f64 = 0.5;
 /// Length of the stretches over which odometry is compared, metres.
 const STRETCH_M: f64 = 1.0;
-/// Stretches that turn by more than this are left out: along and across would not be defined, radians.
+/// Stretches that turn by more than this are left out: along and across would not be defined,
+/// radians.
 const STRETCH_RAD: f64 = 0.5;
 /// Smallest standard deviations assumed, metres and radians; they keep the weights finite.
 const LEAST: [f64; 2] = [1e-3, 1e-4];
@@ -77,7 +78,8 @@ struct Step {
     odometry: Pose2,
 }
 
-/// Compares a run with its reference trajectory. The result is empty where they have no time in common.
+/// Compares a run with its reference trajectory. The result is empty where they have no time in
+/// common.
 pub fn learn_modality_stats(run: &ReferenceRun<'_>, p: &FuseParams) -> RunStats {
     let mut learnt = RunStats::default();
     let steps = positions(run, p, &mut learnt);
@@ -117,7 +119,8 @@ fn positions(run: &ReferenceRun<'_>, p: &FuseParams, learnt: &mut RunStats) -> V
         let mut apply_fixes = |walkers: &mut [Walker; 2], until_ns: i64, way_m: f64| {
             while let Some((t, fix)) = fixes.next_if(|(t, _)| *t < until_ns) {
                 for walker in walkers.iter_mut().filter(|w| w.modality == fix.modality) {
-                    // Fixes out of range were refused before; a refusal here only leaves the fix out.
+                    // Fixes out of range were refused before; a refusal here only leaves the fix
+                    // out.
                     if walker.fuser.pose().is_some() && walker.fuser.apply_fix(*t, fix).is_ok() {
                         walker.news_m = Some(way_m);
                     }
@@ -209,7 +212,8 @@ fn measured_odometry(steps: &[Step], r: &ReferenceTrajectory, p: &FuseParams, le
         }
         let d = measured.minus(&truly);
         let error = Vector3::new(d.x, d.y, wrap_rad(d.z)) / length_m;
-        // Both ends have the uncertainty of the reference; the heading error at the start rotates the stretch.
+        // Both ends have the uncertainty of the reference; the heading error at the start rotates
+        // the stretch.
         let (place, heading) = (2.0 * r.sigma_m.powi(2), r.sigma_rad.powi(2));
         let turned = p.turn_per_turn_rad.powi(2) * measured.theta_rad.abs();
         let variances = p.metre_variances() + Vector3::new(place, place + heading, 2.0 * heading + turned);

@@ -33,11 +33,13 @@ impl From<FixSource> for Modality {
     }
 }
 
-/// Which modalities are fused where reference runs rank them. Odometry carries the pose in any case.
+/// Which modalities are fused where reference runs rank them. Odometry carries the pose in any
+/// case.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FusionMode {
-    // Departs from method 15, which has the other two: see docs/EVALUATION.md, "Modalities by area".
+    // Departs from method 15, which has the other two: see docs/EVALUATION.md, "Modalities by
+    // area".
     /// All modalities, each with its learnt error model.
     #[default]
     All,

@@ -92,8 +92,8 @@ impl ModalityMap {
         self.cells.iter().map(|(cell, (found, advice))| (cell, found, advice))
     }
 
-    /// Every named area with its statistics and advice by heading; the advice holds where the cells have too few
-    /// measurements.
+    /// Every named area with its statistics and advice by heading; the advice holds where the cells
+    /// have too few measurements.
     pub fn named(&self) -> impl Iterator<Item = (&NamedArea, [(StatsByModality, ModalityAdvice); 4])> {
         self.named.iter().map(|(area, by_heading)| {
             let advice_of_cells = |pool: &Pool| {
@@ -133,7 +133,8 @@ impl ModalityMap {
             let enough =
                 |(_, pool): &&(StatsScope, Pool)| pool.found[module.index()].fixes() >= MIN_MEASUREMENTS;
             if let Some((level, pool)) = scopes.iter().find(enough) {
-                // Robot-aligned biases differ from place to place: over the whole map only the variance is inflated.
+                // Robot-aligned biases differ from place to place: over the whole map only the
+                // variance is inflated.
                 let cells = if *level == StatsScope::Map { None } else { Some(pool.cells) };
                 advice.faults[module.index()] = pool.found[module.index()].fault(cells);
             }

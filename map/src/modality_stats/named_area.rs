@@ -16,7 +16,8 @@ pub const MAX_NAME_BYTES: usize = 64;
 pub struct NamedArea {
     /// Name of the area, 1 to [`MAX_NAME_BYTES`] bytes.
     pub name: String,
-    /// Corners in order, x and y in metres; at least three. Where areas overlap the first one counts.
+    /// Corners in order, x and y in metres; at least three. Where areas overlap the first one
+    /// counts.
     pub corners_m: Vec<[f64; 2]>,
 }
 

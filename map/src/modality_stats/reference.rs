@@ -1,5 +1,5 @@
-//! Reference trajectory: where a robot really was, by an independent measurement. In: poses with times of the robot's
-//! clock. Out: the pose at any time between them, none across gaps.
+//! Reference trajectory: where a robot really was, by an independent measurement. In: poses with
+//! times of the robot's clock. Out: the pose at any time between them, none across gaps.
 
 use crate::{
     check::{self, OutOfRange},
@@ -45,8 +45,8 @@ pub enum ReferenceError {
 }
 
 impl ReferenceTrajectory {
-    /// From 2 to [`MAX_REFERENCE`] poses in order of time, ns of the robot's clock; standard deviations up to 1 m and
-    /// 0.5 rad.
+    /// From 2 to [`MAX_REFERENCE`] poses in order of time, ns of the robot's clock; standard
+    /// deviations up to 1 m and 0.5 rad.
     pub fn new(poses: Vec<(i64, Pose2)>, sigma_m: f64, sigma_rad: f64) -> Result<Self, ReferenceError> {
         check::within("poses", poses.len() as f64, 2.0, MAX_REFERENCE as f64)?;
         check::within("sigma_m", sigma_m, 0.0, 1.0)?;

@@ -47,8 +47,9 @@ struct Recorded {
 /// Sigma of the laser along a corridor: undetermined.
 const UNDETERMINED: f64 = 100.0;
 
-/// 12 m along y = 2.5, there or back. Odometry measures 4 % too much, 12 % between x = 4 and 8. A moved wall shifts
-/// the laser fix 0.2 m to the south everywhere, sigma 2 cm. Landmarks (sigma 5 cm) are observed below x = 4 only.
+/// 12 m along y = 2.5, there or back. Odometry measures 4 % too much, 12 % between x = 4 and 8. A
+/// moved wall shifts the laser fix 0.2 m to the south everywhere, sigma 2 cm. Landmarks (sigma 5
+/// cm) are observed below x = 4 only.
 fn drive(random: &mut Random, back: bool) -> Recorded {
     let (start, step) = if back { (12.0, -0.05) } else { (0.0, 0.05) };
     let heading = if back { std::f64::consts::PI } else { 0.0 };
@@ -229,7 +230,8 @@ fn a_cell_with_few_measurements_takes_its_neighbours_statistics() {
     let (here, beside) =
         (areas.advice(&Pose2::new(10.5, 2.5, 0.0)), areas.advice(&Pose2::new(10.5, 3.5, 0.0)));
     assert_eq!((here.level, beside.level), (StatsScope::Neighbourhood, StatsScope::Neighbourhood));
-    // Passages through two or three cells are as many as through one: enough for a bias all the same.
+    // Passages through two or three cells are as many as through one: enough for a bias all the
+    // same.
     assert!((here.fault(Modality::Laser).bias.y + 0.2).abs() < 0.01, "{here:?}");
     let once = learnt(&drive(&mut Random::new(3), false)).cells;
     let advice = ModalityMap::new(FusionMode::All, Vec::new(), [&once]).advice(&Pose2::new(9.5, 3.5, 0.0));
@@ -342,8 +344,8 @@ fn cells_of_a_run_are_bounded_and_a_run_without_overlap_is_empty() {
     assert_eq!(none, RunStats::default());
 }
 
-/// Drives the corridor with these statistics; mean squared error past the landmarks, and the last normalised
-/// squared error.
+/// Drives the corridor with these statistics; mean squared error past the landmarks, and the last
+/// normalised squared error.
 fn driven(random: &mut Random, areas: &ModalityMap) -> (f64, f64) {
     let made = drive(random, true);
     let mut fuser = Fuser::new(FuseParams::default());

@@ -1,6 +1,8 @@
-//! A landmark's place under a ceiling of given height (method 11.2, A24: the laser does not measure ceilings).
+//! A landmark's place under a ceiling of given height (method 11.2, A24: the laser does not measure
+//! ceilings).
 //!
-//! In: posed views, the ceiling. Out: place and size with covariance, or why the object is not there.
+//! In: posed views, the ceiling. Out: place and size with covariance, or why the object is not
+//! there.
 
 use crate::{
     check::{self, OutOfRange},
@@ -50,7 +52,8 @@ pub struct CeilingRectangle {
     pub by_mounting: SMatrix<f64, 5, 6>,
     /// Covariance of the extrinsics.
     pub mounting_covariance: Matrix6<f64>,
-    /// Derivative by the intrinsics' (focal length, principal point), each in its standard deviations.
+    /// Derivative by the intrinsics' (focal length, principal point), each in its standard
+    /// deviations.
     pub by_camera: SMatrix<f64, 5, 3>,
     /// Derivative by the ceiling's height.
     pub by_height: SVector<f64, 5>,
@@ -151,8 +154,8 @@ fn rectangle(
     q.iter().all(|v| v.is_finite()).then_some((q, gain))
 }
 
-/// Fuses views of one object under one ceiling. Views outside of the gate, 99 % of chi2 with 5 degrees of freedom,
-/// are left out.
+/// Fuses views of one object under one ceiling. Views outside of the gate, 99 % of chi2 with 5
+/// degrees of freedom, are left out.
 pub fn ceiling_placement(
     views: &[CeilingRectangle],
     ceiling: &Ceiling,
@@ -187,8 +190,8 @@ fn apart(a: &Vector5, b: &Vector5) -> Vector5 {
     d
 }
 
-/// Fusion in information form; the errors of extrinsics, intrinsics and ceiling are common to all views and added
-/// once.
+/// Fusion in information form; the errors of extrinsics, intrinsics and ceiling are common to all
+/// views and added once.
 fn fused(
     origin: &Vector5,
     views: &[&CeilingRectangle],

@@ -50,8 +50,8 @@ pub enum PlacementError {
     /// A nearer wall is met by some rays only.
     #[error("the quad reaches over the end of a wall")]
     Straddles,
-    /// The intersections are not an upright rectangle of possible size: an open door, a board on an easel, another
-    /// wall.
+    /// The intersections are not an upright rectangle of possible size: an open door, a board on an
+    /// easel, another wall.
     #[error("not on this wall: no upright rectangle (rms {rms_m:.3} m, roll {roll_rad:.3} rad)")]
     NotOnWall {
         /// Root mean square distance of the intersections from the rectangle, metres.

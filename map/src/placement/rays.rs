@@ -1,11 +1,12 @@
-//! Intersections of corner rays with a wall or a ceiling, and their derivatives by all uncertain inputs (method
-//! 11.3).
+//! Intersections of corner rays with a wall or a ceiling, and their derivatives by all uncertain
+//! inputs (method 11.3).
 
 use crate::{placement::view::CheckedView, segments::LaserSegment};
 use nalgebra::{Matrix3, SMatrix, Vector2, Vector3};
 
-/// Columns of the derivatives: 8 corner coordinates, robot (x, y, theta), mounting (rotation, translation), wall
-/// (facing angle, signed distance from the map's origin along the facing normal).
+/// Columns of the derivatives: 8 corner coordinates, robot (x, y, theta), mounting (rotation,
+/// translation), wall (facing angle, signed distance from the map's origin along the facing
+/// normal).
 const CORNERS: usize = 0;
 pub(super) const ROBOT: usize = 8;
 pub(super) const MOUNTING: usize = 11;
@@ -38,8 +39,8 @@ struct Cast {
     along: f64,
 }
 
-/// Intersection of the ray of corner `i` with a wall; `None` when the ray leaves the wall, grazes it, or comes from
-/// behind.
+/// Intersection of the ray of corner `i` with a wall; `None` when the ray leaves the wall, grazes
+/// it, or comes from behind.
 pub(super) fn hit(view: &CheckedView<'_>, i: usize, (theta, r): (f64, f64)) -> Option<Hit> {
     let Cast { mut hit, ray, along } = cast(view, i, &Vector3::new(theta.cos(), theta.sin(), 0.0), r)?;
     let side = Vector3::new(-theta.sin(), theta.cos(), 0.0);
@@ -48,16 +49,16 @@ pub(super) fn hit(view: &CheckedView<'_>, i: usize, (theta, r): (f64, f64)) -> O
     hit.by.iter().all(|v| v.is_finite()).then_some(hit)
 }
 
-/// Intersection of the ray of corner `i` with the ceiling at `height_m`, with its derivative by that height in column
-/// [`WALL`].
+/// Intersection of the ray of corner `i` with the ceiling at `height_m`, with its derivative by
+/// that height in column [`WALL`].
 pub(super) fn ceiling_hit(view: &CheckedView<'_>, i: usize, height_m: f64) -> Option<Hit> {
     let Cast { mut hit, ray, along } = cast(view, i, &-Vector3::z(), -height_m)?;
     hit.by.set_column(WALL, &(-ray / along));
     hit.by.iter().all(|v| v.is_finite()).then_some(hit)
 }
 
-/// Intersection of the ray of corner `i` with the plane of facing normal `n` and offset `r`, with the derivatives by
-/// all inputs but the plane.
+/// Intersection of the ray of corner `i` with the plane of facing normal `n` and offset `r`, with
+/// the derivatives by all inputs but the plane.
 fn cast(view: &CheckedView<'_>, i: usize, n: &Vector3<f64>, r: f64) -> Option<Cast> {
     let robot = view.map_from_robot.pose.to_isometry3();
     let robot_turn = robot.rotation.to_rotation_matrix().into_inner();
@@ -78,7 +79,8 @@ fn cast(view: &CheckedView<'_>, i: usize, n: &Vector3<f64>, r: f64) -> Option<Ca
     let mut by = SMatrix::<f64, 3, INPUTS>::zeros();
     by.set_column(CORNERS + 2 * i, &(a * turn.column(0) * (s / k.fx_px)));
     by.set_column(CORNERS + 2 * i + 1, &(a * turn.column(1) * (s / k.fy_px)));
-    // A left rotation phi of the camera in the map moves the hit by -s A [d]x phi; its centre's shift by A.
+    // A left rotation phi of the camera in the map moves the hit by -s A [d]x phi; its centre's
+    // shift by A.
     let by_turn = -(a * d.cross_matrix()) * s;
     by.set_column(ROBOT, &a.column(0));
     by.set_column(ROBOT + 1, &a.column(1));
@@ -107,9 +109,9 @@ pub(super) fn new_in_each_view(view: &CheckedView<'_>, by: &SMatrix<f64, 8, INPU
     sum + j * view.map_from_robot.covariance * j.transpose()
 }
 
-/// Derivative of the intersections by the intrinsics' errors, each of one standard deviation. They have no part in
-/// the weights: a residual of one view must not correct the camera, since it shows that an object is not on the
-/// wall.
+/// Derivative of the intersections by the intrinsics' errors, each of one standard deviation. They
+/// have no part in the weights: a residual of one view must not correct the camera, since it shows
+/// that an object is not on the wall.
 pub(super) fn by_camera(view: &CheckedView<'_>, by: &SMatrix<f64, 8, INPUTS>) -> SMatrix<f64, 8, 3> {
     let corners = view.by_camera.iter().enumerate();
     // An error of the intrinsics moves the ray through the measured corner.

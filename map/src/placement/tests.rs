@@ -1,5 +1,5 @@
-//! A synthetic room: derivatives against differences, consistent covariance by Monte Carlo, the choice of the wall,
-//! refusals.
+//! A synthetic room: derivatives against differences, consistent covariance by Monte Carlo, the
+//! choice of the wall, refusals.
 
 use crate::{
     extrinsics::{CameraExtrinsics, pan_tilt},
@@ -169,7 +169,8 @@ fn derivatives_are_the_finite_differences() {
     }
 }
 
-/// The place from one or several views with everything drawn: errors of (x, y, theta, z, w, h) and the claim.
+/// The place from one or several views with everything drawn: errors of (x, y, theta, z, w, h) and
+/// the claim.
 fn draw(views: &[(f64, f64)], random: &mut Random) -> (Vector6<f64>, LandmarkPlace) {
     draw_with(&camera(), views, random)
 }
@@ -262,7 +263,8 @@ fn several_views_reduce_the_covariance_without_overconfidence() {
 
 #[test]
 fn a_wall_with_a_wide_covariance_widens_what_is_placed_on_it() {
-    // Oracle: a wall drawn anew in each draw, 6 cm and 10 mrad about its middle, as a map made of scans has them.
+    // Oracle: a wall drawn anew in each draw, 6 cm and 10 mrad about its middle, as a map made of
+    // scans has them.
     let about = Matrix2::new(1e-4, 3e-4, 3e-4, 3.6e-3);
     let by_hand = LaserSegment::by_hand(&[5.0, -1.0, 3.0, 4.0]).unwrap();
     let wide = LaserSegment::about_middle(by_hand.a, by_hand.b, &about).unwrap();
@@ -275,7 +277,8 @@ fn a_wall_with_a_wide_covariance_widens_what_is_placed_on_it() {
         as_by_hand += e.dot(&claim.cholesky().unwrap().solve(&e));
     }
     let (mean, as_by_hand) = (sum / f64::from(n), as_by_hand / f64::from(n));
-    // The band is twice that of an exact model: over 6 cm the place is not quite linear in the wall.
+    // The band is twice that of an exact model: over 6 cm the place is not quite linear in the
+    // wall.
     assert!((5.4..6.6).contains(&mean) && as_by_hand > 12.0, "{mean} {as_by_hand}");
 }
 

@@ -16,8 +16,8 @@ use vision::pose::{LandmarkSize, PoseError};
 pub struct WallRectangle {
     /// Index of the wall.
     pub wall: usize,
-    /// Centre along the wall (metres from the foot of the map's origin, towards the viewer's right), height of the
-    /// centre, width, height; metres.
+    /// Centre along the wall (metres from the foot of the map's origin, towards the viewer's
+    /// right), height of the centre, width, height; metres.
     pub rectangle: Vector4<f64>,
     /// Covariance by the errors that are independent in every view: corners and robot pose.
     pub covariance: Matrix4<f64>,
@@ -25,7 +25,8 @@ pub struct WallRectangle {
     pub by_mounting: SMatrix<f64, 4, 6>,
     /// Covariance of the extrinsics.
     pub mounting_covariance: Matrix6<f64>,
-    /// Derivative by the intrinsics' (focal length, principal point), each in its standard deviations.
+    /// Derivative by the intrinsics' (focal length, principal point), each in its standard
+    /// deviations.
     pub by_camera: Matrix4x3<f64>,
     /// Derivative by the wall's facing angle and signed distance.
     pub by_wall: Matrix4x2<f64>,
@@ -46,8 +47,8 @@ pub fn view_on_wall(
     fit(&checked, wall, rays::plane(&walls[wall]).0, &hits, p)
 }
 
-/// The nearest wall that all four rays meet. Refused when the quad reaches beyond the end of a wall to one behind it:
-/// a place on the wrong wall would be off by their distance.
+/// The nearest wall that all four rays meet. Refused when the quad reaches beyond the end of a wall
+/// to one behind it: a place on the wrong wall would be off by their distance.
 fn nearest(
     checked: &CheckedView<'_>,
     walls: &[LaserSegment],
@@ -134,7 +135,8 @@ fn fit(
     })
 }
 
-/// Corners TL, TR, BR, BL (along, up) of a rectangle (centre along, centre height, width, height, roll).
+/// Corners TL, TR, BR, BL (along, up) of a rectangle (centre along, centre height, width, height,
+/// roll).
 fn corners_of(q: &SVector<f64, 5>) -> SVector<f64, 8> {
     let (s, c) = q[4].sin_cos();
     let mut made = SVector::<f64, 8>::zeros();
@@ -145,8 +147,8 @@ fn corners_of(q: &SVector<f64, 5>) -> SVector<f64, 8> {
     made
 }
 
-/// Weighted least squares over the rectangle, with a prior on its roll; with the gain from intersections to
-/// rectangle.
+/// Weighted least squares over the rectangle, with a prior on its roll; with the gain from
+/// intersections to rectangle.
 fn rectangle(
     intersections: &SVector<f64, 8>,
     weight: &SMatrix<f64, 8, 8>,

@@ -13,8 +13,8 @@ use crate::{
 use nalgebra::{DMatrix, Matrix2, Matrix4, Matrix4x2, Matrix4x3, Matrix6, SMatrix, Vector2, Vector4};
 use vision::pose::LandmarkSize;
 
-/// Fuses views of one object on one wall. The seed is the view that most others agree with; views outside of its gate
-/// are left out.
+/// Fuses views of one object on one wall. The seed is the view that most others agree with; views
+/// outside of its gate are left out.
 pub fn placement(
     views: &[WallRectangle],
     walls: &[LaserSegment],
@@ -44,8 +44,8 @@ fn total(v: &WallRectangle) -> Matrix4<f64> {
     v.covariance + mounting + v.by_camera * v.by_camera.transpose()
 }
 
-/// Fusion in information form with the wall fixed; the errors of extrinsics, intrinsics and wall are common to all
-/// views and added once.
+/// Fusion in information form with the wall fixed; the errors of extrinsics, intrinsics and wall
+/// are common to all views and added once.
 fn fused(views: &[&WallRectangle], wall: &LaserSegment, p: &PlacementParams) -> Option<LandmarkPlace> {
     let mut information = Matrix4::zeros();
     for v in views {

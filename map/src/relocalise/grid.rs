@@ -114,8 +114,8 @@ impl PoseGrid {
         vec![value; self.layers.len() * self.columns * self.rows]
     }
 
-    /// Calls `visit` with index and pose of the cells within a distance of a point, for every heading for which
-    /// `near` gives both.
+    /// Calls `visit` with index and pose of the cells within a distance of a point, for every
+    /// heading for which `near` gives both.
     pub(super) fn each_heading(
         &self,
         near: impl Fn(f64) -> Option<(Point2<f64>, f64)>,
@@ -139,7 +139,8 @@ impl PoseGrid {
         }
     }
 
-    /// Update: multiplies the belief by a likelihood. A likelihood that is zero everywhere changes nothing.
+    /// Update: multiplies the belief by a likelihood. A likelihood that is zero everywhere changes
+    /// nothing.
     pub(super) fn weigh(&mut self, likelihood: impl Fn(usize, &Pose2) -> f64) {
         let before = self.layers.clone();
         let cells = self.columns * self.rows;
@@ -155,7 +156,8 @@ impl PoseGrid {
         }
     }
 
-    /// Prediction: shifts the belief by `motion` (robot frame) and renormalises. Cells that leave the grid are lost.
+    /// Prediction: shifts the belief by `motion` (robot frame) and renormalises. Cells that leave
+    /// the grid are lost.
     pub(super) fn shift(&mut self, motion: &Pose2) {
         let step = TAU / self.layers.len() as f64;
         for k in 0..self.layers.len() {

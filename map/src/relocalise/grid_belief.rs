@@ -23,7 +23,8 @@ pub struct GridBelief {
 }
 
 impl GridBelief {
-    /// A belief over the rectangle between two corners. `prior` weights each pose; 0 where the robot cannot be.
+    /// A belief over the rectangle between two corners. `prior` weights each pose; 0 where the
+    /// robot cannot be.
     pub fn new(
         corners: [Point2<f64>; 2],
         prior: impl Fn(&Pose2) -> f64,
@@ -61,7 +62,8 @@ impl GridBelief {
         self.update_associations(&hypotheses)
     }
 
-    /// Update where the relative pose depends on the landmark: another size or height gives another distance.
+    /// Update where the relative pose depends on the landmark: another size or height gives another
+    /// distance.
     pub fn update_associations(
         &mut self,
         hypotheses: &[AssociationHypothesis<'_>],

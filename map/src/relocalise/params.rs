@@ -18,7 +18,8 @@ pub struct GridBeliefParams {
     pub clutter_reach_m: f64,
     /// Share of the belief that is spread uniformly at every motion, for a kidnapped robot, 0 to 1.
     pub carried: f64,
-    /// Standard deviation of a motion after 1 m, metres; grows with the square root of the distance.
+    /// Standard deviation of a motion after 1 m, metres; grows with the square root of the
+    /// distance.
     pub along_m: f64,
     /// Standard deviation of the heading after 1 m or 1 rad, radians.
     pub turn_rad: f64,

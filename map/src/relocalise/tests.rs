@@ -53,7 +53,8 @@ impl ByHand {
     }
 
     fn observe(&mut self) {
-        // Variances of the observation and of a cell: 0.01 + 0.04 / 12, and of a heading: 0.01 + (10 deg)^2 / 12.
+        // Variances of the observation and of a cell: 0.01 + 0.04 / 12, and of a heading: 0.01 +
+        // (10 deg)^2 / 12.
         let (v, t) = (0.01 + 0.04 / 12.0, 0.01 + (TAU / 36.0).powi(2) / 12.0);
         let peak = 1.0 / ((TAU * v) * (TAU * t).sqrt());
         for (i, belief) in self.0.iter_mut().enumerate() {

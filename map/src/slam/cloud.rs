@@ -1,5 +1,5 @@
-//! Surface points of a scan, robot frame: thinned to even spacing, with the surface's direction where neighbouring
-//! beams determine it. In: a scan. Out: the points that scan matching uses.
+//! Surface points of a scan, robot frame: thinned to even spacing, with the surface's direction
+//! where neighbouring beams determine it. In: a scan. Out: the points that scan matching uses.
 
 use crate::laser::Scan;
 use nalgebra::{Matrix2, Point2, Vector2};
@@ -11,7 +11,8 @@ use serde::{Deserialize, Serialize};
 pub struct CloudParams {
     /// Longer returns are left out: their points are too far apart, metres.
     pub max_range_m: f64,
-    /// Points nearer than this to the one before are left out, so that near walls do not outweigh far ones, metres.
+    /// Points nearer than this to the one before are left out, so that near walls do not outweigh
+    /// far ones, metres.
     pub spacing_m: f64,
     /// Neighbouring returns are one surface if their ranges differ by less than this, metres,
     pub jump_m: f64,
@@ -98,7 +99,8 @@ pub fn cloud(scan: &Scan, p: &CloudParams) -> Cloud {
     Cloud { points, origin: Point2::new(mount.x_m, mount.y_m), fan_rad }
 }
 
-/// Direction of the surface at beam `i` from its neighbours on the same surface, laser frame, and its variance.
+/// Direction of the surface at beam `i` from its neighbours on the same surface, laser frame, and
+/// its variance.
 fn normal(scan: &Scan, i: usize, joined: &[bool], p: &CloudParams) -> Option<(Vector2<f64>, f64)> {
     let here = scan.point(i)?;
     let near = |k: usize| scan.point(k).is_some_and(|q| (q - here).norm() <= p.reach_m);

@@ -1,6 +1,7 @@
-//! Correlative scan matching (Olson 2009) by branch and bound: every pose of a window is compared with a likelihood
-//! field of the reference, coarse to fine, without missing the best one. In: reference scans, points, a window. Out:
-//! the best pose of the grid, and by a second search whether another is as good.
+//! Correlative scan matching (Olson 2009) by branch and bound: every pose of a window is compared
+//! with a likelihood field of the reference, coarse to fine, without missing the best one. In:
+//! reference scans, points, a window. Out: the best pose of the grid, and by a second search
+//! whether another is as good.
 
 use super::cloud::Cloud;
 use crate::pose2::Pose2;
@@ -126,8 +127,8 @@ impl LikelihoodField {
         (((p.x - self.low.x) / self.cell_m).floor() as i64, ((p.y - self.low.y) / self.cell_m).floor() as i64)
     }
 
-    /// The best pose of a window with a score above `at_least`, except those within `not` (metres and radians of a
-    /// pose).
+    /// The best pose of a window with a score above `at_least`, except those within `not` (metres
+    /// and radians of a pose).
     pub(crate) fn search(
         &self,
         points: &[Point2<f64>],

@@ -1,5 +1,6 @@
-//! The pose graph: relative poses with information between keyframes, and the poses that fit them best (sparse
-//! nonlinear least squares). In: poses and constraints. Out: poses, chi2 of every constraint, covariances.
+//! The pose graph: relative poses with information between keyframes, and the poses that fit them
+//! best (sparse nonlinear least squares). In: poses and constraints. Out: poses, chi2 of every
+//! constraint, covariances.
 
 use super::normal_equations::{BlockMatrix, BlockPattern, NotPositiveDefinite};
 use crate::pose2::{Pose2, wrap_rad};
@@ -23,8 +24,8 @@ pub struct PoseConstraint {
     pub measured: Pose2,
     /// Inverse covariance over (x, y, theta) in the frame of `from`; may be singular.
     pub information: Matrix3<f64>,
-    /// For a constraint that may be wrong: its weight falls off beyond this chi2 (dynamic covariance scaling, Agarwal
-    /// et al. 2013).
+    /// For a constraint that may be wrong: its weight falls off beyond this chi2 (dynamic
+    /// covariance scaling, Agarwal et al. 2013).
     pub doubt_chi2: Option<f64>,
 }
 

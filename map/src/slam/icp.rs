@@ -1,6 +1,6 @@
-//! Point-to-line ICP: refines a good guess. Points of a scan are matched to surfaces of others, with distances across
-//! the surface only (method 17.4 for points). In: a guess, an optional prior. Out: the pose and its information by
-//! the walls alone: zero along a bare corridor.
+//! Point-to-line ICP: refines a good guess. Points of a scan are matched to surfaces of others,
+//! with distances across the surface only (method 17.4 for points). In: a guess, an optional prior.
+//! Out: the pose and its information by the walls alone: zero along a bare corridor.
 
 use crate::{
     pose2::Pose2,
@@ -69,7 +69,8 @@ pub(crate) struct IcpResult {
     pub rms_m: f64,
 }
 
-/// Matches `scan` to `reference`, starting at `guess`. `None` if fewer than three points have a surface.
+/// Matches `scan` to `reference`, starting at `guess`. `None` if fewer than three points have a
+/// surface.
 pub(crate) fn align(
     reference: &SurfaceIndex,
     scan: &Cloud,
@@ -86,7 +87,8 @@ pub(crate) fn align(
         let (mut h, mut g) = (sums.h * scale, sums.g * scale);
         done = Some((sums.clone(), scale));
         if let Some(prior) = prior {
-            // Without the correction, noise of the normals would hold the pose at the guess against the prior.
+            // Without the correction, noise of the normals would hold the pose at the guess against
+            // the prior.
             h = sums.determined() * scale + prior.information;
             g += prior.information * pose.minus(&prior.pose);
         }
@@ -127,8 +129,8 @@ struct Sums {
 }
 
 impl Sums {
-    /// The information without the part by noise of the normals: by that noise walls of a bare corridor face
-    /// slightly along it.
+    /// The information without the part by noise of the normals: by that noise walls of a bare
+    /// corridor face slightly along it.
     fn determined(&self) -> Matrix3<f64> {
         // Metres and radians have equal weight at the mean distance of the points.
         let arm = (self.h[(2, 2)] / (self.h[(0, 0)] + self.h[(1, 1)]).max(1e-12)).sqrt().clamp(0.1, 100.0);

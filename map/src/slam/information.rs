@@ -14,7 +14,8 @@ pub(super) fn spread(information: &Matrix3<f64>) -> Matrix3<f64> {
     (information + floor).cholesky().map_or_else(|| Matrix3::identity() * 1e3, |c| c.inverse())
 }
 
-/// The information that is left when the floor is added to the covariance; works for singular information.
+/// The information that is left when the floor is added to the covariance; works for singular
+/// information.
 pub(crate) fn with_floor(information: &Matrix3<f64>, [metres, radians]: [f64; 2]) -> Matrix3<f64> {
     let floor = Vector3::new(metres.powi(2), metres.powi(2), radians.powi(2));
     let inverse = Matrix3::from_diagonal(&floor.map(|v| 1.0 / v.max(1e-12)));

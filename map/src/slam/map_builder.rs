@@ -158,8 +158,9 @@ impl Slam {
 }
 
 impl Slam {
-    /// Walls with covariance relative to the first pose. Lines are merged with the relative covariance of
-    /// neighbouring scans, which is far smaller than that of the map; the latter is added at the end.
+    /// Walls with covariance relative to the first pose. Lines are merged with the relative
+    /// covariance of neighbouring scans, which is far smaller than that of the map; the latter is
+    /// added at the end.
     fn walls(&self, known: &impl Fn(usize) -> Pose2Covariance) -> Result<Vec<LaserSegment>, SlamError> {
         let p = &self.params;
         let near = Vector3::new(p.near_m.powi(2), p.near_m.powi(2), p.near_rad.powi(2));

@@ -1,5 +1,5 @@
-//! Sparse symmetric systems of 3x3 blocks: approximate minimum degree order (crate `amd`), then Cholesky
-//! (`nalgebra-sparse`). In: blocks by pose. Out: solutions by pose.
+//! Sparse symmetric systems of 3x3 blocks: approximate minimum degree order (crate `amd`), then
+//! Cholesky (`nalgebra-sparse`). In: blocks by pose. Out: solutions by pose.
 
 use nalgebra::{DMatrix, Matrix3};
 use nalgebra_sparse::{
@@ -7,7 +7,8 @@ use nalgebra_sparse::{
     pattern::SparsityPattern,
 };
 
-/// Why there is no solution: a matrix that is not positive definite, or has a number that is not finite.
+/// Why there is no solution: a matrix that is not positive definite, or has a number that is not
+/// finite.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct NotPositiveDefinite;
 
@@ -23,7 +24,8 @@ pub(super) struct BlockPattern {
 }
 
 impl BlockPattern {
-    /// A matrix of `blocks` x `blocks` with all diagonal blocks and those of `pairs`, each in both triangles.
+    /// A matrix of `blocks` x `blocks` with all diagonal blocks and those of `pairs`, each in both
+    /// triangles.
     pub(super) fn new(blocks: usize, pairs: impl Iterator<Item = (usize, usize)> + Clone) -> Self {
         let mut neighbours = vec![Vec::new(); blocks];
         for (a, b) in pairs {
@@ -50,7 +52,8 @@ impl BlockPattern {
         BlockMatrix { pattern: self, values: vec![0.0; self.scalars.nnz()] }
     }
 
-    /// Where a block lies, rows and columns in the order of elimination: a function from element to value.
+    /// Where a block lies, rows and columns in the order of elimination: a function from element to
+    /// value.
     fn block(&self, row: usize, column: usize) -> Option<impl Fn(usize, usize) -> usize> {
         let at = self.columns[column].binary_search(&row).ok()?;
         let offsets = self.scalars.major_offsets();
@@ -59,7 +62,8 @@ impl BlockPattern {
     }
 }
 
-/// The place of each node in an order of little fill: approximate minimum degree; their own order if there is none.
+/// The place of each node in an order of little fill: approximate minimum degree; their own order
+/// if there is none.
 fn elimination_order(neighbours: &[Vec<usize>]) -> Vec<usize> {
     let mut offsets = vec![0];
     let mut rows = Vec::new();
@@ -92,7 +96,8 @@ pub(super) struct BlockMatrix<'a> {
 }
 
 impl<'a> BlockMatrix<'a> {
-    /// Adds a block, and off the diagonal its transpose in the other triangle. Blocks outside the pattern are left out.
+    /// Adds a block, and off the diagonal its transpose in the other triangle. Blocks outside the
+    /// pattern are left out.
     pub(super) fn add(&mut self, row: usize, column: usize, block: &Matrix3<f64>) {
         let (row, column) = (self.pattern.place[row], self.pattern.place[column]);
         self.add_placed(row, column, block);

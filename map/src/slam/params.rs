@@ -27,7 +27,8 @@ pub struct SlamParams {
     pub lines: LineParams,
     /// Merging of lines into walls.
     pub walls: WallParams,
-    /// Standard deviation between neighbouring keyframes when their lines are merged into walls: position, metres,
+    /// Standard deviation between neighbouring keyframes when their lines are merged into walls:
+    /// position, metres,
     pub near_m: f64,
     /// and heading, radians.
     pub near_rad: f64,

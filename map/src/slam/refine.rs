@@ -1,5 +1,6 @@
-//! The final fit: every keyframe is matched to others of the same place, and all poses are fitted to the results, in
-//! a few rounds. In: keyframes that are nearly right. Out: better poses, and the constraints that determine them.
+//! The final fit: every keyframe is matched to others of the same place, and all poses are fitted
+//! to the results, in a few rounds. In: keyframes that are nearly right. Out: better poses, and the
+//! constraints that determine them.
 
 use crate::{
     pose2::Pose2,

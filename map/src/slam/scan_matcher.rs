@@ -1,5 +1,5 @@
-//! Scan matching from scan to scan: odometry predicts, the recent keyframes correct. In: a scan. Out: its pose
-//! relative to the last keyframe, and whether it should become one.
+//! Scan matching from scan to scan: odometry predicts, the recent keyframes correct. In: a scan.
+//! Out: its pose relative to the last keyframe, and whether it should become one.
 
 use crate::{
     pose2::{Pose2, Pose2Covariance},

@@ -1,5 +1,5 @@
-//! Surface points of several scans in one frame, indexed by position; scans are matched to them. In: scans at poses.
-//! Out: the nearest surface point of similar direction.
+//! Surface points of several scans in one frame, indexed by position; scans are matched to them.
+//! In: scans at poses. Out: the nearest surface point of similar direction.
 
 use super::cloud::Cloud;
 use crate::pose2::Pose2;
@@ -31,7 +31,8 @@ pub(crate) struct SurfaceIndex {
 }
 
 impl SurfaceIndex {
-    /// Indexes the flat points of `scans`; `bucket_m` is the largest radius of [`SurfaceIndex::nearest`].
+    /// Indexes the flat points of `scans`; `bucket_m` is the largest radius of
+    /// [`SurfaceIndex::nearest`].
     pub(crate) fn new<'a>(scans: impl Iterator<Item = (Pose2, &'a Cloud)>, bucket_m: f64) -> Self {
         let mut all = Vec::new();
         for (pose, cloud) in scans {
@@ -84,8 +85,8 @@ impl SurfaceIndex {
         Self { low, bucket_m, width, height, starts, surfaces }
     }
 
-    /// The nearest surface point within `radius_m` (at most a bucket) whose normal differs by less than `cos_turn`
-    /// says.
+    /// The nearest surface point within `radius_m` (at most a bucket) whose normal differs by less
+    /// than `cos_turn` says.
     pub(crate) fn nearest(
         &self,
         p: &Point2<f64>,

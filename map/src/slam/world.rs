@@ -41,7 +41,8 @@ pub(crate) fn rectangle([x0, y0, x1, y1]: [f64; 4]) -> Walls {
     vec![[x0, y0, x1, y0], [x1, y0, x1, y1], [x1, y1, x0, y1], [x0, y1, x0, y0]]
 }
 
-/// A ring of corridors 2 m wide around a block, with niches and pillars that make its places different.
+/// A ring of corridors 2 m wide around a block, with niches and pillars that make its places
+/// different.
 pub(crate) fn ring() -> Walls {
     let mut walls = rectangle([0.0, 0.0, 24.0, 16.0]);
     walls.extend(rectangle([2.0, 2.0, 22.0, 14.0]));

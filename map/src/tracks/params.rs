@@ -7,7 +7,8 @@ use vision::learn::near_duplicates::NoveltyParams;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct GatherParams {
-    /// Observations of an unknown object before its first view is stored: most single observations are noise.
+    /// Observations of an unknown object before its first view is stored: most single observations
+    /// are noise.
     pub min_sightings: u32,
     /// A track without stored views is dropped if it was not observed for this long, seconds.
     pub memory_s: f64,
@@ -24,7 +25,8 @@ pub struct GatherParams {
     /// Largest C^r to the icons of the track: the default upper limit of the C^r threshold
     /// (`vision::learn::params::LearnParams`).
     pub max_correlation: f64,
-    /// From half of [`super::MAX_TRACK_VIEWS`] on a view must be farther from the others by this factor.
+    /// From half of [`super::MAX_TRACK_VIEWS`] on a view must be farther from the others by this
+    /// factor.
     pub late_novelty: f64,
     /// What counts as a new view.
     pub thinning: NoveltyParams,

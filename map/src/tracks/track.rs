@@ -12,8 +12,8 @@ use vision::{
 
 /// Most views stored of a track.
 pub const MAX_TRACK_VIEWS: usize = 40;
-/// Icons of a track that a new observation is compared with: the last one, and this many spread over the stored
-/// views.
+/// Icons of a track that a new observation is compared with: the last one, and this many spread
+/// over the stored views.
 pub(super) const MAX_ICONS: usize = 4;
 
 /// One object that is followed.

@@ -29,8 +29,8 @@ impl ViewTracker {
         Self { p, tracks: vec![], numbers: 0 }
     }
 
-    /// Resumes a stored track from its views in order. It is followed again by its place only, unless it is a
-    /// landmark's. A number that is in use is ignored.
+    /// Resumes a stored track from its views in order. It is followed again by its place only,
+    /// unless it is a landmark's. A number that is in use is ignored.
     pub fn resume(&mut self, stored: StoredTrack, views: impl IntoIterator<Item = (Corners, IconFeatures)>) {
         let StoredTrack { number, landmark, sightings, known, place } = stored;
         if self.tracks.iter().any(|t| t.number == number) {
@@ -61,8 +61,8 @@ impl ViewTracker {
         self.numbers = self.numbers.max(number);
     }
 
-    /// Adds the quads of one frame of `camera` and gives the outcome of each. `wanted`: landmarks whose views are
-    /// requested; `distractors`: whether views of unknown objects are.
+    /// Adds the quads of one frame of `camera` and gives the outcome of each. `wanted`: landmarks
+    /// whose views are requested; `distractors`: whether views of unknown objects are.
     pub fn update(
         &mut self,
         (at_ns, camera): (i64, &str),

@@ -34,13 +34,13 @@ pub struct VisibilityMap {
     pub(super) obstacles: Vec<Obstacle>,
 }
 
-// Departs from method 12: no polygon Booleans, see the module `visibility`; the area is the same. Free space is not an
-// input, since walls hide what they enclose. Every condition applies to the landmark moved off its wall, not only
-// occlusion: a difference of 5 cm.
+// Departs from method 12: no polygon Booleans, see the module `visibility`; the area is the same.
+// Free space is not an input, since walls hide what they enclose. Every condition applies to the
+// landmark moved off its wall, not only occlusion: a difference of 5 cm.
 /// The visibility area of a landmark among `obstacles`: `O(M log M)` in those within reach.
 ///
-/// A landmark that an obstacle cuts is visible from nowhere, and so is one that the camera cannot show large enough
-/// or as a whole. Its roll is ignored.
+/// A landmark that an obstacle cuts is visible from nowhere, and so is one that the camera cannot
+/// show large enough or as a whole. Its roll is ignored.
 pub fn visibility(
     place: &LandmarkPlace,
     obstacles: &[Obstacle],
@@ -76,7 +76,8 @@ pub fn visibility(
     Ok(made)
 }
 
-/// The obstacles that can affect a landmark's area, in the order given: the area changes only if they do.
+/// The obstacles that can affect a landmark's area, in the order given: the area changes only if
+/// they do.
 pub fn within_reach(
     place: &LandmarkPlace,
     obstacles: &[Obstacle],
@@ -135,7 +136,8 @@ impl VisibilityMap {
         !self.polygons.is_empty() && q.coords.norm() <= self.reach_m && contains(&self.quadrants, &q)
     }
 
-    /// Distance to the boundary of the area, metres, positive inside; minus infinity without an area.
+    /// Distance to the boundary of the area, metres, positive inside; minus infinity without an
+    /// area.
     pub fn margin_m(&self, camera: &Point2<f64>) -> f64 {
         let distance =
             self.polygons.iter().map(|p| p.boundary_distance_m(camera)).fold(f64::INFINITY, f64::min);

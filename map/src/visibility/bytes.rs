@@ -1,5 +1,6 @@
-//! A visibility area as bytes, and back. In: an area, or bytes with the inputs that the area was computed of. Out: the
-//! bytes that name those inputs, the area's own bytes, or the same area again.
+//! A visibility area as bytes, and back. In: an area, or bytes with the inputs that the area was
+//! computed of. Out: the bytes that name those inputs, the area's own bytes, or the same area
+//! again.
 
 use crate::{
     place::LandmarkPlace,
@@ -15,7 +16,8 @@ use crate::{
 };
 use nalgebra::Point2;
 
-/// Version of the computation and of the bytes. It counts up whenever the same inputs give another area.
+/// Version of the computation and of the bytes. It counts up whenever the same inputs give another
+/// area.
 pub const COMPUTATION: u8 = 1;
 
 /// Bytes that are no area of this version.
@@ -23,7 +25,8 @@ pub const COMPUTATION: u8 = 1;
 #[error("not the bytes of a visibility area")]
 pub struct NotAnArea;
 
-/// Everything that an area depends on, as bytes: equal inputs, equal bytes. `near` are the obstacles within reach.
+/// Everything that an area depends on, as bytes: equal inputs, equal bytes. `near` are the
+/// obstacles within reach.
 pub fn inputs(place: &LandmarkPlace, near: &[Obstacle], settings: &VisibilitySettings) -> Vec<u8> {
     let VisibilitySettings { viewer: v, seen: s } = settings;
     let place = [
@@ -47,7 +50,8 @@ pub fn inputs(place: &LandmarkPlace, near: &[Obstacle], settings: &VisibilitySet
 }
 
 impl VisibilityMap {
-    /// What took time to compute: bounds and polygons. With the inputs it is the area again ([`Self::from_bytes`]).
+    /// What took time to compute: bounds and polygons. With the inputs it is the area again
+    /// ([`Self::from_bytes`]).
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut bytes = vec![COMPUTATION];
         let mut put = |numbers: &[f64]| bytes.extend(numbers.iter().flat_map(|v| v.to_le_bytes()));

@@ -1,5 +1,6 @@
-//! Visibility probability for an uncertain pose (method 12.5): the share of draws of the pose from which the landmark
-//! is visible. The draws are fixed points of a low-discrepancy sequence, so the result is reproducible.
+//! Visibility probability for an uncertain pose (method 12.5): the share of draws of the pose from
+//! which the landmark is visible. The draws are fixed points of a low-discrepancy sequence, so the
+//! result is reproducible.
 
 use super::VisibilityMap;
 use crate::pose2::{Pose2, Pose2Covariance, wrap_rad};
@@ -38,7 +39,8 @@ fn normals(index: usize) -> Vector3<f64> {
     Vector3::new(r * angle.cos(), r * angle.sin(), r3 * angle3.cos())
 }
 
-/// Half of the draws of a standard normal vector, transformed to the exact covariance; the others are opposite.
+/// Half of the draws of a standard normal vector, transformed to the exact covariance; the others
+/// are opposite.
 fn standard() -> Vec<Vector3<f64>> {
     let raw: Vec<_> = (1..=DRAWS / 2).map(normals).collect();
     let spread = raw.iter().map(|z| z * z.transpose()).sum::<Matrix3<f64>>() / raw.len() as f64;

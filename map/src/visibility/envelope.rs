@@ -1,6 +1,6 @@
-//! Bounds over direction. A point (x, y) in front of the landmark is (slope, inverse) = (y / x, 1 / x): straight
-//! lines stay straight, and nearer points have larger inverses. The nearest of many bounds is therefore the upper
-//! envelope of straight pieces.
+//! Bounds over direction. A point (x, y) in front of the landmark is (slope, inverse) = (y / x, 1 /
+//! x): straight lines stay straight, and nearer points have larger inverses. The nearest of many
+//! bounds is therefore the upper envelope of straight pieces.
 
 /// Slopes range from minus this to this.
 pub(super) const MAX_SLOPE: f64 = 1.0;
@@ -20,8 +20,8 @@ pub(super) struct Piece {
 }
 
 impl Piece {
-    /// A piece through two points (slope, inverse) in any order, cut to the range of slopes. `None` where nothing is
-    /// left.
+    /// A piece through two points (slope, inverse) in any order, cut to the range of slopes. `None`
+    /// where nothing is left.
     pub(super) fn through(a: (f64, f64), b: (f64, f64)) -> Option<Self> {
         let (a, b) = if a.0 <= b.0 { (a, b) } else { (b, a) };
         let (from, to) = (a.0.max(-MAX_SLOPE), b.0.min(MAX_SLOPE));

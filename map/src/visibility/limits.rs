@@ -1,6 +1,7 @@
-//! The limits of landmark and camera without any wall: incidence, apparent size, fit in the image, tilt range (method
-//! 12.1 to 12.3), for a landmark of any tilt. In one direction on the floor each limit allows one range of distances,
-//! in closed form except for the height, whose ends are roots of a quartic.
+//! The limits of landmark and camera without any wall: incidence, apparent size, fit in the image,
+//! tilt range (method 12.1 to 12.3), for a landmark of any tilt. In one direction on the floor each
+//! limit allows one range of distances, in closed form except for the height, whose ends are roots
+//! of a quartic.
 
 use crate::visibility::{
     local_frame::Moved,
@@ -9,8 +10,8 @@ use crate::visibility::{
 use std::f64::consts::FRAC_PI_2;
 use vision::pose::LandmarkSize;
 
-/// A landmark nearer to the camera's height than this counts as this far above it, metres, so that elevations are
-/// defined.
+/// A landmark nearer to the camera's height than this counts as this far above it, metres, so that
+/// elevations are defined.
 const MIN_RISE_M: f64 = 1e-6;
 /// Bisections of a range in which a bound is sought: a relative precision of 1e-15.
 const HALVINGS: u32 = 50;
@@ -19,11 +20,12 @@ const GOLDEN: f64 = 0.618_033_988_749_895;
 
 /// The conditions of one landmark for one camera.
 ///
-/// The camera is at (r cos d, r sin d, -rise) from the landmark's middle, direction d from its normal on the floor.
-/// The normal is n = (cos t, 0, -sin t), its height runs along u = (sin t, 0, cos t), its width along (0, 1, 0).
-// Departs from method 12.1 to 12.3: these are its conditions in space. For a landmark at the camera's height, on a
-// wall, they are those of the plan view; high up on a wall the plan view takes the landmark for nearer and less
-// oblique than it is.
+/// The camera is at (r cos d, r sin d, -rise) from the landmark's middle, direction d from its
+/// normal on the floor. The normal is n = (cos t, 0, -sin t), its height runs along u = (sin t, 0,
+/// cos t), its width along (0, 1, 0).
+// Departs from method 12.1 to 12.3: these are its conditions in space. For a landmark at the
+// camera's height, on a wall, they are those of the plan view; high up on a wall the plan view
+// takes the landmark for nearer and less oblique than it is.
 #[derive(Debug, Clone)]
 pub(super) struct Limits {
     rise_m: f64,
@@ -39,7 +41,8 @@ pub(super) struct Limits {
     tilt_m: (f64, f64),
 }
 
-/// Nearest and farthest distance on the floor at which the unit can tilt towards the landmark's centre, metres.
+/// Nearest and farthest distance on the floor at which the unit can tilt towards the landmark's
+/// centre, metres.
 fn tilt_range_m(rise_m: f64, [low, high]: [f64; 2]) -> Option<(f64, f64)> {
     // A view down at a landmark is a view up at its mirror image.
     let (rise, low, high) = if rise_m < 0.0 { (-rise_m, -high, -low) } else { (rise_m, low, high) };
@@ -90,8 +93,8 @@ impl Limits {
         self.high_within_m(cosine, (near, far))
     }
 
-    /// Limit of incidence: with the angle e from the vertical, r = rise tan e, it is a sin e + b cos e >=
-    /// `min_cosine`.
+    /// Limit of incidence: with the angle e from the vertical, r = rise tan e, it is a sin e + b
+    /// cos e >= `min_cosine`.
     fn upright_m(&self, cosine: f64) -> Option<(f64, f64)> {
         let (sin_tilt, cos_tilt) = self.tilt;
         let (across, down) = (cosine * cos_tilt, sin_tilt.copysign(sin_tilt * self.rise_m));
@@ -109,7 +112,8 @@ impl Limits {
         Some((rise * low.max(0.0).tan(), far))
     }
 
-    /// Largest distance at which it is wide enough: (r^2 + rise^2)^2 = wide^2 (r^2 cos^2 d + rise^2).
+    /// Largest distance at which it is wide enough: (r^2 + rise^2)^2 = wide^2 (r^2 cos^2 d +
+    /// rise^2).
     fn wide_to_m(&self, cosine: f64) -> Option<f64> {
         let (rise2, wide2) = (self.rise_m.powi(2), self.wide_m.powi(2));
         let half = rise2 - 0.5 * wide2 * cosine * cosine;
@@ -119,8 +123,8 @@ impl Limits {
         (square > 0.0).then(|| square.sqrt())
     }
 
-    /// Smallest distance at which it fits: its bounding box in the image, without foreshortening of the height by
-    /// elevation.
+    /// Smallest distance at which it fits: its bounding box in the image, without foreshortening of
+    /// the height by elevation.
     fn fits_from_m(&self, sine: f64, cosine: f64) -> f64 {
         let (sin_tilt, cos_tilt) = self.tilt;
         let LandmarkSize { width_m, height_m } = self.size;
@@ -134,8 +138,8 @@ impl Limits {
         (distance * distance - self.rise_m.powi(2)).max(0.0).sqrt()
     }
 
-    // Behind and below a landmark tilted by 20 to 40 degrees the apparent height is not monotonic at very oblique
-    // views: it dips by at most 12 %. Such a dip is not cut out.
+    // Behind and below a landmark tilted by 20 to 40 degrees the apparent height is not monotonic
+    // at very oblique views: it dips by at most 12 %. Such a dip is not cut out.
     /// The part of a range in which it is high enough.
     fn high_within_m(&self, cosine: f64, (near, far): (f64, f64)) -> Option<(f64, f64)> {
         let enough = |r: f64| self.high_m * self.height_m2(cosine, r).sqrt() >= r * r + self.rise_m.powi(2);
@@ -150,7 +154,8 @@ impl Limits {
         }
     }
 
-    /// Squared distance of the camera from the line of the landmark's height, which determines its foreshortening.
+    /// Squared distance of the camera from the line of the landmark's height, which determines its
+    /// foreshortening.
     fn height_m2(&self, cosine: f64, r: f64) -> f64 {
         let (sin_tilt, cos_tilt) = self.tilt;
         let along = r * cosine * sin_tilt - self.rise_m * cos_tilt;
@@ -208,8 +213,8 @@ mod tests {
 
     #[test]
     fn under_a_ceiling_the_floor_circle_is_that_of_the_incidence_or_the_size() {
-        // By hand, 1 m above the camera: straight ahead the width is whole and ends at 512 * 0.6 / 75 m in space, the
-        // height is foreshortened: 512 * 0.6 * 1 / (r^2 + 1) = 75.
+        // By hand, 1 m above the camera: straight ahead the width is whole and ends at 512 * 0.6 /
+        // 75 m in space, the height is foreshortened: 512 * 0.6 * 1 / (r^2 + 1) = 75.
         let limits = limits(FRAC_PI_2, 2.2);
         let diameter: f64 = 512.0 * 0.6 / 75.0;
         for direction in [0.0, FRAC_PI_2, 3.0 * FRAC_PI_2, 2.0 * FRAC_PI_2] {
@@ -222,7 +227,8 @@ mod tests {
 
     #[test]
     fn high_on_a_wall_it_is_visible_from_a_distance_only() {
-        // By hand: 1 m above the camera the view angle is below 75 degrees from r > 1 / tan 75 on, straight ahead.
+        // By hand: 1 m above the camera the view angle is below 75 degrees from r > 1 / tan 75 on,
+        // straight ahead.
         let limits = limits(0.0, 2.2);
         let (near, far) = limits.span_m(0.0).unwrap();
         let fits: f64 = 0.6 / (0.9 * 480.0 / 512.0);

@@ -7,7 +7,8 @@ use vision::pose::LandmarkSize;
 /// A landmark with a smaller tilt hangs on a wall: what is behind it hides nothing.
 const UPRIGHT_RAD: f64 = 1e-9;
 
-/// The frame whose origin is the landmark's middle, moved off its wall; x along the normal on the floor.
+/// The frame whose origin is the landmark's middle, moved off its wall; x along the normal on the
+/// floor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct LocalFrame {
     pub(super) origin: Point2<f64>,

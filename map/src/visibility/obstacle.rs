@@ -21,7 +21,8 @@ impl From<&crate::segments::LaserSegment> for Obstacle {
 }
 
 impl Obstacle {
-    /// Whether it can come between camera and landmark at all: the lines of sight run above the lower of the two.
+    /// Whether it can come between camera and landmark at all: the lines of sight run above the
+    /// lower of the two.
     pub(super) fn hides(&self, place: &LandmarkPlace, viewer: &PanTiltCamera) -> bool {
         let half_height = 0.5 * place.size.height_m * place.tilt_rad.cos();
         let lowest = (place.z_m - half_height).min(viewer.camera_height_m);

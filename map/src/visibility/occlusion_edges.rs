@@ -1,5 +1,5 @@
-//! The limits as straight pieces over direction in one quarter: chords that differ from the curves by at most a fifth
-//! of a millimetre.
+//! The limits as straight pieces over direction in one quarter: chords that differ from the curves
+//! by at most a fifth of a millimetre.
 
 use super::{
     envelope::{MAX_SLOPE, Piece},

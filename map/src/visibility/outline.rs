@@ -22,8 +22,8 @@ const MIN_AREA_M2: f64 = 1e-6;
 pub struct Polygon {
     /// Corners, metres, map frame.
     pub corners: Vec<Point2<f64>>,
-    /// Corners of its hole, clockwise; empty for none. A landmark under a ceiling that is visible from all sides but
-    /// not from directly below has one.
+    /// Corners of its hole, clockwise; empty for none. A landmark under a ceiling that is visible
+    /// from all sides but not from directly below has one.
     pub hole: Vec<Point2<f64>>,
 }
 
@@ -111,8 +111,8 @@ pub(super) fn outline(frame: &LocalFrame, quadrants: &[Quadrant; 4]) -> Vec<Poly
     closed(runs).into_iter().filter_map(|(run, round)| run.polygon(frame, round)).collect()
 }
 
-/// The last run goes on with the first where both reach the direction at which directions begin; one that meets
-/// itself there goes all round.
+/// The last run goes on with the first where both reach the direction at which directions begin;
+/// one that meets itself there goes all round.
 fn closed(mut runs: Vec<Run>) -> Vec<(Run, bool)> {
     let begins = runs.first().is_some_and(|r| r.from <= -MAX_SLOPE + SAME);
     let ends = runs.last().is_some_and(|r| r.to >= direction(3, MAX_SLOPE) - SAME);

@@ -1,5 +1,5 @@
-//! Occlusion: the full penumbra of each obstacle, from which some part of the landmark is hidden (method 12.4), as
-//! bounds over direction. Exact, not sampled.
+//! Occlusion: the full penumbra of each obstacle, from which some part of the landmark is hidden
+//! (method 12.4), as bounds over direction. Exact, not sampled.
 
 use crate::visibility::{
     envelope::{MAX_SLOPE, Piece},
@@ -10,7 +10,8 @@ use nalgebra::{Point2, Vector2};
 /// Obstacles nearer than this to the landmark's centre are cut there, metres.
 const MIN_AHEAD_M: f64 = 1e-6;
 
-/// The landmark's extent on the floor about the origin: half its depth along x, half its width along y.
+/// The landmark's extent on the floor about the origin: half its depth along x, half its width
+/// along y.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Footprint {
     pub half_depth_m: f64,
@@ -43,8 +44,9 @@ impl Footprint {
 
 /// The near borders of one obstacle's penumbra within a quarter.
 ///
-/// A point of the landmark is hidden behind the obstacle, between the lines from that point past its ends. The
-/// corners of the landmark give the borders: every such line lies in the penumbra, and its tangents are among them.
+/// A point of the landmark is hidden behind the obstacle, between the lines from that point past
+/// its ends. The corners of the landmark give the borders: every such line lies in the penumbra,
+/// and its tangents are among them.
 pub(super) fn penumbra(
     footprint: &Footprint,
     a: &Point2<f64>,

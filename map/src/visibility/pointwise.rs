@@ -1,12 +1,13 @@
-//! Visibility of a landmark from one point: every condition of method 12 separately, obstacle by obstacle. Slow and
-//! exact; the reference for the polygons, with which it shares only the definition.
+//! Visibility of a landmark from one point: every condition of method 12 separately, obstacle by
+//! obstacle. Slow and exact; the reference for the polygons, with which it shares only the
+//! definition.
 
 use super::{Obstacle, PanTiltCamera, VisibilityParams};
 use crate::place::LandmarkPlace;
 use nalgebra::{Point2, Point3, Vector3};
 
-/// Whether the whole landmark is visible for a camera at `q`: large enough, not too oblique, without an obstacle
-/// between.
+/// Whether the whole landmark is visible for a camera at `q`: large enough, not too oblique,
+/// without an obstacle between.
 pub fn sees(
     place: &LandmarkPlace,
     obstacles: &[Obstacle],
@@ -42,14 +43,16 @@ pub fn sees(
     }
     let corners = [(-1.0, -1.0), (-1.0, 1.0), (1.0, 1.0), (1.0, -1.0)]
         .map(|(y, z)| Point2::from(face(y * half_width, z * half_height).coords.xy()));
-    // Triangles of the camera with all pairs of corners cover the hull of camera and landmark on the floor.
+    // Triangles of the camera with all pairs of corners cover the hull of camera and landmark on
+    // the floor.
     let hidden =
         |o: &Obstacle| (0..4).any(|i| (0..i).any(|j| meets(&[*q, corners[i], corners[j]], &o.a, &o.b)));
     let lowest = (place.z_m - half_height * place.tilt_rad.cos()).min(viewer.camera_height_m);
     !obstacles.iter().any(|o| o.height_m.is_none_or(|h| h > lowest) && hidden(o))
 }
 
-/// Whether a segment touches a triangle: what three half-planes leave of it. A triangle without area touches nothing.
+/// Whether a segment touches a triangle: what three half-planes leave of it. A triangle without
+/// area touches nothing.
 fn meets(triangle: &[Point2<f64>; 3], a: &Point2<f64>, b: &Point2<f64>) -> bool {
     let twice_area = (triangle[1] - triangle[0]).perp(&(triangle[2] - triangle[0]));
     if twice_area.abs() < 1e-12 {

@@ -1,4 +1,5 @@
-//! Bounds in all directions about a landmark: four quarters, each with its own axis, so that no slope exceeds one.
+//! Bounds in all directions about a landmark: four quarters, each with its own axis, so that no
+//! slope exceeds one.
 
 use crate::visibility::{
     envelope::{Envelope, Piece},
@@ -19,7 +20,8 @@ pub(super) struct Quadrant {
     pub near: Envelope,
 }
 
-/// The bounds of all quarters, the first ahead, the others to the left. `obstacles` in the landmark's frame.
+/// The bounds of all quarters, the first ahead, the others to the left. `obstacles` in the
+/// landmark's frame.
 pub(super) fn quadrants(
     limits: &Limits,
     footprint: &Footprint,

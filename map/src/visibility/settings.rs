@@ -63,7 +63,8 @@ pub struct VisibilityParams {
     pub min_side_px: f64,
     /// Largest share of the image that a side may take, 0 to 1; 0.9 by method 12.3.
     pub max_fill: f64,
-    /// Distance of the landmark in front of its wall, so that its own wall does not hide it; 1 mm to 0.5 m.
+    /// Distance of the landmark in front of its wall, so that its own wall does not hide it; 1 mm
+    /// to 0.5 m.
     pub standoff_m: f64,
 }
 

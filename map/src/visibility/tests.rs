@@ -61,8 +61,9 @@ fn ceiling_sign(obstacles: &[Obstacle]) -> VisibilityMap {
 #[test]
 fn a_sign_under_the_ceiling_is_visible_from_a_ring() {
     let map = ceiling_sign(&[]);
-    // By hand: the unit reaches it from rise / tan 1 on; towards the top of the sign its height is foreshortened,
-    // 512 * 0.6 * rise / (r^2 + rise^2) = 75. The standoff moves it 5 cm below the ceiling.
+    // By hand: the unit reaches it from rise / tan 1 on; towards the top of the sign its height is
+    // foreshortened, 512 * 0.6 * rise / (r^2 + rise^2) = 75. The standoff moves it 5 cm below the
+    // ceiling.
     let rise: f64 = 1.25;
     let (near, far) = (rise / 1.0_f64.tan(), (512.0 * 0.6 / 75.0 * rise - rise * rise).sqrt());
     for quarter in 0..4 {
@@ -97,8 +98,9 @@ fn a_wall_cuts_the_ring_under_the_ceiling() {
 
 #[test]
 fn the_open_area_is_two_discs_and_a_cone() {
-    // By hand: alone on its wall a poster as wide as high is visible in the disc tangent to the wall, cut by the
-    // cone, less the discs where it does not fit. Polar about the centre: r from max(0, ...) to D cos(psi).
+    // By hand: alone on its wall a poster as wide as high is visible in the disc tangent to the
+    // wall, cut by the cone, less the discs where it does not fit. Polar about the centre: r from
+    // max(0, ...) to D cos(psi).
     let landmark = place(0.0, 0.0, 1.2, 0.0, (0.6, 0.6));
     let viewer = PanTiltCamera { height_px: 640.0, ..PanTiltCamera::default() };
     let p = VisibilityParams { standoff_m: 0.001, ..VisibilityParams::default() };
@@ -119,8 +121,8 @@ fn the_open_area_is_two_discs_and_a_cone() {
 
 #[test]
 fn a_pillar_casts_its_full_penumbra() {
-    // By hand: the landmark is 0.6 m wide at x = 0.05; a pillar 0.2 m wide at x = 0.85 hides some part of it from x =
-    // 2.45 within |y| < 0.1 + 2 (0.1 + 0.3), by the crossing tangents.
+    // By hand: the landmark is 0.6 m wide at x = 0.05; a pillar 0.2 m wide at x = 0.85 hides some
+    // part of it from x = 2.45 within |y| < 0.1 + 2 (0.1 + 0.3), by the crossing tangents.
     let map = area_among(&[wall(0.85, -0.1, 0.85, 0.1)]);
     let edge = 0.1 + 2.0 * 0.4;
     for side in [-1.0, 1.0] {

@@ -1,4 +1,5 @@
-//! Lists of numbers of one length, for the OpenAPI document alone: the fields themselves are arrays.
+//! Lists of numbers of one length, for the OpenAPI document alone: the fields themselves are
+//! arrays.
 
 /// Two numbers: x and y in metres, or columns and rows in pixels.
 #[derive(Debug, utoipa::ToSchema)]

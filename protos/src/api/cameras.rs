@@ -1,4 +1,5 @@
-//! `/robots/{robot}/cameras`: what is known of a robot's cameras, and their calibration from views of landmarks.
+//! `/robots/{robot}/cameras`: what is known of a robot's cameras, and their calibration from views
+//! of landmarks.
 
 use crate::v1;
 use serde::{Deserialize, Deserializer, Serialize};
@@ -19,7 +20,8 @@ pub struct Camera {
     pub frames: u64,
     /// Views of landmarks from different sides that are kept for calibration.
     pub views: usize,
-    /// What the residuals of its fixes say: `suspicion` is set when the intrinsics seem off, with the reason and its number.
+    /// What the residuals of its fixes say: `suspicion` is set when the intrinsics seem off, with
+    /// the reason and its number.
     pub intrinsics_monitor: IntrinsicsMonitorBody,
 }
 
@@ -48,7 +50,8 @@ pub struct IntrinsicsMonitorBody {
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(tag = "reason", rename_all = "snake_case")]
 pub enum IntrinsicsSuspicionBody {
-    /// The true focal length seems longer than stated by this share (shorter: negative), with standard deviation.
+    /// The true focal length seems longer than stated by this share (shorter: negative), with
+    /// standard deviation.
     Focal {
         /// True over stated, less 1.
         error: f64,
@@ -60,7 +63,8 @@ pub enum IntrinsicsSuspicionBody {
         /// About 1 where all is well.
         reduced_chi2: f64,
     },
-    /// So many of the frames gave no pose because the corners cannot be seen from a robot on the floor.
+    /// So many of the frames gave no pose because the corners cannot be seen from a robot on the
+    /// floor.
     Refused {
         /// Share of the frames, 0 to 1.
         share: f64,
@@ -98,7 +102,8 @@ pub struct UploadedViews {
     pub size_width_m: f64,
     /// See `size_width_m`.
     pub size_height_m: f64,
-    /// At least two, better five to ten, from at least three sides that differ by more than 15 degrees.
+    /// At least two, better five to ten, from at least three sides that differ by more than 15
+    /// degrees.
     pub views: Vec<UploadedView>,
 }
 
@@ -118,11 +123,13 @@ pub struct CalibrationRequest {
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct CalibrationConstraintsBody {
-    /// Radial coefficients (k1, k2) that may be fitted, 0 to 2; only those are that the views ask for.
+    /// Radial coefficients (k1, k2) that may be fitted, 0 to 2; only those are that the views ask
+    /// for.
     pub radial: u8,
     /// The camera does not roll (C2).
     pub zero_roll: bool,
-    /// The camera is this high over the landmark's centre in all views, metres; negative below, -100 to 100 (C3).
+    /// The camera is this high over the landmark's centre in all views, metres; negative
+    /// below, -100 to 100 (C3).
     pub height_m: Option<f64>,
     /// The ratio of the landmark's sides is not what its size says, and is found with the camera.
     pub unknown_aspect: bool,
@@ -151,11 +158,13 @@ fn null_is_infinite<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error>
     Ok(Option::deserialize(from)?.unwrap_or(f64::INFINITY))
 }
 
-/// A calibrated camera. Standard deviations are infinite (null in JSON) where the views do not determine them.
+/// A calibrated camera. Standard deviations are infinite (null in JSON) where the views do not
+/// determine them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct CalibrationReport {
-    /// As frames carry it, with the standard deviations below: what is not known of the camera is then in the poses.
+    /// As frames carry it, with the standard deviations below: what is not known of the camera is
+    /// then in the poses.
     pub intrinsics: v1::Intrinsics,
     /// Width of the pictures that it was calibrated with.
     pub width_px: u32,
@@ -177,7 +186,8 @@ pub struct CalibrationReport {
     pub linear_fx_px: Option<f64>,
     /// Root mean square residual per coordinate.
     pub rms_px: f64,
-    /// Weighted squared residual over its degrees of freedom: about 1 where corners are as good as claimed.
+    /// Weighted squared residual over its degrees of freedom: about 1 where corners are as good as
+    /// claimed.
     pub reduced_chi2: f64,
     /// Orientations of the landmark that differ by more than 15 degrees.
     pub orientations: usize,

@@ -54,7 +54,8 @@ pub struct ReplayQuery {
     pub frames: Option<usize>,
 }
 
-/// What robots on the map would be told otherwise if the draft were published: their last frames, answered by map and draft.
+/// What robots on the map would be told otherwise if the draft were published: their last frames,
+/// answered by map and draft.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct Replay {

@@ -14,7 +14,8 @@ pub struct EventQuery {
     /// Only those of these kinds, with commas between.
     #[cfg_attr(feature = "openapi", param(value_type = Option<Vec<EventKind>>, style = Form, explode = false))]
     pub kind: Option<String>,
-    /// The id of the last event that was received; the header `Last-Event-ID` says the same and counts more.
+    /// The id of the last event that was received; the header `Last-Event-ID` says the same and
+    /// counts more.
     pub last_event_id: Option<String>,
 }
 
@@ -53,8 +54,8 @@ pub enum GatheringChange {
 pub enum ServerEventBody {
     /// The first of every stream: the events after this one follow.
     Ready,
-    /// Events are missing before this one, because the reader was away or behind for too long, or the server was started
-    /// again: read anew what is shown.
+    /// Events are missing before this one, because the reader was away or behind for too long, or
+    /// the server was started again: read anew what is shown.
     Reset,
     /// A map has a new version, or is gone.
     MapChanged {

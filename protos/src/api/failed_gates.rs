@@ -22,7 +22,8 @@ pub enum GateBody {
     NotDistinct,
     /// It looks like a landmark in use, and nothing tells the two apart: see `look_alike`.
     LooksLike,
-    /// Its picture alone does not name it, since it looks like another one; a known pose does. See `look_alike`.
+    /// Its picture alone does not name it, since it looks like another one; a known pose does. See
+    /// `look_alike`.
     ByPoseOnly,
     /// Its stored model cannot be used.
     StoredModel,

@@ -1,4 +1,5 @@
-//! `/maps/{map}/gatherings`: training views gathered by a robot that drives past, and a person's decision on them.
+//! `/maps/{map}/gatherings`: training views gathered by a robot that drives past, and a person's
+//! decision on them.
 
 use super::{failed_gates::FailedGate, learning::Job, views::PlacementReportBody};
 use serde::{Deserialize, Serialize};
@@ -10,7 +11,8 @@ use serde::{Deserialize, Serialize};
 pub struct NewGatheringBody {
     /// A robot that stands on this map.
     pub robot: String,
-    /// Only views of this landmark, which must be learnt already; absent: of whatever flat four-sided thing is none yet.
+    /// Only views of this landmark, which must be learnt already; absent: of whatever flat
+    /// four-sided thing is none yet.
     pub landmark: Option<String>,
     /// Views of every landmark that is recognised beyond doubt, too.
     #[serde(default)]
@@ -115,8 +117,8 @@ pub struct TrackSummary {
     pub known: u32,
     /// Numbers of its views; `views/{number}/icon` is the picture.
     pub views: Vec<i64>,
-    /// Views beside these that do not agree on its place: another border of it was found, or something else. They are left
-    /// out.
+    /// Views beside these that do not agree on its place: another border of it was found, or
+    /// something else. They are left out.
     pub inconsistent_views: usize,
     /// The view that stands best for all.
     pub best_view: Option<i64>,
@@ -129,11 +131,13 @@ pub struct TrackSummary {
     pub place: Option<EstimatedPlace>,
     /// Why that is not known.
     pub not_placed: Option<String>,
-    /// Whether a lesson of these views would pass every gate, look-alikes apart, and nothing else speaks against it.
+    /// Whether a lesson of these views would pass every gate, look-alikes apart, and nothing else
+    /// speaks against it.
     pub passes: bool,
     /// What speaks against it.
     pub failed_gates: Vec<FailedGate>,
-    /// Other tracks that look alike or are at the same place: perhaps the same thing twice, or two of one kind.
+    /// Other tracks that look alike or are at the same place: perhaps the same thing twice, or two
+    /// of one kind.
     pub similar_tracks: Vec<u32>,
 }
 
@@ -165,8 +169,8 @@ pub struct TrackList {
 pub struct AcceptedTrackBody {
     /// Number of the track.
     pub track: u32,
-    /// Name of the landmark it becomes: a new one, or one without views. Several tracks of one object may be given one
-    /// name. Not needed for views of a landmark that is known.
+    /// Name of the landmark it becomes: a new one, or one without views. Several tracks of one
+    /// object may be given one name. Not needed for views of a landmark that is known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
 }

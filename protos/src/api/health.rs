@@ -16,42 +16,46 @@ pub struct Health {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct Readiness {
-    /// `ready`, or `degraded`: everything runs, but one of `counts` is not 0, the disk has no room, the server has no part in
-    /// its router, another server has one of its maps, the last scheduled backup failed, or the check of the database did.
+    /// `ready`, or `degraded`: everything runs, but one of `counts` is not 0, the disk has no room,
+    /// the server has no part in its router, another server has one of its maps, the last scheduled
+    /// backup failed, or the check of the database did.
     pub status: String,
     /// How many there are of what is wrong, for whoever asks.
     #[serde(default)]
     pub counts: ReadinessCounts,
-    /// Maps whose stored version cannot be made ready, with the reason: an earlier version is used, or none since the
-    /// server started. A later change of the map tries again. Only maps of the token that asks: none without one.
+    /// Maps whose stored version cannot be made ready, with the reason: an earlier version is used,
+    /// or none since the server started. A later change of the map tries again. Only maps of the
+    /// token that asks: none without one.
     pub maps_not_in_use: BTreeMap<String, String>,
-    /// Views, tracks and underlays whose stored picture is damaged, at most 100, of maps of the token that asks: none
-    /// without one. The picture is not used; the same photograph, uploaded again, mends it.
+    /// Views, tracks and underlays whose stored picture is damaged, at most 100, of maps of the
+    /// token that asks: none without one. The picture is not used; the same photograph, uploaded
+    /// again, mends it.
     #[serde(default)]
     pub damaged_pictures: Vec<String>,
-    /// Why the server has no part in the router that it is to join: no connection, or a name that another server has. Told
-    /// to whoever sees all maps.
+    /// Why the server has no part in the router that it is to join: no connection, or a name that
+    /// another server has. Told to whoever sees all maps.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub router: Option<String>,
-    /// Maps that another server has, too, with the reason: robots are refused on them here. Only maps of the token that
-    /// asks.
+    /// Maps that another server has, too, with the reason: robots are refused on them here. Only
+    /// maps of the token that asks.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub maps_not_served: BTreeMap<String, String>,
     /// The check of the whole database after the start.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub database_check: Option<DatabaseCheckBody>,
-    /// The newest backup, and why the last attempt failed. A token for all maps is told the name and the reason.
+    /// The newest backup, and why the last attempt failed. A token for all maps is told the name
+    /// and the reason.
     #[serde(default)]
     pub backup: BackupHealth,
-    /// For how many seconds each part that has work, or is probed, has not gone on. Beyond a few the server is not ready.
-    /// Empty for whoever does not see all maps.
+    /// For how many seconds each part that has work, or is probed, has not gone on. Beyond a few
+    /// the server is not ready. Empty for whoever does not see all maps.
     #[serde(default)]
     pub parts_still_s: BTreeMap<String, u64>,
     /// The disk of the data directory; absent for whoever does not see all maps.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub storage: Option<StorageHealth>,
-    /// Panics caught since the start, by where: what they met was refused or dropped, everything else went on. Each is in
-    /// the log. Anything but 0 is a fault of the program.
+    /// Panics caught since the start, by where: what they met was refused or dropped, everything
+    /// else went on. Each is in the log. Anything but 0 is a fault of the program.
     pub panics: BTreeMap<String, u64>,
 }
 

@@ -13,13 +13,13 @@ pub struct Commit {
     pub parent: Option<u64>,
     /// ms since the Unix epoch.
     pub created_ms: i64,
-    /// Name of the token, `local` for that of the server's machine, `server` for what the server does by itself. Of a job:
-    /// who asked for it.
+    /// Name of the token, `local` for that of the server's machine, `server` for what the server
+    /// does by itself. Of a job: who asked for it.
     pub author: String,
     /// The job, if one did it.
     pub job: Option<u64>,
-    /// Method and path of the request, as `PATCH /maps/{map}/landmarks/{landmark}`; of a job its kind; `outside` for
-    /// what another program wrote into the database.
+    /// Method and path of the request, as `PATCH /maps/{map}/landmarks/{landmark}`; of a job its
+    /// kind; `outside` for what another program wrote into the database.
     pub operation: String,
     /// The reason that the client gave (header `Waymark-Why`).
     pub why: Option<String>,
@@ -52,7 +52,8 @@ pub struct ChangeSummary {
     pub reference_runs_added: u64,
     /// Reference runs that are gone.
     pub reference_runs_removed: u64,
-    /// Which settings differ: `name`, `site`, `building`, `floor`, `parent`, `fusion_mode`, `areas`, `visibility_settings`.
+    /// Which settings differ: `name`, `site`, `building`, `floor`, `parent`, `fusion_mode`,
+    /// `areas`, `visibility_settings`.
     pub settings: Vec<String>,
     /// Names of the first landmarks that differ, at most 8.
     pub landmarks: Vec<String>,

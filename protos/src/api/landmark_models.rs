@@ -1,5 +1,5 @@
-//! `.../landmarks/{landmark}/model`, `/distances`, `/icon` and `/maps/{map}/duplicates`: what was learnt, and how it tells
-//! landmarks apart.
+//! `.../landmarks/{landmark}/model`, `/distances`, `/icon` and `/maps/{map}/duplicates`: what was
+//! learnt, and how it tells landmarks apart.
 
 use serde::{Deserialize, Serialize};
 
@@ -124,7 +124,8 @@ pub struct DistanceHistogram {
     pub own: Vec<u32>,
     /// Own distances beyond the last bin, infinite ones included.
     pub own_beyond: u32,
-    /// Distances to other landmarks and distractors, by bin; of these only the 64 nearest are stored.
+    /// Distances to other landmarks and distractors, by bin; of these only the 64 nearest are
+    /// stored.
     pub others: Vec<u32>,
     /// Distances to others that are in no bin: beyond the last one, or not among the nearest.
     pub others_beyond: u64,
@@ -144,14 +145,15 @@ pub struct LandmarkDistances {
     pub gradient_dissimilarity: DistanceHistogram,
 }
 
-/// How strongly the points of quads spoke for a landmark in the stored answers: heaps by the negative decimal logarithm of
-/// the number of false alarms.
+/// How strongly the points of quads spoke for a landmark in the stored answers: heaps by the
+/// negative decimal logarithm of the number of false alarms.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct LandmarkEvidence {
     /// The landmark.
     pub landmark: String,
-    /// Stored answers that were read: the newest that name it or were compared with it, at most 500.
+    /// Stored answers that were read: the newest that name it or were compared with it, at
+    /// most 500.
     pub answers: u64,
     /// Accepted from here upwards.
     pub threshold: f64,

@@ -95,7 +95,8 @@ pub struct Place {
     pub y_m: f64,
     /// Centre, above the floor.
     pub z_m: f64,
-    /// Direction of the outward normal on the floor, counter-clockwise from map x; under a ceiling, where the top points.
+    /// Direction of the outward normal on the floor, counter-clockwise from map x; under a ceiling,
+    /// where the top points.
     pub theta_rad: f64,
     /// Turn about the outward normal, within 0.5; 0 when the sides are vertical.
     #[serde(default, skip_serializing_if = "is_zero")]
@@ -221,8 +222,9 @@ pub struct ObservedPlaceBody {
 pub struct Landmark {
     /// `[a-z0-9_-]{1,64}`, unique in the map.
     pub name: String,
-    /// Another one after every edit of name, size, place, views or, by a person, health, and after every lesson of its model;
-    /// the same after what robots do by themselves. `If-Match` takes it, in quotes.
+    /// Another one after every edit of name, size, place, views or, by a person, health, and after
+    /// every lesson of its model; the same after what robots do by themselves. `If-Match` takes it,
+    /// in quotes.
     #[serde(default)]
     pub revision: String,
     /// How far it has come.
@@ -264,7 +266,8 @@ pub struct NewLandmark {
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct LandmarkPatch {
-    /// Another name, `[a-z0-9_-]{1,64}`, unique in the map. Everything that belongs to the landmark stays with it.
+    /// Another name, `[a-z0-9_-]{1,64}`, unique in the map. Everything that belongs to the landmark
+    /// stays with it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
     /// Width and height.

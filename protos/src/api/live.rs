@@ -16,7 +16,8 @@ pub struct TrajectoriesBody {
     pub truth: Vec<Pose2>,
 }
 
-/// An event of a map's stream. Its name is the variant in snake case; its data are the fields as JSON.
+/// An event of a map's stream. Its name is the variant in snake case; its data are the fields as
+/// JSON.
 #[derive(Debug, Clone, PartialEq)]
 pub enum LiveEventBody {
     /// A frame was answered.
@@ -35,8 +36,9 @@ pub enum LiveEventBody {
     Missed(u64),
 }
 
-/// The data of an event of a map's stream, for the document: the name of the event says which of these it is. `odometry` and
-/// `truth` are positions; `missed` is the number of events that a slow reader has missed.
+/// The data of an event of a map's stream, for the document: the name of the event says which of
+/// these it is. `odometry` and `truth` are positions; `missed` is the number of events that a slow
+/// reader has missed.
 #[cfg(feature = "openapi")]
 #[derive(Debug, Serialize, utoipa::ToSchema)]
 #[serde(untagged)]

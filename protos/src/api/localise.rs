@@ -20,19 +20,21 @@ pub struct ScanBody {
     pub ranges_m: Vec<Option<f32>>,
 }
 
-/// The form of a localisation, for the document: it is read part by part. At least a picture or a scan is needed.
+/// The form of a localisation, for the document: it is read part by part. At least a picture or a
+/// scan is needed.
 #[cfg(feature = "openapi")]
 #[derive(Debug, utoipa::ToSchema)]
 pub struct LocaliseForm {
     /// PNG or JPEG; with it, `intrinsics` and `mounting` are needed.
     #[schema(value_type = Option<String>, format = Binary)]
     pub image: Option<Vec<u8>>,
-    /// JSON, `{"fx_px", "fy_px", "cx_px", "cy_px", ...}`, with `width_px` and `height_px` as a photograph has them.
+    /// JSON, `{"fx_px", "fy_px", "cx_px", "cy_px", ...}`, with `width_px` and `height_px` as a
+    /// photograph has them.
     pub intrinsics: Option<String>,
     /// JSON, `robot_from_camera`: `{"x_m", "y_m", "z_m", "qw", "qx", "qy", "qz"}`.
     pub mounting: Option<String>,
-    /// JSON, a scan from the same place: `robot_from_laser`, `first_bearing_rad`, `bearing_step_rad`, `max_range_m`,
-    /// `ranges_m` (null without return).
+    /// JSON, a scan from the same place: `robot_from_laser`, `first_bearing_rad`,
+    /// `bearing_step_rad`, `max_range_m`, `ranges_m` (null without return).
     pub scan: Option<String>,
 }
 
@@ -73,8 +75,9 @@ pub struct LocaliseResult {
     pub map_version: u64,
     /// What came of it.
     pub status: LocaliseStatus,
-    /// Why there is not exactly one pose: `nothing_recognised`, a code of `pose_refusal` of an answer, `ambiguous`,
-    /// `undetermined` (the walls leave a direction open), `few_points`, `poor_match`, `map_too_large`, `stopped`.
+    /// Why there is not exactly one pose: `nothing_recognised`, a code of `pose_refusal` of an
+    /// answer, `ambiguous`, `undetermined` (the walls leave a direction open), `few_points`,
+    /// `poor_match`, `map_too_large`, `stopped`.
     pub reason: Option<String>,
     /// The pose; null unless `located`.
     pub map_from_robot: Option<Pose2Covariance>,

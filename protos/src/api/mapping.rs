@@ -10,7 +10,8 @@ use serde::{Deserialize, Serialize};
 pub struct NewMapping {
     /// A robot that stands on this map; its scans must come with odometry.
     pub robot: String,
-    /// Where on the map its first pose is: x, y in metres, heading in radians. The origin, if absent.
+    /// Where on the map its first pose is: x, y in metres, heading in radians. The origin, if
+    /// absent.
     #[serde(default)]
     #[cfg_attr(feature = "openapi", schema(value_type = super::arrays::Triple))]
     pub origin: [f64; 3],
@@ -21,8 +22,8 @@ pub struct NewMapping {
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum MappingStageBody {
-    /// The server was started again: the scans that were kept are mapped once more. New ones wait, as many as there is room
-    /// for.
+    /// The server was started again: the scans that were kept are mapped once more. New ones wait,
+    /// as many as there is room for.
     Resuming,
     /// Scans are taken.
     Mapping,
@@ -48,7 +49,8 @@ pub struct MappingProgressBody {
     pub stage: MappingStageBody,
     /// Scans that were taken.
     pub scans: u64,
-    /// Scans that were not: the queue was full, the robot's software was started again, or there were too many.
+    /// Scans that were not: the queue was full, the robot's software was started again, or there
+    /// were too many.
     pub dropped: u64,
     /// Way driven, metres.
     pub distance_m: f64,
@@ -61,7 +63,8 @@ pub struct MappingProgressBody {
     pub loop_closures: Option<usize>,
     /// Why it failed.
     pub reason: Option<String>,
-    /// Why further scans are not kept on disk: a restart of the server would lose them. Absent while they are.
+    /// Why further scans are not kept on disk: a restart of the server would lose them. Absent
+    /// while they are.
     pub journal_error: Option<String>,
     /// The walls that are held: what would replace those of the map. Absent at every other stage.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -74,8 +77,8 @@ pub struct MappingProgressBody {
 #[cfg_attr(feature = "openapi", into_params(parameter_in = Query))]
 #[serde(deny_unknown_fields)]
 pub struct FinishMappingQuery {
-    /// Hold the walls (`stage` is `found` then), so that somebody may look at them: asked once more without it, they replace
-    /// those of the map; `DELETE` gives them up.
+    /// Hold the walls (`stage` is `found` then), so that somebody may look at them: asked once more
+    /// without it, they replace those of the map; `DELETE` gives them up.
     #[serde(default)]
     pub hold: bool,
 }

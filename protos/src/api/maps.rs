@@ -8,7 +8,8 @@ use vision::recognise::DistanceKind;
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Distance {
-    /// The picture itself, laid on the learnt icon, must be like it, and one of the two distances must accept.
+    /// The picture itself, laid on the learnt icon, must be like it, and one of the two distances
+    /// must accept.
     #[default]
     Both,
     /// Bucketed correlation.
@@ -45,8 +46,8 @@ pub struct Map {
     pub name: String,
     /// Counts up with every change that an answer could depend on.
     pub version: u64,
-    /// Another one after every edit or lesson of the map or of what is in it, the same after what robots do by themselves:
-    /// `If-Match` takes it, in quotes.
+    /// Another one after every edit or lesson of the map or of what is in it, the same after what
+    /// robots do by themselves: `If-Match` takes it, in quotes.
     #[serde(default)]
     pub revision: String,
     /// Landmarks in it, learnt or not.

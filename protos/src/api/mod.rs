@@ -1,11 +1,13 @@
 //! The HTTP interface: the bodies of requests and answers as JSON, one file for each resource.
 //!
-//! The server answers with these types and the client reads them; each is declared once. Lengths are metres, angles
-//! radians, counter-clockwise from the map's x axis, times milliseconds or nanoseconds since the Unix epoch; the last part
-//! of a field's name is its unit. Covariances of poses are over (x, y, theta), row-major, in m and rad.
+//! The server answers with these types and the client reads them; each is declared once. Lengths
+//! are metres, angles radians, counter-clockwise from the map's x axis, times milliseconds or
+//! nanoseconds since the Unix epoch; the last part of a field's name is its unit. Covariances of
+//! poses are over (x, y, theta), row-major, in m and rad.
 //!
-//! A body of a request refuses unknown fields. A body that is only answered ignores them, so that a newer server can say
-//! more. With the feature `openapi` every type has a schema; the server makes its OpenAPI document of them.
+//! A body of a request refuses unknown fields. A body that is only answered ignores them, so that a
+//! newer server can say more. With the feature `openapi` every type has a schema; the server makes
+//! its OpenAPI document of them.
 
 #[cfg(feature = "openapi")]
 pub mod arrays;

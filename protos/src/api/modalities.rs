@@ -1,9 +1,11 @@
-//! `/maps/{map}/modalities`: which modality is best where, as reference runs have shown; named areas; what is fused.
+//! `/maps/{map}/modalities`: which modality is best where, as reference runs have shown; named
+//! areas; what is fused.
 
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// What is fused where runs have told which modality is best. Odometry carries the pose in any case.
+/// What is fused where runs have told which modality is best. Odometry carries the pose in any
+/// case.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(rename_all = "snake_case")]
@@ -64,8 +66,8 @@ pub enum StatsScopeBody {
     Map,
 }
 
-/// A part of the map with a name: a room, a piece of corridor. It speaks for its square metres that were hardly driven
-/// through.
+/// A part of the map with a name: a room, a piece of corridor. It speaks for its square metres that
+/// were hardly driven through.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
@@ -90,8 +92,8 @@ pub struct ModalityMapPatch {
     pub areas: Option<Vec<AreaBody>>,
 }
 
-/// What runs have shown of one modality: odometry alone, or the laser or landmarks each with odometry only.
-/// Errors are robot-aligned: metres along, metres to the left, radians.
+/// What runs have shown of one modality: odometry alone, or the laser or landmarks each with
+/// odometry only. Errors are robot-aligned: metres along, metres to the left, radians.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct ModalityStatsBody {
@@ -109,7 +111,8 @@ pub struct ModalityStatsBody {
     pub rate_hz: f64,
     /// Share of them off by more than three of the standard deviations that they claim.
     pub outliers: f64,
-    /// Mean squared error over availability, 0.1 rad as much as a metre; absent if it never knew anything. The lowest is best.
+    /// Mean squared error over availability, 0.1 rad as much as a metre; absent if it never knew
+    /// anything. The lowest is best.
     pub score: Option<f64>,
     /// Steps of 5 cm that were compared.
     pub steps: u64,
@@ -125,8 +128,8 @@ pub struct AdviceBody {
     pub best: Option<ModalityBody>,
     /// What is fused.
     pub used: Vec<ModalityBody>,
-    /// Whose runs say so: those through the `cell`, those through it and the eight around it (`neighbourhood`), those through
-    /// the named `area`, or all of the `map`.
+    /// Whose runs say so: those through the `cell`, those through it and the eight around it
+    /// (`neighbourhood`), those through the named `area`, or all of the `map`.
     pub scope: StatsScopeBody,
     /// What each modality gets wrong there beyond what it claims.
     pub error_models: Vec<ErrorModelBody>,

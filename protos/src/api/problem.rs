@@ -21,9 +21,9 @@ pub struct Problem {
     pub field: Option<String>,
     /// A sentence for a person.
     pub detail: String,
-    /// More, by code: `quads` with `quad_not_found` and `quad_ambiguous`; `may_be_done` (true) with `timeout` and
-    /// `not_published`, if the change that was asked for may have been made; `part` with `part_ended`; `stored` and `given`
-    /// with `size_differs`.
+    /// More, by code: `quads` with `quad_not_found` and `quad_ambiguous`; `may_be_done` (true) with
+    /// `timeout` and `not_published`, if the change that was asked for may have been made; `part`
+    /// with `part_ended`; `stored` and `given` with `size_differs`.
     #[serde(flatten)]
     pub more: Map<String, Value>,
 }

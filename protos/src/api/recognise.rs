@@ -7,9 +7,10 @@ pub struct PhotographForm {
     /// PNG or JPEG.
     #[schema(value_type = String, format = Binary)]
     pub image: Vec<u8>,
-    /// JSON: `fx_px`, `fy_px`, `cx_px`, `cy_px` and optionally a lens: `plumb_bob` (5 numbers), `rational_polynomial` (8) or
-    /// `equidistant` (4). `width_px` and `height_px` say of which size of picture they are: one of another scale has them
-    /// scaled, one of other proportions is refused. Without them a principal point far off the middle is refused. Without
-    /// intrinsics there is recognition but no pose.
+    /// JSON: `fx_px`, `fy_px`, `cx_px`, `cy_px` and optionally a lens: `plumb_bob` (5 numbers),
+    /// `rational_polynomial` (8) or `equidistant` (4). `width_px` and `height_px` say of which size
+    /// of picture they are: one of another scale has them scaled, one of other proportions is
+    /// refused. Without them a principal point far off the middle is refused. Without intrinsics
+    /// there is recognition but no pose.
     pub intrinsics: Option<String>,
 }

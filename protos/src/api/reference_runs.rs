@@ -1,4 +1,5 @@
-//! `/robots/{robot}/recording` and `/maps/{map}/reference-runs`: recordings, and reference runs, to learn which modality to trust where.
+//! `/robots/{robot}/recording` and `/maps/{map}/reference-runs`: recordings, and reference runs, to
+//! learn which modality to trust where.
 
 use super::modalities::ModalityStatsBody;
 use serde::{Deserialize, Serialize};
@@ -11,14 +12,15 @@ pub struct RecordingStatusBody {
     pub map: String,
     /// Whose run.
     pub robot: String,
-    /// False once it is full, or the robot's software was started again, or it went to another map, or its odometry
-    /// jumped: what was recorded until then can be learnt from.
+    /// False once it is full, or the robot's software was started again, or it went to another map,
+    /// or its odometry jumped: what was recorded until then can be learnt from.
     pub active: bool,
     /// Why it is active no longer.
     pub reason: Option<String>,
     /// Way driven by odometry, metres.
     pub distance_m: f64,
-    /// Time of the first and the last reading of odometry, ns of the robot's clock; absent before the first.
+    /// Time of the first and the last reading of odometry, ns of the robot's clock; absent before
+    /// the first.
     #[cfg_attr(feature = "openapi", schema(value_type = Option<super::arrays::Span>))]
     pub span_ns: Option<[i64; 2]>,
     /// Readings of odometry that were kept.
@@ -34,8 +36,9 @@ pub struct RecordingStatusBody {
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct ReferenceTrajectoryBody {
-    /// Time (ns of the robot's clock, as in its messages), x and y in metres on the map, heading in radians; times rise, 2 to
-    /// 200 000 (up to 112 bytes each). Nothing is learnt between two that are more than a second apart.
+    /// Time (ns of the robot's clock, as in its messages), x and y in metres on the map, heading in
+    /// radians; times rise, 2 to 200 000 (up to 112 bytes each). Nothing is learnt between two that
+    /// are more than a second apart.
     pub poses: Vec<(i64, f64, f64, f64)>,
     /// Standard deviation of its positions, metres; 0.01 if absent.
     pub sigma_m: Option<f64>,

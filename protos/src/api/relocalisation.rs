@@ -1,4 +1,5 @@
-//! `/robots/{robot}/relocalisation`: relocalisation, where a robot may be while nothing that it sees is unique.
+//! `/robots/{robot}/relocalisation`: relocalisation, where a robot may be while nothing that it
+//! sees is unique.
 
 use serde::{Deserialize, Serialize};
 
@@ -38,7 +39,8 @@ pub enum MissingConditionBody {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct RelocalisationStatus {
-    /// False for a robot that knows where it is, or has seen nothing to search with: all else is empty then.
+    /// False for a robot that knows where it is, or has seen nothing to search with: all else is
+    /// empty then.
     pub relocalising: bool,
     /// The map it searches.
     pub map: Option<String>,

@@ -14,7 +14,8 @@ pub struct RobotActivity {
     pub last_message_ms: Option<u64>,
     /// Since the last frame in which a landmark was named; absent if there was none.
     pub last_recognised_ms: Option<u64>,
-    /// Answered frames in a second, over the last ten whole seconds, or all since its first message.
+    /// Answered frames in a second, over the last ten whole seconds, or all since its first
+    /// message.
     pub frames_per_s: f64,
 }
 
@@ -22,7 +23,8 @@ pub struct RobotActivity {
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct RobotInput {
-    /// `frame`, `odometry`, `scan`; of ROS 2 also `camera_info` and `transform`; `connection`: its links to the server.
+    /// `frame`, `odometry`, `scan`; of ROS 2 also `camera_info` and `transform`; `connection`: its
+    /// links to the server.
     pub input: String,
     /// How many were used.
     pub used: u64,

@@ -9,7 +9,8 @@ use serde::{Deserialize, Serialize};
 pub struct CertificateRequest {
     /// PKCS #10, PEM, signed with the private key. Of it only the public key is taken.
     pub request: String,
-    /// Seconds for which the certificate is valid, by the server's clock: 60 to ten years; a year if absent.
+    /// Seconds for which the certificate is valid, by the server's clock: 60 to ten years; a year
+    /// if absent.
     #[serde(default)]
     pub valid_s: Option<u64>,
 }

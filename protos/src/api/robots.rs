@@ -20,7 +20,8 @@ pub struct Robot {
     pub alive: bool,
     /// The start of its software that speaks for it; absent if it is not connected.
     pub epoch: Option<u64>,
-    /// A second program that uses the robot's name and is refused; shown for 10 s after its last message.
+    /// A second program that uses the robot's name and is refused; shown for 10 s after its last
+    /// message.
     pub conflict: Option<EpochConflictBody>,
     /// Its fused pose; absent if it is unknown, or nothing newer than 2 s supports it.
     pub pose: Option<RobotPose>,
@@ -55,14 +56,15 @@ pub struct RobotPose {
     pub covariance: [f64; 9],
     /// Since the capture of the newest odometry or fix that supports it; at most 2000.
     pub age_ms: f64,
-    /// How far it is trusted, as it was last published. Read as unspecified where a server does not say.
+    /// How far it is trusted, as it was last published. Read as unspecified where a server does not
+    /// say.
     #[serde(default, deserialize_with = "known_or_unspecified")]
     #[cfg_attr(feature = "openapi", schema(required))]
     pub trust: PoseTrust,
 }
 
-/// How far a fused pose is trusted, by the landmarks that were named without it (globally). Those that were named by it
-/// (guided) say nothing of it.
+/// How far a fused pose is trusted, by the landmarks that were named without it (globally). Those
+/// that were named by it (guided) say nothing of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(rename_all = "snake_case")]
@@ -156,19 +158,21 @@ pub struct CorrectionBody {
     pub captured_ns: i64,
     /// The map it is a pose in.
     pub map: String,
-    /// `landmarks` (named without the pose), `guided` (landmarks named by the pose), `laser` or `relocalisation`; `by_hand` when
-    /// a person said where it is; `map_change` when the robot came from another map.
+    /// `landmarks` (named without the pose), `guided` (landmarks named by the pose), `laser` or
+    /// `relocalisation`; `by_hand` when a person said where it is; `map_change` when the robot came
+    /// from another map.
     pub modality: String,
     /// The landmarks it rests on, by name; empty for the laser.
     pub landmarks: Vec<String>,
-    /// `started` (it gave the first pose), `applied`, `gated_out` (it contradicts the pose and was left out), `reset` (the
-    /// last of several that contradict the pose and agree with one another, or a person: it replaced the pose), `excluded_by_mode` (it
-    /// agrees, but reference runs have shown another modality to be better here, and the map's fusion mode leaves this one
-    /// out), `too_old`, `waiting` (newer than the last odometry), `carried_over` (the pose on another map, in the frame of
-    /// this one).
+    /// `started` (it gave the first pose), `applied`, `gated_out` (it contradicts the pose and was
+    /// left out), `reset` (the last of several that contradict the pose and agree with one another,
+    /// or a person: it replaced the pose), `excluded_by_mode` (it agrees, but reference runs have
+    /// shown another modality to be better here, and the map's fusion mode leaves this one out),
+    /// `too_old`, `waiting` (newer than the last odometry), `carried_over` (the pose on another
+    /// map, in the frame of this one).
     pub outcome: String,
-    /// Squared Mahalanobis distance of the fix from the pose before it, 3 degrees of freedom; for `applied`,
-    /// `excluded_by_mode` and `gated_out`.
+    /// Squared Mahalanobis distance of the fix from the pose before it, 3 degrees of freedom; for
+    /// `applied`, `excluded_by_mode` and `gated_out`.
     pub chi2: Option<f64>,
     /// By how much it moved the pose, in the robot's frame before it: forwards, metres.
     pub along_m: Option<f64>,
@@ -182,13 +186,16 @@ pub struct CorrectionBody {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct CorrectionsBody {
-    /// What the pose rests on now: `odometry`, `landmarks`, `guided`, `laser`, `relocalisation`, `by_hand`; empty without a pose.
+    /// What the pose rests on now: `odometry`, `landmarks`, `guided`, `laser`, `relocalisation`,
+    /// `by_hand`; empty without a pose.
     pub modalities: Vec<String>,
-    /// For each modality how many fixes came to which end. For the laser also why scans gave no fix: `no_pose` (there is
-    /// none to correct), `no_walls` (the map has none), `few_points`, `poor_match` (it shows something else than the
-    /// map), `gate_prior` (it contradicts the pose), `ambiguous` (several poses fit), `superseded` (a newer one came first).
+    /// For each modality how many fixes came to which end. For the laser also why scans gave no
+    /// fix: `no_pose` (there is none to correct), `no_walls` (the map has none), `few_points`,
+    /// `poor_match` (it shows something else than the map), `gate_prior` (it contradicts the pose),
+    /// `ambiguous` (several poses fit), `superseded` (a newer one came first).
     pub totals: BTreeMap<String, BTreeMap<String, u64>>,
-    /// The latest 200 of each modality, oldest first; without `repeated` ones, which tell nothing new.
+    /// The latest 200 of each modality, oldest first; without `repeated` ones, which tell nothing
+    /// new.
     pub corrections: Vec<CorrectionBody>,
 }
 

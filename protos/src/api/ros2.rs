@@ -13,7 +13,7 @@ pub struct Ros2Status {
     pub received: BTreeMap<String, u64>,
     /// Messages sent, by topic.
     pub sent: BTreeMap<String, u64>,
-    /// Messages that were not used, or only in part, by topic and reason, such as `no_transform`; the log has the details.
-    /// The topic is empty for what belongs to none.
+    /// Messages that were not used, or only in part, by topic and reason, such as `no_transform`;
+    /// the log has the details. The topic is empty for what belongs to none.
     pub reasons: BTreeMap<String, BTreeMap<String, u64>>,
 }

@@ -72,8 +72,8 @@ pub struct StoredAnswerSummary {
     pub status: AnswerStatus,
     /// Whether it gave a pose of the robot by the picture alone.
     pub has_pose: bool,
-    /// Why there is no pose: the code of the frame's rejection; where no landmark was named, the gate that refused the nearest
-    /// candidate; else the gate that refused the pose.
+    /// Why there is no pose: the code of the frame's rejection; where no landmark was named, the
+    /// gate that refused the nearest candidate; else the gate that refused the pose.
     pub refusal: Option<String>,
     /// The landmarks that it names, by their names at that time.
     pub landmarks: Vec<String>,
@@ -87,7 +87,8 @@ pub struct StoredAnswerSummary {
 pub struct LandmarkIcon {
     /// Its name at that time.
     pub landmark: String,
-    /// Path of its icon as it was learnt; absent if there is no landmark with a model of this name any more.
+    /// Path of its icon as it was learnt; absent if there is no landmark with a model of this name
+    /// any more.
     pub icon: Option<String>,
 }
 
@@ -95,7 +96,8 @@ pub struct LandmarkIcon {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct PointMatch {
-    /// Place in the quad's icon: (0, 0) is its top-left corner, (1, 1) its bottom-right one; a little outside is possible.
+    /// Place in the quad's icon: (0, 0) is its top-left corner, (1, 1) its bottom-right one; a
+    /// little outside is possible.
     #[cfg_attr(feature = "openapi", schema(value_type = super::arrays::Pair))]
     pub seen: [f64; 2],
     /// Place in the landmark's icon, likewise.
@@ -122,7 +124,8 @@ pub struct QuadMatches {
 pub enum PriorSource {
     /// The robot sent it with its frame: a pose beyond the limit is refused.
     Robot,
-    /// The server had it of earlier frames and odometry: it only chooses between two solutions of the picture.
+    /// The server had it of earlier frames and odometry: it only chooses between two solutions of
+    /// the picture.
     Server,
 }
 
@@ -134,8 +137,8 @@ pub struct PriorCheck {
     pub source: PriorSource,
     /// The pose without the picture, map frame, with covariance.
     pub prior: Pose2Covariance,
-    /// The pose by the landmarks of the picture: of several solutions the nearest to the prior, also where it was refused;
-    /// null where the picture gives none.
+    /// The pose by the landmarks of the picture: of several solutions the nearest to the prior,
+    /// also where it was refused; null where the picture gives none.
     pub seen: Option<Pose2Covariance>,
     /// Squared Mahalanobis distance of the two, under the sum of their covariances.
     pub distance2: Option<f64>,
@@ -149,11 +152,13 @@ pub struct PriorCheck {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct StoredQuad {
-    /// Path of its icon; absent for quads that are too small, partly outside of the picture, or beyond the first eight.
+    /// Path of its icon; absent for quads that are too small, partly outside of the picture, or
+    /// beyond the first eight.
     pub icon: Option<String>,
     /// The landmarks it was compared with, in the order of the answer's candidates.
     pub landmarks: Vec<LandmarkIcon>,
-    /// Its points that are like those of the best candidate; null without an icon, and where that has no points.
+    /// Its points that are like those of the best candidate; null without an icon, and where that
+    /// has no points.
     pub matched: Option<QuadMatches>,
 }
 
@@ -163,7 +168,8 @@ pub struct StoredQuad {
 pub struct StoredAnswer {
     /// In brief.
     pub summary: StoredAnswerSummary,
-    /// `Answer` of protos/waymark/v1/waymark.proto as JSON: quads with candidates, distances and thresholds, poses.
+    /// `Answer` of protos/waymark/v1/waymark.proto as JSON: quads with candidates, distances and
+    /// thresholds, poses.
     pub answer: Answer,
     /// The pictures of its quads, in the order of `answer.quads`.
     pub quads: Vec<StoredQuad>,

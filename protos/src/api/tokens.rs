@@ -73,7 +73,8 @@ pub struct Token {
     pub name: String,
     /// What it may do.
     pub role: Role,
-    /// Maps that it is for, by name; null for all maps and what is above maps. Deleted maps are left out.
+    /// Maps that it is for, by name; null for all maps and what is above maps. Deleted maps are
+    /// left out.
     pub maps: Option<Vec<String>>,
     /// Milliseconds since the Unix epoch.
     pub created_ms: i64,
@@ -87,7 +88,8 @@ pub struct Token {
 #[derive(Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct CreatedToken {
-    /// `wmk_{id}_{secret}`, sent as `Authorization: Bearer`. It is shown this once: only its digest is stored.
+    /// `wmk_{id}_{secret}`, sent as `Authorization: Bearer`. It is shown this once: only its digest
+    /// is stored.
     #[cfg_attr(feature = "openapi", schema(format = Password))]
     pub text: String,
     /// What it is.

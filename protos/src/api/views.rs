@@ -9,7 +9,8 @@ use serde::{Deserialize, Serialize};
 pub struct TrainingView {
     /// Its number, never used again.
     pub id: i64,
-    /// The landmark's corners in the picture: top-left, top-right, bottom-right, bottom-left, in pixels.
+    /// The landmark's corners in the picture: top-left, top-right, bottom-right, bottom-left, in
+    /// pixels.
     #[cfg_attr(feature = "openapi", schema(value_type = super::arrays::Corners))]
     pub corners: [[f64; 2]; 4],
     /// Of the picture, as a viewer shows it.
@@ -20,10 +21,12 @@ pub struct TrainingView {
     pub image_kind: String,
     /// ms since the Unix epoch.
     pub created_ms: i64,
-    /// In the answer to an upload: what became of it. With `duplicate` and `near_duplicate` the view given is the one that is there.
+    /// In the answer to an upload: what became of it. With `duplicate` and `near_duplicate` the
+    /// view given is the one that is there.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub outcome: Option<UploadOutcomeBody>,
-    /// In the answer to an upload with `capture`: whether the landmark has a place by its views now, or why not.
+    /// In the answer to an upload with `capture`: whether the landmark has a place by its views
+    /// now, or why not.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub placing: Option<PlacementReportBody>,
 }
@@ -70,7 +73,8 @@ pub enum UploadOutcomeBody {
     New,
     /// The same quad of the same picture is there already.
     Duplicate,
-    /// Not stored: the view shows nothing that this one does not. A lesson would gain nothing by it.
+    /// Not stored: the view shows nothing that this one does not. A lesson would gain nothing by
+    /// it.
     NearDuplicate,
 }
 
@@ -95,7 +99,8 @@ pub struct RefusedView {
     pub refused_ms: i64,
     /// Who did not take it.
     pub by: RefusedBy,
-    /// A code: of the refusal of the upload, `duplicate`, `near_duplicate`, `beyond_limit` or `picture_unreadable`.
+    /// A code: of the refusal of the upload, `duplicate`, `near_duplicate`, `beyond_limit` or
+    /// `picture_unreadable`.
     pub reason: String,
     /// Why: one sentence for a person.
     pub sentence: String,
@@ -115,12 +120,13 @@ pub struct PlacementReportBody {
     pub placed: bool,
     /// Views with a robot pose that the place rests on.
     pub views_used: usize,
-    /// Why not: `by_hand` (a place by hand stays), or what is wrong with the views, with the residual.
+    /// Why not: `by_hand` (a place by hand stays), or what is wrong with the views, with the
+    /// residual.
     pub reason: Option<String>,
 }
 
-/// How a picture was taken: the part `capture` of an upload. With it the server places the landmark itself, on the map's
-/// walls or under a ceiling, unless it was placed by hand.
+/// How a picture was taken: the part `capture` of an upload. With it the server places the landmark
+/// itself, on the map's walls or under a ceiling, unless it was placed by hand.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
@@ -134,8 +140,9 @@ pub struct CaptureMetadata {
     /// The landmark is under a ceiling so high, not on a wall.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ceiling_height_m: Option<f64>,
-    /// Covariance of each corner by the noise of its edges: (uu, uv, vv), top-left, top-right, bottom-right, bottom-left.
-    /// Absent: 1 px, or the detector's where the server finds the corners.
+    /// Covariance of each corner by the noise of its edges: (uu, uv, vv), top-left, top-right,
+    /// bottom-right, bottom-left. Absent: 1 px, or the detector's where the server finds the
+    /// corners.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "openapi", schema(value_type = Option<super::arrays::CornerCovariances>))]
     pub corner_covariance_px2: Option<[[f64; 3]; 4]>,
@@ -148,20 +155,25 @@ pub struct NewViewForm {
     /// PNG or JPEG.
     #[schema(value_type = String, format = Binary)]
     pub image: Vec<u8>,
-    /// JSON, `[[x,y],[x,y],[x,y],[x,y]]`: top-left, top-right, bottom-right, bottom-left, in pixels.
+    /// JSON, `[[x,y],[x,y],[x,y],[x,y]]`: top-left, top-right, bottom-right, bottom-left, in
+    /// pixels.
     pub corners: Option<String>,
     /// `true`: the picture shows the landmark and nothing else.
     pub whole_image: Option<String>,
-    /// JSON, how it was taken: `intrinsics`, `map_from_robot` (pose with covariance), `robot_from_camera`, and
-    /// `ceiling_height_m` for a landmark under a ceiling; also `corner_covariance_px2`, `[[uu,uv,vv], ...]` of the four
-    /// corners, where their noise is known (else 1 px, or the detector's where the server finds them). With it the server
-    /// places the landmark on the map's walls itself, unless it was placed by hand.
+    /// JSON, how it was taken: `intrinsics`, `map_from_robot` (pose with covariance),
+    /// `robot_from_camera`, and `ceiling_height_m` for a landmark under a ceiling; also
+    /// `corner_covariance_px2`, `[[uu,uv,vv], ...]` of the four corners, where their noise is known
+    /// (else 1 px, or the detector's where the server finds them). With it the server places the
+    /// landmark on the map's walls itself, unless it was placed by hand.
     pub capture: Option<String>,
-    /// `true`: stored even if a stored view shows it from the same side, as large and in the same light.
+    /// `true`: stored even if a stored view shows it from the same side, as large and in the same
+    /// light.
     pub keep_near_duplicate: Option<String>,
-    /// `true`: makes the landmark if there is none of this name, together with this view or not at all.
+    /// `true`: makes the landmark if there is none of this name, together with this view or not at
+    /// all.
     pub create: Option<String>,
-    /// Width of the landmark, 0.01 to 100, together with `height_m`. Refused if the landmark has another size by hand.
+    /// Width of the landmark, 0.01 to 100, together with `height_m`. Refused if the landmark has
+    /// another size by hand.
     pub width_m: Option<String>,
     /// Height of the landmark, 0.01 to 100.
     pub height_m: Option<String>,

@@ -8,7 +8,8 @@ use map::{
 use nalgebra::Point2;
 use serde::{Deserialize, Serialize};
 
-/// The floor area from which a landmark is seen: a GeoJSON `Feature` in metres of the map, not degrees.
+/// The floor area from which a landmark is seen: a GeoJSON `Feature` in metres of the map, not
+/// degrees.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct VisibilityAreaBody {
@@ -21,8 +22,8 @@ pub struct VisibilityAreaBody {
     pub properties: VisibilityAreaProperties,
 }
 
-/// A GeoJSON `MultiPolygon`: polygons of rings of points, m in the map; the outer ring counter-clockwise, that of a hole
-/// clockwise, the first point repeated.
+/// A GeoJSON `MultiPolygon`: polygons of rings of points, m in the map; the outer ring
+/// counter-clockwise, that of a hole clockwise, the first point repeated.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct MultiPolygon {
@@ -205,7 +206,8 @@ pub struct GazeQueryBody {
     #[serde(default)]
     #[cfg_attr(feature = "openapi", schema(value_type = Object))]
     pub head: PanTiltUnit,
-    /// `focal_px`, `pan_rad`, `tilt_rad` and the rest of the camera; absent for the map's (`/maps/{map}/visibility-settings`).
+    /// `focal_px`, `pan_rad`, `tilt_rad` and the rest of the camera; absent for the map's
+    /// (`/maps/{map}/visibility-settings`).
     #[cfg_attr(feature = "openapi", schema(value_type = Option<Object>))]
     pub viewer: Option<PanTiltCamera>,
     /// `product` (the paper's) or `information`.

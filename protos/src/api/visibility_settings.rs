@@ -1,4 +1,5 @@
-//! `/maps/{map}/visibility-settings`: the camera that looks for a map's landmarks, and what counts as seen.
+//! `/maps/{map}/visibility-settings`: the camera that looks for a map's landmarks, and what counts
+//! as seen.
 
 use serde::{Deserialize, Serialize};
 
@@ -16,7 +17,8 @@ pub struct VisibilitySettingsBody {
     pub height_px: Option<f64>,
     /// Height of the camera above the floor: 0 to 10 m; usually 1.2.
     pub camera_height_m: Option<f64>,
-    /// Lowest tilt of the camera, up positive, within 1.55; usually -0.35. The same as the highest for one that is fixed.
+    /// Lowest tilt of the camera, up positive, within 1.55; usually -0.35. The same as the highest
+    /// for one that is fixed.
     pub tilt_low_rad: Option<f64>,
     /// Highest tilt; usually 0.35. Signs under ceilings are seen only by cameras that look up.
     pub tilt_high_rad: Option<f64>,
@@ -30,7 +32,7 @@ pub struct VisibilitySettingsBody {
     pub min_side_px: Option<f64>,
     /// Largest share of the image that a landmark may take: 0.01 to 1; usually 0.9.
     pub max_fill: Option<f64>,
-    /// How far before its wall a landmark is taken to hang, so that its own wall does not hide it: 0.001 to 0.5 m; usually
-    /// 0.05.
+    /// How far before its wall a landmark is taken to hang, so that its own wall does not hide it:
+    /// 0.001 to 0.5 m; usually 0.05.
     pub standoff_m: Option<f64>,
 }

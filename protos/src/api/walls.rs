@@ -13,9 +13,9 @@ pub struct WallBody {
     /// Second end: x, y in metres.
     #[cfg_attr(feature = "openapi", schema(value_type = super::arrays::Pair))]
     pub b: [f64; 2],
-    /// How well it is known, about its middle: variance of its direction (rad^2), covariance of direction and offset to its
-    /// free side (rad m), variance of the offset (m^2), relative to the map frame. A map made of scans has it. Absent: measured
-    /// by hand, to 1 cm.
+    /// How well it is known, about its middle: variance of its direction (rad^2), covariance of
+    /// direction and offset to its free side (rad m), variance of the offset (m^2), relative to the
+    /// map frame. A map made of scans has it. Absent: measured by hand, to 1 cm.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "openapi", schema(value_type = Option<super::arrays::Triple>))]
     pub covariance: Option<[f64; 3]>,
@@ -49,10 +49,11 @@ impl FromIterator<[[f64; 2]; 2]> for WallsBody {
 #[cfg_attr(feature = "openapi", into_params(parameter_in = Query))]
 #[serde(deny_unknown_fields)]
 pub struct WallFileQuery {
-    /// Extension of its name: `geojson`, `svg`, `svgz`, `json` (a map of `waymark map build`, or GeoJSON) or `txt` (a vector
-    /// map).
+    /// Extension of its name: `geojson`, `svg`, `svgz`, `json` (a map of `waymark map build`, or
+    /// GeoJSON) or `txt` (a vector map).
     pub kind: String,
-    /// Metres of a unit of an SVG floor plan, above 0; left out, the plan's width and height in mm, cm, in or pt count.
+    /// Metres of a unit of an SVG floor plan, above 0; left out, the plan's width and height in mm,
+    /// cm, in or pt count.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub metres_per_unit: Option<f64>,
 }

@@ -97,7 +97,8 @@ pub struct CheckedFrame {
 }
 
 impl CheckedFrame {
-    /// Whether the whole image is there: of other parts than those of its quads, nothing can be said.
+    /// Whether the whole image is there: of other parts than those of its quads, nothing can be
+    /// said.
     pub fn is_whole(&self) -> bool {
         matches!(self.pixels, Pixels::Image(_))
     }

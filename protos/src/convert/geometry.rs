@@ -32,8 +32,8 @@ pub fn between(field: &str, value: f64, low: f64, high: f64) -> Result<f64, Reje
     Ok(value)
 }
 
-/// A rigid transform. Coordinates within [`MAX_COORDINATE_M`]; the quaternion is normalised when it is within
-/// [`QUATERNION_TOLERANCE`] of unit length.
+/// A rigid transform. Coordinates within [`MAX_COORDINATE_M`]; the quaternion is normalised when it
+/// is within [`QUATERNION_TOLERANCE`] of unit length.
 pub fn pose3(pose: &v1::Pose3) -> Result<Isometry3<f64>, Rejection> {
     let x = within("x_m", pose.x_m, MAX_COORDINATE_M)?;
     let y = within("y_m", pose.y_m, MAX_COORDINATE_M)?;
@@ -69,7 +69,8 @@ pub fn pose2_wire(pose: &Pose2) -> v1::Pose2 {
     v1::Pose2 { x_m: pose.x_m, y_m: pose.y_m, theta_rad: pose.theta_rad }
 }
 
-/// A pose on the floor with its covariance over (x, y, theta): 9 finite numbers, symmetric, not negative.
+/// A pose on the floor with its covariance over (x, y, theta): 9 finite numbers, symmetric, not
+/// negative.
 pub fn pose2_covariance(value: &v1::Pose2Covariance) -> Result<Pose2Covariance, Rejection> {
     let pose =
         value.pose.as_ref().ok_or_else(|| Rejection::new(Code::Missing, "pose", "the pose is absent"))?;
@@ -88,7 +89,8 @@ pub fn pose2_covariance_wire(value: &Pose2Covariance) -> v1::Pose2Covariance {
     }
 }
 
-/// Extrinsics of a camera within [`MAX_MOUNTING_M`] of the robot's origin, with the default covariance.
+/// Extrinsics of a camera within [`MAX_MOUNTING_M`] of the robot's origin, with the default
+/// covariance.
 pub fn mounting(pose: &v1::Pose3) -> Result<CameraExtrinsics, Rejection> {
     let transform = pose3(pose)?;
     for (field, value) in [("x_m", pose.x_m), ("y_m", pose.y_m), ("z_m", pose.z_m)] {
@@ -122,8 +124,8 @@ fn covariance(numbers: &[f64]) -> Result<Matrix3<f64>, Rejection> {
     Ok(symmetric)
 }
 
-/// A calibrated camera: no lens, or one of `plumb_bob` (5 coefficients), `rational_polynomial` (8), `equidistant`
-/// (4). Absent standard deviations are [`IntrinsicsSigmas::usual`].
+/// A calibrated camera: no lens, or one of `plumb_bob` (5 coefficients), `rational_polynomial` (8),
+/// `equidistant` (4). Absent standard deviations are [`IntrinsicsSigmas::usual`].
 pub fn intrinsics(wire: &v1::Intrinsics) -> Result<Intrinsics, Rejection> {
     let (distortion, lens) = lens(wire)?;
     let made = Intrinsics::new(wire.fx_px, wire.fy_px, wire.cx_px, wire.cy_px, distortion);
@@ -148,8 +150,9 @@ pub fn intrinsics(wire: &v1::Intrinsics) -> Result<Intrinsics, Rejection> {
     })
 }
 
-/// Checked intrinsics of an image of this width and height, px: those that state another scale are scaled. Errors:
-/// `size_mismatch` with the field `width_px` for other proportions; half a stated size.
+/// Checked intrinsics of an image of this width and height, px: those that state another scale are
+/// scaled. Errors: `size_mismatch` with the field `width_px` for other proportions; half a stated
+/// size.
 pub fn intrinsics_of_picture(wire: &v1::Intrinsics, picture: [usize; 2]) -> Result<Intrinsics, Rejection> {
     let camera = intrinsics(wire)?;
     let stated = match (wire.width_px, wire.height_px) {

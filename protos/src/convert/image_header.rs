@@ -2,7 +2,8 @@
 
 use crate::v1;
 
-/// Encoding, width and height in pixels; `None` for what is no JPEG or PNG, or ends before it says its size.
+/// Encoding, width and height in pixels; `None` for what is no JPEG or PNG, or ends before it says
+/// its size.
 pub fn image_header(image: &[u8]) -> Option<(v1::ImageEncoding, u32, u32)> {
     if image.starts_with(b"\x89PNG\r\n\x1a\n") {
         png_size(image).map(|(width, height)| (v1::ImageEncoding::Png, width, height))

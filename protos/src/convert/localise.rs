@@ -85,7 +85,8 @@ pub fn localise_reply(result: LocaliseResult) -> v1::LocaliseReply {
     }
 }
 
-/// The result that a reply states, or its refusal. `None` for a status or a hypothesis that this version does not know.
+/// The result that a reply states, or its refusal. `None` for a status or a hypothesis that this
+/// version does not know.
 pub fn localise_result(reply: v1::LocaliseReply) -> Option<Result<LocaliseResult, v1::Rejection>> {
     let status = match reply.status() {
         _ if reply.rejection.is_some() => return reply.rejection.map(Err),

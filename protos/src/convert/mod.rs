@@ -1,6 +1,7 @@
-//! Checked conversions between the wire and the types of `vision` and `map`. In: decoded messages. Out: values that
-//! are finite, in range and bounded, or a [`Rejection`](crate::Rejection) that names the field. Doubtful input is
-//! refused here, once; later stages do not check again. Clock, robots and maps are checked by the server.
+//! Checked conversions between the wire and the types of `vision` and `map`. In: decoded messages.
+//! Out: values that are finite, in range and bounded, or a [`Rejection`](crate::Rejection) that
+//! names the field. Doubtful input is refused here, once; later stages do not check again. Clock,
+//! robots and maps are checked by the server.
 
 pub mod frame;
 pub mod gaze;

@@ -45,7 +45,8 @@ pub struct CheckedScan {
     pub captured_ns: i64,
     /// Pose of the robot in its odometry frame.
     pub odom_from_robot: Pose2,
-    /// Bearings and ranges. A range that is not a number is a beam without return, as drivers send it.
+    /// Bearings and ranges. A range that is not a number is a beam without return, as drivers send
+    /// it.
     pub scan: Scan,
 }
 

@@ -1,4 +1,5 @@
-//! The result of recognition in wire form. Names are given by the caller: `vision` knows landmarks by number only.
+//! The result of recognition in wire form. Names are given by the caller: `vision` knows landmarks
+//! by number only.
 
 use super::geometry::pose3_wire;
 use crate::v1;

@@ -1,4 +1,5 @@
-//! How many bits samples in 16 have. Cameras of 10, 12 and 14 bits fill 16 from the low end: taken as 16 bits they are black.
+//! How many bits samples in 16 have. Cameras of 10, 12 and 14 bits fill 16 from the low end: taken
+//! as 16 bits they are black.
 
 /// Bits that a sensor may have.
 const BITS: [u32; 4] = [10, 12, 14, 16];

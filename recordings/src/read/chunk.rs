@@ -1,4 +1,5 @@
-//! Unpacks a chunk: zstd and lz4 without C. In: the record. Out: its content, of the stated length and checksum.
+//! Unpacks a chunk: zstd and lz4 without C. In: the record. Out: its content, of the stated length
+//! and checksum.
 
 use super::{MAX_CHUNK_BYTES, error::ReadFault};
 use mcap::records::ChunkHeader;

@@ -1,5 +1,5 @@
-//! The messages of a drive. In: a file. Out: messages of the wire in the order of time, with the images of frames; those
-//! of ROS are converted where a robot is given for them.
+//! The messages of a drive. In: a file. Out: messages of the wire in the order of time, with the
+//! images of frames; those of ROS are converted where a robot is given for them.
 
 use super::{
     error::{ReadError, ReadFault},

@@ -1,11 +1,12 @@
-//! Reads MCAP files in the order of time. In: the bytes of a file. Out: messages of the wire, or of any kind.
+//! Reads MCAP files in the order of time. In: the bytes of a file. Out: messages of the wire, or of
+//! any kind.
 //!
 //! ```text
 //! parts (a walk over the records, chunks unread) -> ordered (messages by log time) -> drive (messages of the wire)
 //! ```
 //!
-//! `mcap` parses the records. Its readers are not used: `LinearReader` panics on a record that ends after its chunk,
-//! `IndexedReader` checks no checksum and keeps the memory of every chunk slot.
+//! `mcap` parses the records. Its readers are not used: `LinearReader` panics on a record that ends
+//! after its chunk, `IndexedReader` checks no checksum and keeps the memory of every chunk slot.
 
 mod chunk;
 mod drive;

@@ -1,8 +1,9 @@
-//! The messages of a file in the order of their log time; those of one time in the order of the file. In: a file. Out:
-//! one message after the other.
+//! The messages of a file in the order of their log time; those of one time in the order of the
+//! file. In: a file. Out: one message after the other.
 //!
-//! Parts are opened in the order of the file, because a channel is announced before its messages. A part is opened as
-//! soon as it, or a later one, may hold an earlier message than those that are open.
+//! Parts are opened in the order of the file, because a channel is announced before its messages. A
+//! part is opened as soon as it, or a later one, may hold an earlier message than those that are
+//! open.
 
 use super::{
     MAX_CHUNK_MESSAGES, MAX_OPEN_BYTES, chunk,
@@ -78,13 +79,14 @@ impl<R: Read + Seek> MessageReader<R> {
         })
     }
 
-    /// Where the file ends inside a record, bytes, as that of a recorder that was killed does; messages before that
-    /// are read. `None` for a whole file.
+    /// Where the file ends inside a record, bytes, as that of a recorder that was killed does;
+    /// messages before that are read. `None` for a whole file.
     pub fn cut_off_at(&self) -> Option<u64> {
         self.cut_off_at
     }
 
-    /// All channels, by topic, without their messages; it unpacks every chunk once. Call it before the first message.
+    /// All channels, by topic, without their messages; it unpacks every chunk once. Call it before
+    /// the first message.
     pub fn channels(&mut self) -> Result<Vec<Arc<ChannelInfo>>, ReadError> {
         for part in self.parts.clone() {
             let announced = self.content(part).and_then(|content| {
@@ -171,7 +173,8 @@ impl<R: Read + Seek> MessageReader<R> {
         Ok(())
     }
 
-    /// Takes a schema or a channel. Others are not even parsed: `parse_record` panics on a short attachment.
+    /// Takes a schema or a channel. Others are not even parsed: `parse_record` panics on a short
+    /// attachment.
     fn announce(&mut self, kind: u8, body: &[u8]) -> Result<(), ReadFault> {
         if !matches!(kind, op::SCHEMA | op::CHANNEL) {
             return Ok(());

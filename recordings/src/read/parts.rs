@@ -1,5 +1,6 @@
-//! The parts of a file: its chunks, and runs of messages outside of chunks. In: a file. Out: where they are and what
-//! time they span, without reading their content. A file that ends inside a record is read up to there.
+//! The parts of a file: its chunks, and runs of messages outside of chunks. In: a file. Out: where
+//! they are and what time they span, without reading their content. A file that ends inside a
+//! record is read up to there.
 
 use super::{
     MAX_CHUNK_BYTES, MAX_PARTS, MAX_RECORD_BYTES,
@@ -27,7 +28,8 @@ pub(super) struct Part {
     pub(super) earliest_ns: u64,
 }
 
-/// Walks over the records of a file. Out: the parts in the order of the file, and where it ends inside a record.
+/// Walks over the records of a file. Out: the parts in the order of the file, and where it ends
+/// inside a record.
 pub(super) fn parts(file: &mut (impl Read + Seek)) -> Result<(Vec<Part>, Option<u64>), ReadError> {
     let end = file.seek(SeekFrom::End(0)).map_err(|e| ReadFault::from(e).at(0))?;
     let mut magic = [0; MAGIC.len()];
@@ -64,7 +66,8 @@ pub(super) fn parts(file: &mut (impl Read + Seek)) -> Result<(Vec<Part>, Option<
 
 /// A record as a part; `None` for one that is passed over. The file stands after the record's head.
 fn part(file: &mut impl Read, kind: u8, offset: u64, bytes: u64) -> Result<Option<Part>, ReadFault> {
-    // How long the fixed fields are, and where a log time stands in them: the earliest of a chunk, or a message's own.
+    // How long the fixed fields are, and where a log time stands in them: the earliest of a chunk,
+    // or a message's own.
     let (most, fixed, time_at) = match kind {
         op::CHUNK => (MAX_CHUNK_BYTES, 40, 0),
         op::MESSAGE => (MAX_RECORD_BYTES, 22, 6),

@@ -1,5 +1,5 @@
-//! What viewers get of a message. In: a message of the wire or the content of a map. Out: messages of Foxglove's
-//! schemas with their topics.
+//! What viewers get of a message. In: a message of the wire or the content of a map. Out: messages
+//! of Foxglove's schemas with their topics.
 
 mod answer;
 mod frame;

@@ -1,5 +1,5 @@
-//! Claim: a file that was cut off is read up to its last whole chunk; a damaged file gives an error or messages, never
-//! a panic.
+//! Claim: a file that was cut off is read up to its last whole chunk; a damaged file gives an error
+//! or messages, never a panic.
 
 use crate::drive::{file, messages, name, read};
 use proptest::prelude::*;

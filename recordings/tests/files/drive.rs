@@ -20,7 +20,8 @@ fn covariance() -> Vec<f64> {
     vec![0.01, 0.0, 0.0, 0.0, 0.01, 0.0, 0.0, 0.0, 0.001]
 }
 
-/// Five frames of each encoding that viewers know, with odometry, scans, answers and poses between them.
+/// Five frames of each encoding that viewers know, with odometry, scans, answers and poses between
+/// them.
 pub(crate) fn messages(image_bytes: usize) -> Vec<Recorded> {
     let (robot, camera) = (name("r1"), name("front"));
     let mut all = Vec::new();

@@ -1,5 +1,6 @@
-//! Claim: the Python packages `mcap` and `mcap-protobuf-support`, which share nothing with this crate, decode every
-//! message of a recording by the schemas in it. Skipped, with the reason printed, where they cannot be installed.
+//! Claim: the Python packages `mcap` and `mcap-protobuf-support`, which share nothing with this
+//! crate, decode every message of a recording by the schemas in it. Skipped, with the reason
+//! printed, where they cannot be installed.
 
 use crate::drive::{file, messages};
 use std::{path::Path, process::Command};

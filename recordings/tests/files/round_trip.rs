@@ -1,4 +1,5 @@
-//! Claim: what is written is read back, message by message; viewers get the channels that the crate promises.
+//! Claim: what is written is read back, message by message; viewers get the channels that the crate
+//! promises.
 
 use crate::drive::{START_NS, file, landmark, messages, read};
 use protos::prost::Message as _;

@@ -1,7 +1,7 @@
 //! The key of a topic: `[<namespace of the bridge>/]<topic>`.
 //!
-//! Source: `eclipse-zenoh/zenoh-plugin-ros2dds src/ros2_utils.rs` (`ros2_name_to_key_expr`). The namespace also
-//! precedes `/tf` and `/tf_static`, so robots with namespaces do not share them.
+//! Source: `eclipse-zenoh/zenoh-plugin-ros2dds src/ros2_utils.rs` (`ros2_name_to_key_expr`). The
+//! namespace also precedes `/tf` and `/tf_static`, so robots with namespaces do not share them.
 
 use crate::topic_name::TopicName;
 

@@ -1,8 +1,9 @@
-//! Quality of service as the bridge's tokens write it: in the numbers of DDS, which are others than those of ROS.
+//! Quality of service as the bridge's tokens write it: in the numbers of DDS, which are others than
+//! those of ROS.
 //!
-//! `[K]:<reliability>:<durability>:<history>,<depth>[:<user data>]`; what is absent has the default of DDS. Source:
-//! `eclipse-zenoh/zenoh-plugin-ros2dds src/liveliness_mgt.rs` (`qos_to_key_expr`). The user data of publishers since
-//! Iron holds `typehash=RIHS01_...;`.
+//! `[K]:<reliability>:<durability>:<history>,<depth>[:<user data>]`; what is absent has the default
+//! of DDS. Source: `eclipse-zenoh/zenoh-plugin-ros2dds src/liveliness_mgt.rs` (`qos_to_key_expr`).
+//! The user data of publishers since Iron holds `typehash=RIHS01_...;`.
 
 use std::fmt;
 

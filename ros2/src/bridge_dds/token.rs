@@ -1,8 +1,9 @@
-//! Liveliness tokens of bridges: which bridges there are, and which topics their robots publish and subscribe to.
+//! Liveliness tokens of bridges: which bridges there are, and which topics their robots publish and
+//! subscribe to.
 //!
-//! `@/<zid>/@ros2_lv` for a bridge; `@/<zid>/@ros2_lv/MP|MS/<key>/<type>/<qos>` for a topic, and with `SS`, `SC`, `AS`,
-//! `AC` and no quality of service for services and actions. `/` inside of a part is `§`. Source:
-//! `eclipse-zenoh/zenoh-plugin-ros2dds src/liveliness_mgt.rs`.
+//! `@/<zid>/@ros2_lv` for a bridge; `@/<zid>/@ros2_lv/MP|MS/<key>/<type>/<qos>` for a topic, and
+//! with `SS`, `SC`, `AS`, `AC` and no quality of service for services and actions. `/` inside of a
+//! part is `§`. Source: `eclipse-zenoh/zenoh-plugin-ros2dds src/liveliness_mgt.rs`.
 
 use super::qos::{DdsQos, DdsQosError};
 use crate::type_name::{TypeName, TypeNameError};

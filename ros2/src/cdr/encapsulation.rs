@@ -15,7 +15,8 @@ pub enum ByteOrder {
 }
 
 impl ByteOrder {
-    /// Reads the header. The two bytes of options say nothing about the fields and may have any value.
+    /// Reads the header. The two bytes of options say nothing about the fields and may have any
+    /// value.
     pub(super) fn of_header(payload: &[u8]) -> Result<Self, CdrError> {
         let fault = match payload {
             [0, 0, _, _, ..] => return Ok(Self::Big),

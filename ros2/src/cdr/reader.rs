@@ -1,5 +1,5 @@
-//! Reads fields in order from a payload. Bytes and texts are borrowed; nothing is allocated before its count has been
-//! compared with the bytes that are left.
+//! Reads fields in order from a payload. Bytes and texts are borrowed; nothing is allocated before
+//! its count has been compared with the bytes that are left.
 
 use super::{
     Value,
@@ -8,7 +8,8 @@ use super::{
     scalar::Scalar,
 };
 
-/// Most bytes after the last field: the padding that CycloneDDS adds (`eclipse-cyclonedds/cyclonedds` issue 1805).
+/// Most bytes after the last field: the padding that CycloneDDS adds
+/// (`eclipse-cyclonedds/cyclonedds` issue 1805).
 pub const MAX_END_PADDING_BYTES: usize = 3;
 
 /// A position in a payload.

@@ -1,7 +1,8 @@
 //! `CameraInfo` as intrinsics and lens model of the image that is sent.
 //!
-//! Source: `ros2/common_interfaces sensor_msgs/msg/CameraInfo.msg`; `ros-perception/vision_opencv
-//! image_geometry/src/pinhole_camera_model.cpp` (region of interest, then binning). Pixel centres are at integers.
+//! Source: `ros2/common_interfaces sensor_msgs/msg/CameraInfo.msg`;
+//! `ros-perception/vision_opencv image_geometry/src/pinhole_camera_model.cpp` (region of interest,
+//! then binning). Pixel centres are at integers.
 
 use crate::messages::CameraInfo;
 use protos::v1;
@@ -61,8 +62,8 @@ pub enum CameraError {
     /// The server would refuse it: field and reason.
     #[error("{0}")]
     Refused(String),
-    /// The rectified image belongs to a camera that is turned: one of a stereo pair. Its frame is another one than
-    /// the header's.
+    /// The rectified image belongs to a camera that is turned: one of a stereo pair. Its frame is
+    /// another one than the header's.
     #[error("the image is rectified into a turned frame; send the raw image")]
     Turned,
 }
@@ -148,13 +149,14 @@ impl CameraModel {
     }
 }
 
-/// Names of a lens that bends nothing. `CameraInfo` of simulations and of rectified streams has them.
+/// Names of a lens that bends nothing. `CameraInfo` of simulations and of rectified streams has
+/// them.
 const NO_LENS: [&str; 6] = ["", "none", "None", "pinhole", "perspective", "rectified"];
 
 impl LensModel {
-    /// The lens by the coefficients that are not 0, in the order of OpenCV: some drivers send `plumb_bob` with 8
-    /// coefficients, `rational_polynomial` with 5, or up to 14 (thin prism and tilt), the last ones 0. `plumb_bob` with k4
-    /// to k6 is the rational model, as OpenCV reads it.
+    /// The lens by the coefficients that are not 0, in the order of OpenCV: some drivers send
+    /// `plumb_bob` with 8 coefficients, `rational_polynomial` with 5, or up to 14 (thin prism and
+    /// tilt), the last ones 0. `plumb_bob` with k4 to k6 is the rational model, as OpenCV reads it.
     pub fn of(name: &str, d: &[f64]) -> Result<Self, CameraError> {
         if d.iter().any(|c| !c.is_finite()) {
             return Err(CameraError::Field("d"));

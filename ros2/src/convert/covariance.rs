@@ -1,5 +1,5 @@
-//! Covariances of ROS, 6 x 6 over (x, y, z, rotations about fixed x, y, z), of planar ones, 3 x 3 over (x, y,
-//! theta). Both are in the parent frame of the pose, so entries are only moved.
+//! Covariances of ROS, 6 x 6 over (x, y, z, rotations about fixed x, y, z), of planar ones, 3 x 3
+//! over (x, y, theta). Both are in the parent frame of the pose, so entries are only moved.
 
 use nalgebra::Matrix3;
 
@@ -31,9 +31,9 @@ pub fn ros_of_planar(covariance: &Matrix3<f64>) -> [f64; 36] {
     full
 }
 
-/// The covariance as Nav2 takes it: every element in 0..=[`MAX_INITIAL_VARIANCE`]. A negative correlation becomes none,
-/// which keeps 3 x 3 covariances positive semidefinite; one beyond the clipped variances is clipped as well. The first
-/// element that is not finite is refused.
+/// The covariance as Nav2 takes it: every element in 0..=[`MAX_INITIAL_VARIANCE`]. A negative
+/// correlation becomes none, which keeps 3 x 3 covariances positive semidefinite; one beyond the
+/// clipped variances is clipped as well. The first element that is not finite is refused.
 pub fn clip_for_initial_pose(covariance: &[f64; 36]) -> Result<[f64; 36], CovarianceError> {
     if let Some(index) = covariance.iter().position(|v| !v.is_finite()) {
         return Err(CovarianceError(index));

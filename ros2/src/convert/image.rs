@@ -16,7 +16,8 @@ use wide::narrowed;
 pub enum PixelLayout {
     /// `mono8`, `8UC1`, `mono16`.
     Gray,
-    /// Samples of red, green and blue at these places of a pixel of so many: `rgb8`, `bgra8`, `rgb16` ...
+    /// Samples of red, green and blue at these places of a pixel of so many: `rgb8`, `bgra8`,
+    /// `rgb16` ...
     Colour {
         /// Places of red, green and blue.
         places: [usize; 3],
@@ -28,12 +29,14 @@ pub enum PixelLayout {
         /// Column and row of red in the square.
         red: [usize; 2],
     },
-    /// `yuv422` (`uyvy`) and `yuv422_yuy2` (`yuyv`): two bytes a pixel, luma and one of Cb and Cr, which two pixels share.
+    /// `yuv422` (`uyvy`) and `yuv422_yuy2` (`yuyv`): two bytes a pixel, luma and one of Cb and Cr,
+    /// which two pixels share.
     Yuv422 {
         /// Place of the luma in a pixel, 0 or 1.
         luma: usize,
     },
-    /// `nv12` and `nv21`: rows of luma, then half as many of Cb and Cr, which squares of four pixels share.
+    /// `nv12` and `nv21`: rows of luma, then half as many of Cb and Cr, which squares of four
+    /// pixels share.
     Yuv420 {
         /// Place of Cb in a pair, 0 or 1.
         cb: usize,
@@ -80,8 +83,8 @@ impl PixelLayout {
     }
 }
 
-/// Luma as JPEG has it (ITU-R BT.601), in the fixed point of the server's decoder (`vision/src/frame/picture.rs`): a raw image
-/// gives the grey of its PNG.
+/// Luma as JPEG has it (ITU-R BT.601), in the fixed point of the server's decoder
+/// (`vision/src/frame/picture.rs`): a raw image gives the grey of its PNG.
 fn luma([r, g, b]: [u8; 3]) -> u8 {
     ((19_595 * u32::from(r) + 38_470 * u32::from(g) + 7_471 * u32::from(b) + 32_768) >> 16) as u8
 }

@@ -19,8 +19,8 @@ pub enum InitialPoseError {
     Covariance(#[from] CovarianceError),
 }
 
-/// The message that Nav2 takes: `map_frame` has to be its global frame, and `stamp` one of the robot's newest, for it
-/// looks up its odometry at that time. The covariance is over (x, y, theta).
+/// The message that Nav2 takes: `map_frame` has to be its global frame, and `stamp` one of the
+/// robot's newest, for it looks up its odometry at that time. The covariance is over (x, y, theta).
 pub fn initial_pose<'a>(
     map_frame: &'a str,
     stamp: Time,

@@ -1,8 +1,8 @@
 //! Laser scans as plain numbers, and how the laser is mounted.
 //!
-//! Source: `ros2/common_interfaces sensor_msgs/msg/LaserScan.msg`: the stamp is the time of the first ray, angles run
-//! counter-clockwise about the laser's z axis from its x axis, ranges outside of `range_min` to `range_max` are
-//! invalid.
+//! Source: `ros2/common_interfaces sensor_msgs/msg/LaserScan.msg`: the stamp is the time of the
+//! first ray, angles run counter-clockwise about the laser's z axis from its x axis, ranges outside
+//! of `range_min` to `range_max` are invalid.
 
 use super::planar::{PlanarPose, tilt_rad};
 use crate::messages::LaserScan;
@@ -15,7 +15,8 @@ pub const MAX_LASER_TILT_RAD: f64 = 5.0 * PI / 180.0;
 /// Longest accepted time of a scan, seconds.
 pub const MAX_SCAN_S: f64 = 10.0;
 
-/// Largest accepted angle of the first ray, smallest step and smallest `range_max`, as of [`map::laser::Scan`].
+/// Largest accepted angle of the first ray, smallest step and smallest `range_max`, as of
+/// [`map::laser::Scan`].
 const MAX_ANGLE_RAD: f32 = MAX_FAN_RAD as f32;
 const MIN_STEP_RAD: f32 = 1e-5;
 const MIN_RANGE_MAX_M: f32 = 0.1;
@@ -33,8 +34,8 @@ pub struct PlanarScan {
     pub first_bearing_rad: f64,
     /// Angle from one ray to the next, radians, signed.
     pub bearing_step_rad: f64,
-    /// Largest valid range, metres, at most [`MAX_RANGE_M`]: drivers without a limit send the largest number, or
-    /// infinity.
+    /// Largest valid range, metres, at most [`MAX_RANGE_M`]: drivers without a limit send the
+    /// largest number, or infinity.
     pub max_range_m: f64,
     /// Ranges, metres; NaN where invalid.
     pub ranges_m: Vec<f32>,
@@ -54,7 +55,8 @@ pub enum LaserError {
         "`angle_increment` times the rays of the scan is {0} rad, more than a turn: angles are in radians"
     )]
     Fan(f64),
-    /// A number is not finite or makes no sense: a step of 0, `range_max` not above `range_min`, a negative time.
+    /// A number is not finite or makes no sense: a step of 0, `range_max` not above `range_min`, a
+    /// negative time.
     #[error("`{field}` of the scan is {value}")]
     Field {
         /// Name of the field.

@@ -4,14 +4,16 @@ use super::pose::transform_of;
 use crate::messages::{Header, Time, TransformStamped};
 use nalgebra::Isometry3;
 
-/// `map_from_odom` of two poses of the robot's base at one time, that of the picture. Height, roll and pitch of the
-/// odometry are taken over, so that `map_from_odom * odom_from_base` is exactly the pose in the map.
+/// `map_from_odom` of two poses of the robot's base at one time, that of the picture. Height, roll
+/// and pitch of the odometry are taken over, so that `map_from_odom * odom_from_base` is exactly
+/// the pose in the map.
 pub fn map_from_odom(map_from_base: &Isometry3<f64>, odom_from_base: &Isometry3<f64>) -> Isometry3<f64> {
     map_from_base * odom_from_base.inverse()
 }
 
-/// The transform as `/tf` carries it. For `map` to `odom`, AMCL stamps it ahead of the newest data of the robot by a
-/// tolerance (1 s by default) and repeats it (`ros-navigation/navigation2 nav2_amcl/src/amcl_node.cpp`).
+/// The transform as `/tf` carries it. For `map` to `odom`, AMCL stamps it ahead of the newest data
+/// of the robot by a tolerance (1 s by default) and repeats it
+/// (`ros-navigation/navigation2 nav2_amcl/src/amcl_node.cpp`).
 pub fn transform_stamped<'a>(
     parent_frame: &'a str,
     child_frame: &'a str,

@@ -1,9 +1,10 @@
-//! Conventions of ROS in plain numbers. In: messages. Out: metres, radians, nanoseconds and pixels in the coordinate
-//! frames of docs/TERMS.md, or a typed error; and back.
+//! Conventions of ROS in plain numbers. In: messages. Out: metres, radians, nanoseconds and pixels
+//! in the coordinate frames of docs/TERMS.md, or a typed error; and back.
 //!
-//! Sources: REP-103 (units, axes, covariances over x, y, z and rotations about fixed axes), REP-105 (`map`, `odom`,
-//! `base_link`), REP-104 (`CameraInfo`), `ros2/geometry2` (tf2), `ros-navigation/navigation2`; files are named where
-//! they matter. `a_from_b` takes coordinates of b to those of a; ROS calls it the transform with parent a and child b.
+//! Sources: REP-103 (units, axes, covariances over x, y, z and rotations about fixed axes), REP-105
+//! (`map`, `odom`, `base_link`), REP-104 (`CameraInfo`), `ros2/geometry2` (tf2),
+//! `ros-navigation/navigation2`; files are named where they matter. `a_from_b` takes coordinates of
+//! b to those of a; ROS calls it the transform with parent a and child b.
 
 mod rotation;
 mod pose;

@@ -1,10 +1,12 @@
-//! The two frames of a camera: body (x forward, y left, z up) and optical (z forward, x right, y down; names end in
-//! `_optical_frame`). Images, and Waymark's `camera` frame, are of the optical one (REP-103).
+//! The two frames of a camera: body (x forward, y left, z up) and optical (z forward, x right, y
+//! down; names end in `_optical_frame`). Images, and Waymark's `camera` frame, are of the optical
+//! one (REP-103).
 
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 
-/// Takes coordinates of the optical frame to those of the body frame of the same camera: for a driver that names only
-/// the body frame, `robot_from_camera` is `robot_from_body * body_from_optical()`.
+/// Takes coordinates of the optical frame to those of the body frame of the same camera: for a
+/// driver that names only the body frame, `robot_from_camera` is
+/// `robot_from_body * body_from_optical()`.
 pub fn body_from_optical() -> UnitQuaternion<f64> {
     let axes = Matrix3::new(0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0);
     UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(axes))

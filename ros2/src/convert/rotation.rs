@@ -3,8 +3,9 @@
 use crate::messages::Quaternion;
 use nalgebra::UnitQuaternion;
 
-/// Largest difference of the squared norm from 1, that of tf2 (`ros2/geometry2 tf2/src/buffer_core.cpp`,
-/// `QUATERNION_NORMALIZATION_TOLERANCE`): what a robot's own tf takes is taken here.
+/// Largest difference of the squared norm from 1, that of tf2
+/// (`ros2/geometry2 tf2/src/buffer_core.cpp`, `QUATERNION_NORMALIZATION_TOLERANCE`): what a robot's
+/// own tf takes is taken here.
 pub const MAX_NORM2_ERROR: f64 = 10e-3;
 
 /// Why four numbers are no rotation.
@@ -31,8 +32,9 @@ pub fn rotation(q: &Quaternion) -> Result<UnitQuaternion<f64>, RotationError> {
     Ok(UnitQuaternion::from_quaternion(raw))
 }
 
-/// The quaternion of a rotation, of the two the one with `w >= 0`, normalised: Nav2 takes a squared norm within 1e-4
-/// of 1 (`ros-navigation/navigation2 nav2_util/include/nav2_util/validate_messages.hpp`).
+/// The quaternion of a rotation, of the two the one with `w >= 0`, normalised: Nav2 takes a squared
+/// norm within 1e-4 of 1
+/// (`ros-navigation/navigation2 nav2_util/include/nav2_util/validate_messages.hpp`).
 pub fn quaternion(rotation: &UnitQuaternion<f64>) -> Quaternion {
     let q = rotation.quaternion().normalize();
     let sign = if q.w < 0.0 { -1.0 } else { 1.0 };

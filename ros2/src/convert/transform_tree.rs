@@ -1,9 +1,9 @@
 //! The tree of transforms that robots send on `/tf_static`, and sums along it.
 //!
-//! A broadcaster repeats all its transforms in its last message (`ros2/geometry2
-//! tf2_ros/src/static_transform_broadcaster.cpp`), and there are several: they are merged by child frame, and the
-//! newest wins, as in tf2. A leading slash is taken off, as tf2 does where it receives (`ros2/geometry2
-//! tf2/src/buffer_core.cpp`).
+//! A broadcaster repeats all its transforms in its last message
+//! (`ros2/geometry2 tf2_ros/src/static_transform_broadcaster.cpp`), and there are several: they are
+//! merged by child frame, and the newest wins, as in tf2. A leading slash is taken off, as tf2 does
+//! where it receives (`ros2/geometry2 tf2/src/buffer_core.cpp`).
 
 use super::pose::{PoseError, isometry_of_transform};
 use crate::messages::{TFMessage, TransformStamped};
@@ -75,7 +75,8 @@ pub enum LookupError {
 }
 
 impl TransformTree {
-    /// Takes over the transforms of a message. Returns how many changed the tree, and what was left out.
+    /// Takes over the transforms of a message. Returns how many changed the tree, and what was left
+    /// out.
     pub fn merge(&mut self, message: &TFMessage<'_>) -> (usize, Vec<TransformError>) {
         let (mut changed, mut errors) = (0, Vec::new());
         for transform in &message.transforms {
@@ -87,7 +88,8 @@ impl TransformTree {
         (changed, errors)
     }
 
-    /// Takes over one transform in place of the child's former one. Returns whether that changed the tree.
+    /// Takes over one transform in place of the child's former one. Returns whether that changed
+    /// the tree.
     pub fn insert(&mut self, transform: &TransformStamped<'_>) -> Result<bool, TransformError> {
         let (child, parent) = (plain(transform.child_frame_id), plain(transform.header.frame_id));
         for name in [child, parent] {
@@ -108,8 +110,8 @@ impl TransformTree {
         Ok(former != Some(link))
     }
 
-    /// `target_from_source`: takes coordinates of `source` to those of `target`. For a camera, `target` is the robot's
-    /// base and `source` the frame of the image's header.
+    /// `target_from_source`: takes coordinates of `source` to those of `target`. For a camera,
+    /// `target` is the robot's base and `source` the frame of the image's header.
     pub fn lookup(&self, target: &str, source: &str) -> Result<Isometry3<f64>, LookupError> {
         let (target, source) = (plain(target), plain(source));
         for frame in [source, target] {

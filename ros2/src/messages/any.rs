@@ -1,4 +1,5 @@
-//! The messages by the name of their type, for who learns the type from a key, a token or a setting.
+//! The messages by the name of their type, for who learns the type from a key, a token or a
+//! setting.
 
 use super::{
     CameraInfo, CompressedImage, Detection2DArray, Header, Image, LaserScan, Message, Odometry,
@@ -85,7 +86,8 @@ impl MessageKind {
         Self::ALL.iter().copied().find(|kind| kind.name() == name)
     }
 
-    /// Whether the message itself has a field of type `uint8[]`, which publishers since Lyrical send as a buffer.
+    /// Whether the message itself has a field of type `uint8[]`, which publishers since Lyrical
+    /// send as a buffer.
     pub fn has_bytes(self) -> bool {
         matches!(self, Self::Image | Self::CompressedImage)
     }

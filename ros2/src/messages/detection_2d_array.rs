@@ -1,5 +1,6 @@
-//! `vision_msgs/msg/Detection2DArray` with `Detection2D`, `ObjectHypothesisWithPose`, `BoundingBox2D` and `Pose2D`:
-//! what was recognised in an image. `ObjectHypothesis` and `Point2D` are written as the fields they have.
+//! `vision_msgs/msg/Detection2DArray` with `Detection2D`, `ObjectHypothesisWithPose`,
+//! `BoundingBox2D` and `Pose2D`: what was recognised in an image. `ObjectHypothesis` and `Point2D`
+//! are written as the fields they have.
 
 use super::{Header, Message, PoseWithCovariance};
 use crate::{

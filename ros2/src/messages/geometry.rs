@@ -90,7 +90,8 @@ impl Value<'_> for Pose {
 pub struct PoseWithCovariance {
     /// The mean.
     pub pose: Pose,
-    /// 6 x 6, row-major, over x, y, z (metres) and rotations about the fixed axes x, y, z (radians).
+    /// 6 x 6, row-major, over x, y, z (metres) and rotations about the fixed axes x, y, z
+    /// (radians).
     pub covariance: [f64; 36],
 }
 

@@ -25,7 +25,8 @@ impl Time {
         i32::try_from(ns.div_euclid(NS_PER_S)).map(|sec| Self { sec, nanosec }).or(Err(TimeError(ns)))
     }
 
-    /// Nanoseconds since the epoch of the clock. More than a second of nanoseconds counts as it stands.
+    /// Nanoseconds since the epoch of the clock. More than a second of nanoseconds counts as it
+    /// stands.
     pub fn to_ns(self) -> i64 {
         i64::from(self.sec) * NS_PER_S + i64::from(self.nanosec)
     }

@@ -6,8 +6,8 @@ use crate::{
     type_name::TypeName,
 };
 
-/// One turn of a planar laser. Ray i has the angle `angle_min + i * angle_increment`, counter-clockwise from the
-/// laser's x axis, and the time `stamp + i * time_increment`.
+/// One turn of a planar laser. Ray i has the angle `angle_min + i * angle_increment`,
+/// counter-clockwise from the laser's x axis, and the time `stamp + i * time_increment`.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct LaserScan<'a> {
     /// Time of the first ray, and the laser's frame.

@@ -1,12 +1,13 @@
-//! The messages that robots and a server exchange, field by field as in their definitions. Texts and the bytes of
-//! images are borrowed from the payload.
+//! The messages that robots and a server exchange, field by field as in their definitions. Texts
+//! and the bytes of images are borrowed from the payload.
 //!
 //! Definitions: `ros2/common_interfaces` (`sensor_msgs`, `nav_msgs`, `geometry_msgs`, `std_msgs`),
-//! `ros2/rcl_interfaces` (`builtin_interfaces`), `ros2/geometry2` (`tf2_msgs`), `ros-perception/vision_msgs` 4.1.1;
-//! the `.msg` files named at each type. The hashes (REP-2011, `RIHS01_`) are equal for Humble, Jazzy, Kilted and
-//! Lyrical.
+//! `ros2/rcl_interfaces` (`builtin_interfaces`), `ros2/geometry2` (`tf2_msgs`),
+//! `ros-perception/vision_msgs` 4.1.1; the `.msg` files named at each type. The hashes (REP-2011,
+//! `RIHS01_`) are equal for Humble, Jazzy, Kilted and Lyrical.
 //!
-//! A definition whose hash is another one would have other bytes, so [`Message::HASH`] stands beside the fields.
+//! A definition whose hash is another one would have other bytes, so [`Message::HASH`] stands
+//! beside the fields.
 
 mod header;
 mod geometry;

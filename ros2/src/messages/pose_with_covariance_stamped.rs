@@ -1,4 +1,5 @@
-//! `geometry_msgs/msg/PoseWithCovarianceStamped`: `/initialpose`, and a measurement for `robot_localization`.
+//! `geometry_msgs/msg/PoseWithCovarianceStamped`: `/initialpose`, and a measurement for
+//! `robot_localization`.
 
 use super::{Header, Message, PoseWithCovariance};
 use crate::{

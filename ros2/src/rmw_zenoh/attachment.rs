@@ -1,8 +1,9 @@
 //! What goes beside every payload: number, time and sender.
 //!
-//! Source: `attachment_helpers.cpp`, `zenoh_utils.cpp`; `eclipse-zenoh/zenoh zenoh-ext/src/serialization.rs`.
-//! 33 bytes: i64 number, i64 time, a length of 16, the sender; little endian. Up to Humble 0.1.1, Jazzy 0.2.3 and
-//! Rolling 0.5.0 each is preceded by its name as a text with a length byte: 77 bytes. A subscription of ROS drops
+//! Source: `attachment_helpers.cpp`, `zenoh_utils.cpp`;
+//! `eclipse-zenoh/zenoh zenoh-ext/src/serialization.rs`. 33 bytes: i64 number, i64 time, a length
+//! of 16, the sender; little endian. Up to Humble 0.1.1, Jazzy 0.2.3 and Rolling 0.5.0 each is
+//! preceded by its name as a text with a length byte: 77 bytes. A subscription of ROS drops
 //! messages without an attachment, and may end at a malformed one, so one is written to every put.
 
 use super::gid::Gid;
@@ -19,7 +20,8 @@ const GID_BYTES: usize = 16;
 pub struct Attachment {
     /// Number of the message; a publisher begins with 1.
     pub sequence: i64,
-    /// When it was published, ns since 1970 by the clock of the robot's computer, even under simulated time.
+    /// When it was published, ns since 1970 by the clock of the robot's computer, even under
+    /// simulated time.
     pub source_ns: i64,
     /// The publisher.
     pub source: Gid,

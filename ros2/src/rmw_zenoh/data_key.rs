@@ -1,7 +1,8 @@
 //! The key of a topic: `<domain>/<topic>/<pkg>::msg::dds_::<Type>_/<hash>`.
 //!
-//! Source: `liveliness_utils.cpp` (`TopicInfo`), `buffer_endpoint_helpers.hpp`; the matching, `eclipse-zenoh/zenoh
-//! commons/zenoh-keyexpr/src/key_expr`: zenoh matches exact keys; `*` and `**` match no part that begins with `@`.
+//! Source: `liveliness_utils.cpp` (`TopicInfo`), `buffer_endpoint_helpers.hpp`; the matching,
+//! `eclipse-zenoh/zenoh commons/zenoh-keyexpr/src/key_expr`: zenoh matches exact keys; `*` and `**`
+//! match no part that begins with `@`.
 
 use super::domain;
 use crate::{
@@ -39,7 +40,8 @@ pub struct DataKey<'a> {
 pub enum Channel {
     /// The topic's key.
     Topic,
-    /// The key with `/_buf_cpu`: types with a `uint8[]` since Lyrical, where all subscribers know buffers.
+    /// The key with `/_buf_cpu`: types with a `uint8[]` since Lyrical, where all subscribers know
+    /// buffers.
     CpuBuffers,
 }
 

@@ -1,7 +1,7 @@
 //! The 16 bytes that name an entity in attachments.
 //!
-//! Source: `liveliness_utils.cpp` (`Entity`) and `simplified_xxhash3.cpp`: XXH3 of 128 bits over the whole token,
-//! seed 0, low half first.
+//! Source: `liveliness_utils.cpp` (`Entity`) and `simplified_xxhash3.cpp`: XXH3 of 128 bits over
+//! the whole token, seed 0, low half first.
 
 use std::fmt;
 use xxhash_rust::xxh3::xxh3_128;
@@ -11,7 +11,8 @@ use xxhash_rust::xxh3::xxh3_128;
 pub struct Gid(pub [u8; 16]);
 
 impl Gid {
-    /// Of the entity with this liveliness token, as received or declared: one byte more gives another name.
+    /// Of the entity with this liveliness token, as received or declared: one byte more gives
+    /// another name.
     pub fn of_token(token: &str) -> Self {
         Self(xxh3_128(token.as_bytes()).to_le_bytes())
     }

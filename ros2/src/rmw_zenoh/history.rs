@@ -1,11 +1,13 @@
 //! What a late subscriber of a transient local topic (`/tf_static`) asks for.
 //!
-//! Source: `eclipse-zenoh/zenoh zenoh-ext/src/advanced_publisher.rs` and `advanced_cache.rs`, tried with 1.10.2 through
-//! two routers. A publisher with a cache answers queries at `<data key>/@adv/pub/<zid>/<entity>/_` and declares a
-//! liveliness token there; the entity is `uhlc` where it numbers nothing. The replies carry the data key, so the query
-//! has to accept replies of any key: without [`ACCEPT_ANY_KEY`] the answer is silently empty.
+//! Source: `eclipse-zenoh/zenoh zenoh-ext/src/advanced_publisher.rs` and `advanced_cache.rs`, tried
+//! with 1.10.2 through two routers. A publisher with a cache answers queries at
+//! `<data key>/@adv/pub/<zid>/<entity>/_` and declares a liveliness token there; the entity is
+//! `uhlc` where it numbers nothing. The replies carry the data key, so the query has to accept
+//! replies of any key: without [`ACCEPT_ANY_KEY`] the answer is silently empty.
 
-/// Parameter of the query that lets replies have another key than the query; zenoh's `ReplyKeyExpr::Any` writes it.
+/// Parameter of the query that lets replies have another key than the query; zenoh's
+/// `ReplyKeyExpr::Any` writes it.
 pub const ACCEPT_ANY_KEY: &str = "_anyke";
 
 /// Between the data key and who publishes.
@@ -13,7 +15,8 @@ const PUBLISHERS: &str = "/@adv/pub/";
 /// Longest part of a cache's key after the data key, in parts: session, entity, `_`.
 const CACHE_PARTS: usize = 3;
 
-/// Where publishers with a cache declare their tokens: each one that appears is asked for its samples.
+/// Where publishers with a cache declare their tokens: each one that appears is asked for its
+/// samples.
 pub fn publishers_of(key: &str) -> String {
     format!("{key}/@adv/pub/**")
 }

@@ -1,9 +1,12 @@
-//! A node of our own: the tokens to declare, so that robots see it and publishers of images begin to publish.
+//! A node of our own: the tokens to declare, so that robots see it and publishers of images begin
+//! to publish.
 //!
-//! Source: `liveliness_utils.cpp` (`Entity`); `ros-perception/image_common image_transport/src/publisher.cpp`, which
-//! publishes only while some subscription's token has its topic and type. A subscription therefore repeats topic, type
-//! and hash of the publisher's token. What is published has the hash of the robot's own subscription, for a robot may
-//! have another definition than this crate; [`crate::messages::Message::HASH`] is for robots without one.
+//! Source: `liveliness_utils.cpp` (`Entity`);
+//! `ros-perception/image_common image_transport/src/publisher.cpp`, which publishes only while some
+//! subscription's token has its topic and type. A subscription therefore repeats topic, type and
+//! hash of the publisher's token. What is published has the hash of the robot's own subscription,
+//! for a robot may have another definition than this crate; [`crate::messages::Message::HASH`] is
+//! for robots without one.
 
 use super::{
     attachment::Attachment,
@@ -26,8 +29,8 @@ pub struct LocalNode {
 }
 
 impl LocalNode {
-    /// The first node of a session. `zid` is the session's identity as zenoh prints it; `namespace` begins with a
-    /// slash.
+    /// The first node of a session. `zid` is the session's identity as zenoh prints it; `namespace`
+    /// begins with a slash.
     pub fn new(domain: u32, zid: &str, namespace: &str, node: &str) -> Self {
         let token = Token {
             domain,
@@ -57,7 +60,8 @@ impl LocalNode {
         &self.token
     }
 
-    /// A subscription to what `publisher` publishes: best effort, or reliable with earlier samples where it keeps them.
+    /// A subscription to what `publisher` publishes: best effort, or reliable with earlier samples
+    /// where it keeps them.
     pub fn subscription(&mut self, publisher: &Endpoint) -> Token {
         let qos = match publisher.qos.durability {
             Durability::TransientLocal => Qos::latched(LATCHED_DEPTH),

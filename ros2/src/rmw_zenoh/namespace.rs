@@ -1,10 +1,12 @@
-//! The namespace of a zenoh session: a prefix of every key of a robot, data and tokens alike, that keeps robots of the
-//! same domain apart. The session adds and removes it, so a server sees it and the robot does not.
+//! The namespace of a zenoh session: a prefix of every key of a robot, data and tokens alike, that
+//! keeps robots of the same domain apart. The session adds and removes it, so a server sees it and
+//! the robot does not.
 //!
-//! Source: `eclipse-zenoh/zenoh DEFAULT_CONFIG.json5` (`namespace`), tried with zenoh 1.10.2: `robots/r1` gives
-//! `robots/r1/0/chatter/...` and `robots/r1/@ros2_lv/0/...`.
+//! Source: `eclipse-zenoh/zenoh DEFAULT_CONFIG.json5` (`namespace`), tried with zenoh 1.10.2:
+//! `robots/r1` gives `robots/r1/0/chatter/...` and `robots/r1/@ros2_lv/0/...`.
 
-/// The key as the robot sees it; `None` for a key outside of the namespace. An empty namespace holds every key.
+/// The key as the robot sees it; `None` for a key outside of the namespace. An empty namespace
+/// holds every key.
 pub fn strip_namespace<'a>(key: &'a str, namespace: &str) -> Option<&'a str> {
     if namespace.is_empty() {
         return Some(key);

@@ -1,9 +1,9 @@
 //! Quality of service as liveliness tokens write it. It never keeps data from being delivered.
 //!
-//! `reliability:durability:history,depth:deadline s,ns:lifespan s,ns:liveliness,lease s,ns`; what equals the default
-//! is left empty. Source: `liveliness_utils.cpp` (`qos_to_keyexpr`), `qos.cpp` (defaults); numbers of `ros2/rmw
-//! include/rmw/types.h`. Before Humble 0.1.2, Jazzy 0.2.3 and Rolling 0.5.0 an empty durability meant transient local
-//! (`ros2/rmw_zenoh` issue 263).
+//! `reliability:durability:history,depth:deadline s,ns:lifespan s,ns:liveliness,lease s,ns`; what
+//! equals the default is left empty. Source: `liveliness_utils.cpp` (`qos_to_keyexpr`), `qos.cpp`
+//! (defaults); numbers of `ros2/rmw include/rmw/types.h`. Before Humble 0.1.2, Jazzy 0.2.3 and
+//! Rolling 0.5.0 an empty durability meant transient local (`ros2/rmw_zenoh` issue 263).
 
 use std::fmt;
 
@@ -163,7 +163,8 @@ impl Qos {
         Self { depth, ..Self::default() }
     }
 
-    /// Reliable and transient local: `/tf_static`, with depth 1 for its publisher and 100 for its listener.
+    /// Reliable and transient local: `/tf_static`, with depth 1 for its publisher and 100 for its
+    /// listener.
     pub fn latched(depth: u64) -> Self {
         Self { durability: Durability::TransientLocal, depth, ..Self::default() }
     }

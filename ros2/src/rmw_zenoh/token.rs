@@ -1,8 +1,9 @@
 //! Liveliness tokens: which nodes there are, and what they publish and subscribe to.
 //!
-//! `@ros2_lv/<domain>/<zid>/<node id>/<entity id>/<kind>/<enclave>/<namespace>/<node>`, and for an endpoint
-//! `/<topic>/<type>/<hash>/<qos>`, since Lyrical perhaps `/backends:...`. `/` inside of a part is `%`. So there are 9,
-//! 13 or 14 parts. Source: `liveliness_utils.cpp` (`Entity`), and the design document.
+//! `@ros2_lv/<domain>/<zid>/<node id>/<entity id>/<kind>/<enclave>/<namespace>/<node>`, and for an
+//! endpoint `/<topic>/<type>/<hash>/<qos>`, since Lyrical perhaps `/backends:...`. `/` inside of a
+//! part is `%`. So there are 9, 13 or 14 parts. Source: `liveliness_utils.cpp` (`Entity`), and the
+//! design document.
 
 use super::{
     domain,
@@ -79,7 +80,8 @@ pub struct Endpoint {
     pub hash: String,
     /// Quality of service.
     pub qos: Qos,
-    /// Where a subscription takes buffers: [`super::CPU_BACKEND`] for plain CDR. `None` for nodes before Lyrical.
+    /// Where a subscription takes buffers: [`super::CPU_BACKEND`] for plain CDR. `None` for nodes
+    /// before Lyrical.
     pub backends: Option<String>,
 }
 

@@ -44,7 +44,8 @@ pub struct ConvertedMessage {
     pub problems: Vec<Problem>,
 }
 
-/// One robot: calibrations, transforms, odometry, and what waits for odometry (one frame a camera, one scan).
+/// One robot: calibrations, transforms, odometry, and what waits for odometry (one frame a camera,
+/// one scan).
 #[derive(Debug, Clone)]
 pub struct RobotAdapter {
     settings: RobotSettings,

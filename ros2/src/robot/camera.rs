@@ -61,15 +61,17 @@ impl CameraState {
             return Err(lack(age_ns, MissingReason::ImageSize { calibrated, given }));
         }
         let wire = model.to_wire();
-        // A frame with a calibration that the server refuses would be refused as a whole; without it, it still names.
+        // A frame with a calibration that the server refuses would be refused as a whole; without
+        // it, it still names.
         geometry::intrinsics(&wire)
             .map_err(|refused| lack(age_ns, CameraError::Refused(refused.to_string()).into()))?;
         Ok(wire)
     }
 }
 
-/// Raw images of more pixels travel as grey. So many in colour, 1.6 MB, 20 times a second are what a robot may send by the
-/// server's defaults (`limits.robot_bytes_per_s`); larger ones are better sent compressed.
+/// Raw images of more pixels travel as grey. So many in colour, 1.6 MB, 20 times a second are what
+/// a robot may send by the server's defaults (`limits.robot_bytes_per_s`); larger ones are better
+/// sent compressed.
 const MAX_COLOUR_PX: u32 = 960 * 540;
 
 /// Pixels as they go on the wire.
@@ -80,7 +82,8 @@ pub(super) struct Pixels {
 }
 
 impl Pixels {
-    /// Of a raw image. The only place that chooses how raw pixels travel: in colour up to [`MAX_COLOUR_PX`], else as grey.
+    /// Of a raw image. The only place that chooses how raw pixels travel: in colour up to
+    /// [`MAX_COLOUR_PX`], else as grey.
     pub(super) fn of_raw(topic: &str, image: &Image<'_>) -> Result<Self, Problem> {
         let rows = ImageRows::of(image);
         let rows = rows.map_err(|fault| Problem::Image { topic: topic.to_owned(), fault })?;

@@ -10,8 +10,8 @@ use crate::{
 };
 use protos::v1;
 
-/// A scan without number and odometry. Its time is that of the middle ray: what the robot moved during the turn then
-/// counts as much before it as after it.
+/// A scan without number and odometry. Its time is that of the middle ray: what the robot moved
+/// during the turn then counts as much before it as after it.
 pub(super) fn scan(
     topic: &str,
     message: &LaserScan<'_>,

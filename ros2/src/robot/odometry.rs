@@ -6,9 +6,11 @@ use std::collections::VecDeque;
 
 /// Most poses that are kept: ten seconds at 50 a second.
 pub const MAX_ODOMETRY: usize = 512;
-/// A pose that is older than the newest by more than this means that the robot's clock was set back.
+/// A pose that is older than the newest by more than this means that the robot's clock was set
+/// back.
 pub const MAX_STEP_BACK_NS: i64 = 1_000_000_000;
-/// A message that is newer than the newest odometry by up to this waits for odometry; by more, odometry has stopped.
+/// A message that is newer than the newest odometry by up to this waits for odometry; by more,
+/// odometry has stopped.
 pub const MAX_WAIT_NS: i64 = 500_000_000;
 
 /// Poses by time, oldest first.

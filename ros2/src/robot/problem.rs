@@ -36,7 +36,8 @@ pub struct MissingInput {
     pub input: Input,
     /// The topic that it comes on.
     pub topic: String,
-    /// Stamp of the message less the newest stamp on that topic; `None` where nothing was received on it.
+    /// Stamp of the message less the newest stamp on that topic; `None` where nothing was received
+    /// on it.
     pub age_ns: Option<i64>,
     /// Why what was received does not do.
     pub reason: MissingReason,
@@ -158,8 +159,8 @@ pub enum Problem {
     Superseded(String),
 }
 
-/// What whoever runs the robot can do about a word of [`Problem::word`] or [`MissingInput::word`], or one of the wire; empty where the
-/// sentence of the problem says it.
+/// What whoever runs the robot can do about a word of [`Problem::word`] or [`MissingInput::word`],
+/// or one of the wire; empty where the sentence of the problem says it.
 pub fn advice(word: &str) -> &'static str {
     match word {
         "not_used" | "other_type" => "Compare `ros2 topic list -t` with the robot's settings in the server.",

@@ -31,11 +31,13 @@ pub struct CameraSettings {
     pub form: ImageForm,
     /// Topic of its calibration.
     pub camera_info: String,
-    /// Whether the images are rectified already: then the lens is left out and `P` gives the intrinsics.
+    /// Whether the images are rectified already: then the lens is left out and `P` gives the
+    /// intrinsics.
     pub is_rectified: bool,
     /// Name of the camera's frame, in place of that in the header of its images.
     pub frame: Option<String>,
-    /// Whether that frame has the axes of a body (x forward), as some simulators have it, not optical ones (z forward).
+    /// Whether that frame has the axes of a body (x forward), as some simulators have it, not
+    /// optical ones (z forward).
     pub has_body_axes: bool,
 }
 
@@ -62,7 +64,8 @@ pub struct RobotSettings {
     pub map_frame: String,
     /// Topic of the laser; `None` for a robot without one.
     pub scan: Option<String>,
-    /// Topic of `nav_msgs/msg/Odometry`; `None` takes odometry from the transforms below `odom_frame`.
+    /// Topic of `nav_msgs/msg/Odometry`; `None` takes odometry from the transforms below
+    /// `odom_frame`.
     pub odometry: Option<String>,
     /// Topic of transforms that change.
     pub tf: String,
@@ -202,7 +205,8 @@ fn check_frame(field: String, frame: &str) -> Result<(), SettingsError> {
     Ok(())
 }
 
-/// The absolute name of a topic of a node in `namespace`: `scan` in `/r1` is `/r1/scan`, `/scan` stays `/scan`.
+/// The absolute name of a topic of a node in `namespace`: `scan` in `/r1` is `/r1/scan`, `/scan`
+/// stays `/scan`.
 pub fn absolute_topic(namespace: &str, topic: &str) -> Result<String, TopicNameError> {
     let absolute = match namespace.trim_matches('/') {
         _ if topic.starts_with('/') => topic.to_owned(),

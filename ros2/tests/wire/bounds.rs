@@ -1,5 +1,5 @@
-//! Claim: damaged payloads give a typed error that names field and offset; no count is believed before it has been
-//! compared with the bytes that are left.
+//! Claim: damaged payloads give a typed error that names field and offset; no count is believed
+//! before it has been compared with the bytes that are left.
 
 use crate::rosbags::samples;
 use ros2::{

@@ -1,4 +1,5 @@
-//! Claim: the calibrations of other people's cameras are used, or frames go without one and say why.
+//! Claim: the calibrations of other people's cameras are used, or frames go without one and say
+//! why.
 
 use super::robot::{CAMERA_INFO, IMAGE, frames, image, info, robot};
 use protos::{convert::geometry::intrinsics, v1};

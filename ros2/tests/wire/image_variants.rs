@@ -4,7 +4,8 @@ use super::robot::{IMAGE, OPTICAL, frames, header, robot};
 use protos::{CheckedFrame, v1};
 use ros2::messages::{AnyMessage, Image};
 
-/// Encoding, bytes of one pixel (or of 2 x 2 where pixels share colours), grey level, whether it has colour.
+/// Encoding, bytes of one pixel (or of 2 x 2 where pixels share colours), grey level, whether it
+/// has colour.
 const READ: &[(&str, &[u8], u8, bool)] = &[
     ("mono8", &[90], 90, false),
     ("8UC1", &[90], 90, false),

@@ -1,4 +1,5 @@
-//! Claim: data keys are those that rmw_zenoh declares, and every other key is refused with a reason.
+//! Claim: data keys are those that rmw_zenoh declares, and every other key is refused with a
+//! reason.
 
 use ros2::{
     rmw_zenoh::{Channel, DataKey, DataKeyError, HASH_NOT_SUPPORTED, MAX_KEY_BYTES, cpu_buffers_of},

@@ -1,5 +1,5 @@
-//! The formats byte for byte: values measured with rosbags, Fast-CDR and zenoh, random messages of rosbags, what holds
-//! for every message, and what a robot of ROS is to Waymark.
+//! The formats byte for byte: values measured with rosbags, Fast-CDR and zenoh, random messages of
+//! rosbags, what holds for every message, and what a robot of ROS is to Waymark.
 
 mod attachments;
 mod bounds;

@@ -1,4 +1,5 @@
-//! Claim: what stands in padding and in the header's options does not matter, and is written as zero.
+//! Claim: what stands in padding and in the header's options does not matter, and is written as
+//! zero.
 
 use crate::rosbags::samples;
 use ros2::{
@@ -22,7 +23,8 @@ fn padding(kind: MessageKind, payload: &[u8]) -> Vec<usize> {
 
 #[test]
 fn garbage_in_padding_is_read_past() {
-    // A frame of three letters needs no padding before a number of four bytes, one of four letters three bytes.
+    // A frame of three letters needs no padding before a number of four bytes, one of four letters
+    // three bytes.
     let image = Image {
         header: Header { frame_id: "abcd", ..Header::default() },
         encoding: "mono8",
@@ -30,8 +32,8 @@ fn garbage_in_padding_is_read_past() {
         ..Image::default()
     };
     let payload = image.encode();
-    // Header 12 bytes with the length, `abcd` and its NUL to 17, padding to 20; height, width, length to 32; `mono8`
-    // and its NUL to 38, is_bigendian, padding to 40.
+    // Header 12 bytes with the length, `abcd` and its NUL to 17, padding to 20; height, width,
+    // length to 32; `mono8` and its NUL to 38, is_bigendian, padding to 40.
     let expected: Vec<usize> = [17, 18, 19, 39].iter().map(|at| at + HEADER_BYTES).collect();
     assert_eq!(padding(MessageKind::Image, &payload), expected);
     let mut dirty = payload.clone();

@@ -1,4 +1,5 @@
-//! Claim: key, payload and attachment of a sample become a typed message, or a refusal that says what is wrong.
+//! Claim: key, payload and attachment of a sample become a typed message, or a refusal that says
+//! what is wrong.
 
 use ros2::{
     messages::{AnyMessage, CompressedImage, Message, MessageKind, TFMessage},

@@ -1,5 +1,5 @@
-//! Claim: the messages of a robot of ROS become the frames, odometry and scans of Waymark, and whatever is missing is
-//! said with topic and age.
+//! Claim: the messages of a robot of ROS become the frames, odometry and scans of Waymark, and
+//! whatever is missing is said with topic and age.
 
 use protos::{Name, v1};
 use ros2::{

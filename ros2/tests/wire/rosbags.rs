@@ -1,5 +1,5 @@
-//! Claim: random messages that rosbags wrote are read field by field, and written again to the same bytes
-//! (`tests/golden.py` made the file).
+//! Claim: random messages that rosbags wrote are read field by field, and written again to the same
+//! bytes (`tests/golden.py` made the file).
 
 use crate::{
     fields::{self, Content, bits},

@@ -1,5 +1,5 @@
-//! Claim: what is written is read again, for messages of any content, in both byte orders; and bytes of any content
-//! are read without a panic.
+//! Claim: what is written is read again, for messages of any content, in both byte orders; and
+//! bytes of any content are read without a panic.
 
 use crate::rosbags::samples;
 use proptest::prelude::*;

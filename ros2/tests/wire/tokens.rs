@@ -1,4 +1,5 @@
-//! Claim: liveliness tokens of rmw_zenoh are read and written part by part, those of newer releases included.
+//! Claim: liveliness tokens of rmw_zenoh are read and written part by part, those of newer releases
+//! included.
 
 use ros2::rmw_zenoh::{
     CPU_BACKEND, Durability, Endpoint, EntityKind, Gid, History, Liveliness, MAX_TOKEN_BYTES, Qos,

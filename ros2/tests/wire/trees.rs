@@ -1,4 +1,5 @@
-//! Claim: transforms of `/tf_static` are merged, summed up along the tree, and a missing link is named.
+//! Claim: transforms of `/tf_static` are merged, summed up along the tree, and a missing link is
+//! named.
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use ros2::{
@@ -26,7 +27,8 @@ fn tree(links: Vec<TransformStamped<'_>>) -> TransformTree {
 
 #[test]
 fn the_camera_on_the_robot_is_the_sum_of_the_links() {
-    // A camera 0.2 m ahead and 1 m up, turned left by 90 degrees, with its optical frame; as drivers send it.
+    // A camera 0.2 m ahead and 1 m up, turned left by 90 degrees, with its optical frame; as
+    // drivers send it.
     let turned = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), std::f64::consts::FRAC_PI_2);
     let base_from_body = Isometry3::from_parts(Translation3::new(0.2, 0.0, 1.0), turned);
     let optical = Isometry3::from_parts(Translation3::identity(), body_from_optical());
@@ -39,7 +41,8 @@ fn the_camera_on_the_robot_is_the_sum_of_the_links() {
     assert_eq!(tree.merge(&TFMessage::decode(&payload).unwrap()), (2, vec![]));
 
     let robot_from_camera = tree.lookup("base_link", "camera_optical_frame").unwrap();
-    // 3 m in front of the lens and 0.5 m to the right in the picture: 3 m left of the robot, 0.5 m further ahead.
+    // 3 m in front of the lens and 0.5 m to the right in the picture: 3 m left of the robot, 0.5 m
+    // further ahead.
     let point = robot_from_camera * Point3::new(0.5, 0.0, 3.0);
     assert!((point - Point3::new(0.7, 3.0, 1.0)).norm() < 1e-9, "{point}");
     let back = tree.lookup("camera_optical_frame", "base_link").unwrap();

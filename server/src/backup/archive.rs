@@ -1,5 +1,5 @@
-//! The file of a backup: a SQLite database, then a manifest (JSON), then a foot of 64 bytes. SQLite reads the file as it is; it
-//! leaves out what follows its last page.
+//! The file of a backup: a SQLite database, then a manifest (JSON), then a foot of 64 bytes. SQLite
+//! reads the file as it is; it leaves out what follows its last page.
 //!
 //! | foot | bytes |
 //! |---|---|
@@ -120,7 +120,8 @@ pub(super) fn digest_of(path: &Path, length: u64) -> io::Result<String> {
     Ok(pictures::hex(&hash.finalize()))
 }
 
-/// Copies the first `length` bytes to a new file, and brings it to the disk. Returns their SHA-256, hexadecimal.
+/// Copies the first `length` bytes to a new file, and brings it to the disk. Returns their SHA-256,
+/// hexadecimal.
 pub(super) fn copy_database(from: &Path, length: u64, to: &Path) -> io::Result<String> {
     let (mut hash, mut copy) = (Sha256::new(), private_file::create(to)?);
     each_part(from, length, |part| {

@@ -1,8 +1,9 @@
-//! Backups of a running server. In: the data directory, a request or the schedule. Out: files in its folder `backups`, each one
-//! committed state with a manifest of digests (`archive`); `restore` puts one in the place of the data.
+//! Backups of a running server. In: the data directory, a request or the schedule. Out: files in
+//! its folder `backups`, each one committed state with a manifest of digests (`archive`); `restore`
+//! puts one in the place of the data.
 //!
-//! One backup is made at a time, beside the writer, which waits for nothing. A file gets its name when it is complete and
-//! compared with its digests. The newest `backup.keep` stay.
+//! One backup is made at a time, beside the writer, which waits for nothing. A file gets its name
+//! when it is complete and compared with its digests. The newest `backup.keep` stay.
 
 pub(crate) mod archive;
 mod restore;

@@ -1,5 +1,5 @@
-//! Restores a backup. In: the file of a backup, and a data directory that no server uses. Out: the directory with the state of
-//! the backup; what was there before stays beside it.
+//! Restores a backup. In: the file of a backup, and a data directory that no server uses. Out: the
+//! directory with the state of the backup; what was there before stays beside it.
 
 use super::{
     BackupManifest,
@@ -63,8 +63,8 @@ pub struct Verified {
     database_sha256: String,
 }
 
-/// Reads the whole of a backup and compares it with its manifest: digest of the file, integrity of the database, schema,
-/// digests of maps, models and pictures.
+/// Reads the whole of a backup and compares it with its manifest: digest of the file, integrity of
+/// the database, schema, digests of maps, models and pictures.
 pub async fn verify(file: &Path) -> Result<Verified, RestoreError> {
     let at = |source| RestoreError::File { path: file.to_owned(), source };
     let damaged = |fault: String| RestoreError::Damaged { faults: vec![fault] };
@@ -165,7 +165,8 @@ impl StoppedServer {
         self.data.join(open::FILE).exists()
     }
 
-    /// Puts a verified backup in the place of the data. Returns the folder with what was there before, if there was anything.
+    /// Puts a verified backup in the place of the data. Returns the folder with what was there
+    /// before, if there was anything.
     pub fn restore(&self, backup: &Verified) -> Result<Option<PathBuf>, RestoreError> {
         let at = |source| RestoreError::File { path: self.data.clone(), source };
         let time = now_ms().to_string();

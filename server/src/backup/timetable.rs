@@ -12,7 +12,8 @@ pub(super) fn every(settings: BackupSettings) -> Option<Duration> {
     (settings.every_hours > 0).then(|| Duration::from_hours(u64::from(settings.every_hours)))
 }
 
-/// Time until the next backup. Times are ms since the Unix epoch: of the newest backup, of a failed attempt after it, now.
+/// Time until the next backup. Times are ms since the Unix epoch: of the newest backup, of a failed
+/// attempt after it, now.
 pub(super) fn wait(every: Duration, newest: Option<i64>, failed: Option<i64>, now: i64) -> Duration {
     let after = |start: i64, pause: Duration| start.saturating_add(pause.as_millis() as i64);
     let due = newest.map_or(now, |start| after(start, every));

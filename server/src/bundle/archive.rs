@@ -1,6 +1,7 @@
-//! The zip of a bundle. Files are stored as they are, in the order in which they are written, without times. The comment at the
-//! end is the seal: the SHA-256 of all bytes before it, 64 hexadecimal digits. So no byte of it changes unseen, not even one that
-//! readers of zip files skip.
+//! The zip of a bundle. Files are stored as they are, in the order in which they are written,
+//! without times. The comment at the end is the seal: the SHA-256 of all bytes before it, 64
+//! hexadecimal digits. So no byte of it changes unseen, not even one that readers of zip files
+//! skip.
 
 use super::{
     BundleError, Fault, MANIFEST, MAX_FILES, MAX_RECORD_BYTES,
@@ -147,7 +148,8 @@ impl Reader {
     }
 }
 
-/// Checks the seal, and that the record of the end, from which the number of files is read, has no more than fit.
+/// Checks the seal, and that the record of the end, from which the number of files is read, has no
+/// more than fit.
 fn sealed(file: &mut File) -> Result<(), BundleError> {
     let none = || refused(Fault::NotABundle, "bundle", "it is no bundle of a map, or its end is missing");
     let length = file.metadata()?.len();
@@ -173,7 +175,8 @@ fn sealed(file: &mut File) -> Result<(), BundleError> {
     Ok(())
 }
 
-/// Name and size of each file. No file is packed, so that together they are no larger than the bundle.
+/// Name and size of each file. No file is packed, so that together they are no larger than the
+/// bundle.
 fn entries(zip: &mut ZipArchive<File>, length: u64) -> Result<BTreeMap<String, u64>, BundleError> {
     let (mut found, mut sum) = (BTreeMap::new(), 0_u64);
     if zip.has_duplicate_names() {

@@ -1,4 +1,5 @@
-//! From a bundle to a new map: checked as a whole first, then written in one transaction, which is one commit of its history.
+//! From a bundle to a new map: checked as a whole first, then written in one transaction, which is
+//! one commit of its history.
 
 use super::{
     BundleError,
@@ -23,8 +24,8 @@ pub(crate) struct Request {
     pub(crate) without_link: bool,
 }
 
-/// Makes a map of a bundle. Nothing is left of one that is refused. Errors: `Refused`; `Exists`, `Limit`, `NotFound` of the map
-/// that it lies in.
+/// Makes a map of a bundle. Nothing is left of one that is refused. Errors: `Refused`; `Exists`,
+/// `Limit`, `NotFound` of the map that it lies in.
 pub(crate) async fn load(
     store: &Store,
     file: File,

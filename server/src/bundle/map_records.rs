@@ -1,4 +1,5 @@
-//! Files of a bundle about the map itself: `map.json`, `walls.geojson`, `modalities.json`, `visibility.json`, `underlay.json`.
+//! Files of a bundle about the map itself: `map.json`, `walls.geojson`, `modalities.json`,
+//! `visibility.json`, `underlay.json`.
 
 use super::{BundleError, MAP, MODALITIES, UNDERLAY, VISIBILITY, WALLS, invalid};
 use crate::{
@@ -281,7 +282,8 @@ impl WallsRecord {
     }
 }
 
-/// `landmarks.geojson`, for programs of geography: a point for each landmark with a place. Nothing is read of it.
+/// `landmarks.geojson`, for programs of geography: a point for each landmark with a place. Nothing
+/// is read of it.
 pub(super) fn landmark_points<'a>(
     landmarks: impl Iterator<Item = (&'a str, [f64; 4], Option<[f64; 2]>)>,
 ) -> Value {

@@ -1,7 +1,9 @@
-//! A map as one file (docs/BUNDLE.md): a zip with JSON, GeoJSON, pictures and models, which other programs read without Waymark.
+//! A map as one file (docs/BUNDLE.md): a zip with JSON, GeoJSON, pictures and models, which other
+//! programs read without Waymark.
 //!
-//! [`save`] writes one of what is stored, [`load`] makes a new map of one. The same contents give the same bytes: no time and
-//! no number of a row is in it but those of the data. Landmarks are numbered from 1 in their order.
+//! [`save`] writes one of what is stored, [`load`] makes a new map of one. The same contents give
+//! the same bytes: no time and no number of a row is in it but those of the data. Landmarks are
+//! numbered from 1 in their order.
 
 mod archive;
 mod landmark_records;

@@ -26,8 +26,9 @@ use std::{
 use tokio::runtime::Handle;
 use vision::model::{LandmarkId, renumbered};
 
-/// A bundle of a map, in a file of this folder that has no name and ends with its handle. `may_see` says whether the map that it
-/// lies in may be named. Errors: `NotFound`, `PictureDamaged`, `Damaged`, `Limit`; `Busy` while pictures keep being deleted.
+/// A bundle of a map, in a file of this folder that has no name and ends with its handle. `may_see`
+/// says whether the map that it lies in may be named. Errors: `NotFound`, `PictureDamaged`,
+/// `Damaged`, `Limit`; `Busy` while pictures keep being deleted.
 pub(crate) async fn save(
     store: &Store,
     map: &str,

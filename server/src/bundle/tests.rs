@@ -1,4 +1,5 @@
-//! A bundle is the map: exported, imported and exported again it is the same, and no byte of it changes unseen.
+//! A bundle is the map: exported, imported and exported again it is the same, and no byte of it
+//! changes unseen.
 
 mod any_bytes;
 

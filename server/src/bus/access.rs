@@ -1,9 +1,9 @@
-//! Who may do what on the encrypted listener, as access control of zenoh. In: certificates, robots with their maps, prefixes
-//! of robots of ROS 2. Out: rules by which a robot writes its own keys alone, and reads its own answers and its maps' changes.
-//! What no rule allows is dropped.
+//! Who may do what on the encrypted listener, as access control of zenoh. In: certificates, robots
+//! with their maps, prefixes of robots of ROS 2. Out: rules by which a robot writes its own keys
+//! alone, and reads its own answers and its maps' changes. What no rule allows is dropped.
 //!
-//! zenoh knows of a certificate nothing but its name, which the front makes the robot's. It reads the rules once, when a session
-//! opens: [`super::gate`] opens it again when they change.
+//! zenoh knows of a certificate nothing but its name, which the front makes the robot's. It reads
+//! the rules once, when a session opens: [`super::gate`] opens it again when they change.
 
 use crate::config::Ros2Robot;
 use engine::snapshot::Snapshots;
@@ -48,8 +48,8 @@ pub(super) struct Policy {
 }
 
 impl Policy {
-    /// What registered robots may, of those that have certificates; the front connects each under its name. `by_name`: all
-    /// may have one of the operator's own authority.
+    /// What registered robots may, of those that have certificates; the front connects each under
+    /// its name. `by_name`: all may have one of the operator's own authority.
     pub(super) fn new(holders: &[String], snapshots: &Snapshots, ros2: &[Ros2Robot], by_name: bool) -> Self {
         let registered = snapshots.robots();
         let mut linked = BTreeMap::<&str, BTreeSet<String>>::new();
@@ -97,8 +97,8 @@ impl Policy {
     }
 }
 
-/// The same for a router of the operator that servers join: each robot is known by the common names of its certificates, and
-/// hears changes of `maps`.
+/// The same for a router of the operator that servers join: each robot is known by the common names
+/// of its certificates, and hears changes of `maps`.
 pub fn access_control_for_router(
     fleet: &Name,
     robots: &BTreeMap<Name, BTreeSet<String>>,
@@ -142,8 +142,8 @@ fn shared(keys: &Keys) -> [Value; 4] {
     ]
 }
 
-/// What a robot may by its name. What it sends and asks for has no wildcards: they would let keys of any length pass, and zenoh
-/// panics where it forwards one of more than 65 535 bytes.
+/// What a robot may by its name. What it sends and asks for has no wildcards: they would let keys
+/// of any length pass, and zenoh panics where it forwards one of more than 65 535 bytes.
 fn of_robot(keys: &Keys, robot: &Name, grant: &Grant) -> Vec<Value> {
     let key = |key: &Key| keys.build(key);
     let id = |what: &str| format!("{robot} {what}");

@@ -1,10 +1,10 @@
-//! The router that robots on other machines meet behind the front: it knows each by its name, and has access control. Behind
-//! it is the server's own router, over a socket of this process.
+//! The router that robots on other machines meet behind the front: it knows each by its name, and
+//! has access control. Behind it is the server's own router, over a socket of this process.
 //!
-//! Access control is read when a session opens. So when robots or their maps change what robots may, the gate closes and opens
-//! again: robots connect again by themselves, and the server's own router, its subscriptions and its other robots stay. A
-//! certificate that is revoked or expires changes nothing here: the front ends that robot's connections
-//! ([`super::front::Admission`]).
+//! Access control is read when a session opens. So when robots or their maps change what robots
+//! may, the gate closes and opens again: robots connect again by themselves, and the server's own
+//! router, its subscriptions and its other robots stay. A certificate that is revoked or expires
+//! changes nothing here: the front ends that robot's connections ([`super::front::Admission`]).
 
 use super::{
     BusError,
@@ -29,12 +29,13 @@ use tokio::{sync::watch, task::JoinHandle, time::Instant};
 const GATHER: Duration = Duration::from_millis(20);
 /// How often it is looked whether messages still pass to the server's own router.
 const LOOK_EVERY: Duration = Duration::from_secs(10);
-/// Time between closing a gate and opening the next. zenoh computes its trees of routers at most every 100 ms, and tells
-/// what is declared to routers whose index in them is new. A gate that joined earlier would take the index of the closed
-/// one, and be told of no subscription.
+/// Time between closing a gate and opening the next. zenoh computes its trees of routers at most
+/// every 100 ms, and tells what is declared to routers whose index in them is new. A gate that
+/// joined earlier would take the index of the closed one, and be told of no subscription.
 const BEFORE_REOPENING: Duration = Duration::from_millis(250);
-/// Wait of the first attempt until the two routers know of each other. While the server runs, each further attempt waits
-/// twice as long, at most [`LONGEST_JOIN`]; the second and last one of a start waits that long.
+/// Wait of the first attempt until the two routers know of each other. While the server runs, each
+/// further attempt waits twice as long, at most [`LONGEST_JOIN`]; the second and last one of a
+/// start waits that long.
 const FIRST_JOIN: Duration = Duration::from_secs(2);
 /// Longest wait until the two routers know of each other.
 const LONGEST_JOIN: Duration = Duration::from_secs(10);
@@ -60,7 +61,8 @@ pub(super) struct GateSettings {
     pub(super) listens: watch::Sender<Option<SocketAddr>>,
 }
 
-/// What tells the gate that robots may do something else, and that the server shows another certificate.
+/// What tells the gate that robots may do something else, and that the server shows another
+/// certificate.
 type ChangeSignals = (watch::Receiver<u64>, watch::Receiver<Arc<ServerCertificate>>);
 
 /// The gate at work.
@@ -102,7 +104,8 @@ impl GateSettings {
         Err(BusError::Listen { endpoint: self.inner.clone(), detail })
     }
 
-    /// Waits until messages pass to the server's own router: earlier ones would be lost. False if they do not.
+    /// Waits until messages pass to the server's own router: earlier ones would be lost. False if
+    /// they do not.
     async fn join(&self, session: &zenoh::Session, within: Duration) -> bool {
         let Ok(robot) = Name::new(ASKS) else { return false };
         let (key, until) = (self.keys.build(&Key::Hello(robot)), Instant::now() + within);

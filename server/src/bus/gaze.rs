@@ -1,4 +1,5 @@
-//! `robot/{robot}/rpc/gaze`: answers gaze queries of robots on zenoh's thread, in less than a millisecond.
+//! `robot/{robot}/rpc/gaze`: answers gaze queries of robots on zenoh's thread, in less than a
+//! millisecond.
 
 use super::{BusError, Receivers, caught};
 use crate::fleet::Responsibility;

@@ -1,5 +1,6 @@
-//! `robot/{robot}/rpc/hello`: answers that the robot's messages arrive, and how large they may be. A client learns by it whether
-//! its certificate gives access, and which frames would be dropped on the way: neither is answered.
+//! `robot/{robot}/rpc/hello`: answers that the robot's messages arrive, and how large they may be.
+//! A client learns by it whether its certificate gives access, and which frames would be dropped on
+//! the way: neither is answered.
 
 use super::{BusError, Receivers, caught};
 use protos::{Key, Keys, prost::Message as _, v1};

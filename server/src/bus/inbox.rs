@@ -1,5 +1,6 @@
-//! Incoming messages: one subscription for each kind, with a callback that parses the key, checks the message and passes it
-//! on. A refused frame is answered; every refusal is counted. Nothing here waits or panics.
+//! Incoming messages: one subscription for each kind, with a callback that parses the key, checks
+//! the message and passes it on. A refused frame is answered; every refusal is counted. Nothing
+//! here waits or panics.
 
 use super::{BusError, Outbox, Receivers, caught};
 use crate::fleet::Responsibility;

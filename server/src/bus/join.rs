@@ -1,8 +1,9 @@
-//! A router of the operator that the server joins as a client. In: endpoints and credentials. Out: a session that hears robots,
-//! for as long as the server runs; the tokens by which servers know each other.
+//! A router of the operator that the server joins as a client. In: endpoints and credentials. Out:
+//! a session that hears robots, for as long as the server runs; the tokens by which servers know
+//! each other.
 //!
-//! The connection is made on a task of its own and tried for ever: HTTP does not wait for it. zenoh makes a lost one again by
-//! itself, with subscriptions and tokens.
+//! The connection is made on a task of its own and tried for ever: HTTP does not wait for it. zenoh
+//! makes a lost one again by itself, with subscriptions and tokens.
 
 use super::{
     BusError, Outbox, Receivers, caught,
@@ -52,7 +53,8 @@ pub(super) struct Join {
     stop: watch::Sender<bool>,
 }
 
-/// A session that hears robots no longer, while others still know of the server: what is queued is sent first.
+/// A session that hears robots no longer, while others still know of the server: what is queued is
+/// sent first.
 pub(super) struct Announced {
     pub(super) session: Session,
     // Held: dropping them withdraws them.

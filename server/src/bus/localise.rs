@@ -1,8 +1,8 @@
-//! `robot/{robot}/rpc/localise`: where a robot is, by what it senses at one place. In: queries. Out: replies, by the code of
-//! HTTP's `localise`.
+//! `robot/{robot}/rpc/localise`: where a robot is, by what it senses at one place. In: queries.
+//! Out: replies, by the code of HTTP's `localise`.
 //!
-//! A search takes longer than zenoh's threads may wait: queries pass a bounded queue to one thread. Each robot has one place
-//! in it, so that none keeps the others out.
+//! A search takes longer than zenoh's threads may wait: queries pass a bounded queue to one thread.
+//! Each robot has one place in it, so that none keeps the others out.
 
 use super::{BusError, Receivers, caught};
 use crate::fleet::Responsibility;

@@ -1,8 +1,9 @@
-//! The zenoh side: frames, odometry, scans and presence in; answers, poses and map changes out. An embedded router, so
-//! robots need no other daemon; no discovery, no shared memory, no administration space, bounded messages.
+//! The zenoh side: frames, odometry, scans and presence in; answers, poses and map changes out. An
+//! embedded router, so robots need no other daemon; no discovery, no shared memory, no
+//! administration space, bounded messages.
 //!
-//! Callbacks run on zenoh's threads and never wait: they check and hand over. What goes out passes a bounded queue
-//! and its own thread, so a slow link holds up no worker.
+//! Callbacks run on zenoh's threads and never wait: they check and hand over. What goes out passes
+//! a bounded queue and its own thread, so a slow link holds up no worker.
 
 mod access;
 mod front;
@@ -132,8 +133,8 @@ pub struct Receivers {
 }
 
 impl Receivers {
-    /// Whether messages of a robot are taken: access control forbids those of revoked certificates, and this those that
-    /// arrive until it does.
+    /// Whether messages of a robot are taken: access control forbids those of revoked certificates,
+    /// and this those that arrive until it does.
     pub(crate) fn admits(&self, robot: &Name) -> bool {
         self.certificates.as_ref().is_none_or(|certificates| certificates.admits(robot, now_ms()))
     }
@@ -263,7 +264,8 @@ fn begin_changes(to: &Receivers, outbox: &Outbox) -> JoinHandle<()> {
     tokio::spawn(forward_map_changes(to.clone(), outbox.clone(), pulse))
 }
 
-/// A zenoh callback that catches panics: a panic would end the task that receives from a robot. `kind` names the message.
+/// A zenoh callback that catches panics: a panic would end the task that receives from a robot.
+/// `kind` names the message.
 pub(crate) fn caught<T>(
     vitals: &Arc<Vitals>,
     kind: &'static str,

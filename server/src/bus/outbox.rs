@@ -1,8 +1,9 @@
-//! Outgoing messages: a bounded queue and one thread that puts them on zenoh. A full queue drops the message and counts it.
+//! Outgoing messages: a bounded queue and one thread that puts them on zenoh. A full queue drops
+//! the message and counts it.
 //!
-//! Every message is sent with `CongestionControl::Drop`: a subscriber that does not read loses its own messages and delays no
-//! other. No message must arrive: the next answer or pose replaces the last, and `map/{map}/version` answers queries for the
-//! version of a map.
+//! Every message is sent with `CongestionControl::Drop`: a subscriber that does not read loses its
+//! own messages and delays no other. No message must arrive: the next answer or pose replaces the
+//! last, and `map/{map}/version` answers queries for the version of a map.
 
 use super::{BusError, Receivers};
 use engine::{
@@ -62,7 +63,8 @@ impl std::fmt::Debug for Outbox {
 }
 
 impl Outbox {
-    /// Sends on the session in `session`; what is sent while there is none is lost, as there is nobody to hear it.
+    /// Sends on the session in `session`; what is sent while there is none is lost, as there is
+    /// nobody to hear it.
     pub(super) fn start(
         session: Arc<OnceLock<zenoh::Session>>,
         keys: Keys,
@@ -121,7 +123,8 @@ impl Outbox {
         self.send_bytes(key, message.encode_to_vec());
     }
 
-    /// A message and what it lacks, as one: the bytes of two messages one after the other are those of both merged.
+    /// A message and what it lacks, as one: the bytes of two messages one after the other are those
+    /// of both merged.
     fn send_parts<M: Message>(&self, key: &Key, message: &M, rest: &M) {
         let mut bytes = message.encode_to_vec();
         bytes.extend(rest.encode_to_vec());

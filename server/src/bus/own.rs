@@ -1,9 +1,10 @@
-//! The server's own routers and the listeners before them. In: the settings. Out: a router that hears robots, on a socket that
-//! no other program reaches; the front; with encryption, the gate between the two.
+//! The server's own routers and the listeners before them. In: the settings. Out: a router that
+//! hears robots, on a socket that no other program reaches; the front; with encryption, the gate
+//! between the two.
 
 use super::{
     BusError, Receivers, close,
-    front::{self, Admission, Front, Lasting, ToGate, Destination},
+    front::{self, Admission, Destination, Front, Lasting, ToGate},
     gate::{Gate, GateSettings},
     router::{self, RouterSettings},
 };
@@ -17,8 +18,8 @@ use std::{path::PathBuf, sync::Arc};
 use tempfile::TempDir;
 use tokio::{net::TcpListener, sync::watch};
 
-/// The sockets at which robots will connect. They are taken before all else: an address that another program has is told at
-/// once.
+/// The sockets at which robots will connect. They are taken before all else: an address that
+/// another program has is told at once.
 #[derive(Debug, Default)]
 pub(crate) struct Sockets {
     /// With the endpoint and its real port; none where the server joins a router.
@@ -143,7 +144,12 @@ impl OwnRouter {
         };
         let gate = Gate::open(settings, to.vitals.begin("the task that admits robots")).await?;
         let mut fronts: Vec<Front> = self.local.into_iter().map(plain).collect();
-        fronts.push(Front::open(self.listener, Destination::Certified(admission, to_gate), robots, to.live.clone()));
+        fronts.push(Front::open(
+            self.listener,
+            Destination::Certified(admission, to_gate),
+            robots,
+            to.live.clone(),
+        ));
         Ok(Doors { fronts, gate: Some(gate), _socket: self.socket })
     }
 }

@@ -1,5 +1,6 @@
-//! `server/{id}/ping`: the server asks itself, as a robot would: a client of its own, over a link, through the router, to a
-//! callback on the router's session, and back. An answer says that messages of robots arrive and are answered.
+//! `server/{id}/ping`: the server asks itself, as a robot would: a client of its own, over a link,
+//! through the router, to a callback on the router's session, and back. An answer says that
+//! messages of robots arrive and are answered.
 
 use super::{BusError, Receivers, caught, router};
 use protos::Keys;

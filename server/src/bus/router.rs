@@ -6,20 +6,24 @@ use base64::{Engine as _, prelude::BASE64_STANDARD};
 use serde_json::{Value, json};
 use std::time::Duration;
 
-/// Sessions beyond the robots: tools, a second connection while the first times out, and the server's own probe.
+/// Sessions beyond the robots: tools, a second connection while the first times out, and the
+/// server's own probe.
 pub(super) const SPARE_SESSIONS: usize = 9;
 /// Room for keys and headers besides the largest frame.
 const MESSAGE_SPARE_BYTES: usize = 64 << 10;
 /// A robot whose link is silent for so long is gone.
 const LEASE_MS: u64 = 2000;
-/// A message for a robot whose queue is full is dropped after this wait. All answers share one sending thread, so this bounds
-/// what one robot that does not read costs the others: a thousandth of a second a message.
+/// A message for a robot whose queue is full is dropped after this wait. All answers share one
+/// sending thread, so this bounds what one robot that does not read costs the others: a thousandth
+/// of a second a message.
 const WAIT_BEFORE_DROP_US: u64 = 1000;
-/// Batches that wait for each link at the priority of answers and poses. Each message is a batch of its own there: a frame
-/// of ROS gives up to four at once (pose, detections, initial pose, transform), and zenoh's two lose the third of them
-/// while the sending task waits for a core. At most 64 KiB each, allocated when they are needed.
+/// Batches that wait for each link at the priority of answers and poses. Each message is a batch of
+/// its own there: a frame of ROS gives up to four at once (pose, detections, initial pose,
+/// transform), and zenoh's two lose the third of them while the sending task waits for a core. At
+/// most 64 KiB each, allocated when they are needed.
 const ANSWER_BATCHES: usize = 8;
-/// The same for a message of several parts. Through the gate only frames are, on their way to the server.
+/// The same for a message of several parts. Through the gate only frames are, on their way to the
+/// server.
 const FRAGMENTS_WAIT_US: u64 = 50_000;
 /// A robot that does not take a reply to its own query for this long is disconnected.
 const WAIT_BEFORE_CLOSE_US: u64 = 1_000_000;
@@ -87,7 +91,8 @@ pub(super) async fn open_client(endpoint: &str) -> Result<zenoh::Session, BusErr
     zenoh::open(config).await.map_err(|e| fault(e.to_string()))
 }
 
-/// A client of a router at one of `endpoints`; links and queues are as those of the server's own router.
+/// A client of a router at one of `endpoints`; links and queues are as those of the server's own
+/// router.
 pub(super) fn client_config(endpoints: &[String], frame_bytes: usize) -> zenoh::Result<zenoh::Config> {
     let settings =
         RouterSettings { listen: Vec::new(), connect: None, tls: None, access: None, robots: 0, frame_bytes };
@@ -109,7 +114,8 @@ fn config(settings: &RouterSettings<'_>) -> zenoh::Result<zenoh::Config> {
 fn settings_of(settings: &RouterSettings<'_>) -> Value {
     let RouterSettings { listen, connect, tls, access, robots, frame_bytes } = settings;
     let fragments_us = if connect.is_some() { FRAGMENTS_WAIT_US } else { WAIT_BEFORE_DROP_US };
-    // No time stamps: clocks of robots decide nothing here, and a clock far ahead would have its samples refused.
+    // No time stamps: clocks of robots decide nothing here, and a clock far ahead would have its
+    // samples refused.
     let mut config = json!({
         "mode": "router",
         "listen": { "endpoints": listen, "timeout_ms": 0, "exit_on_failure": true },

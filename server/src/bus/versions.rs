@@ -1,5 +1,5 @@
-//! `map/{map}/version`: answers queries for the version of a map, for robots that missed a change. Runs on zenoh's thread: one
-//! look-up of a snapshot a map.
+//! `map/{map}/version`: answers queries for the version of a map, for robots that missed a change.
+//! Runs on zenoh's thread: one look-up of a snapshot a map.
 
 use super::{BusError, Receivers, caught};
 use protos::{Key, Keys, Name, prost::Message, v1};
@@ -9,7 +9,8 @@ use zenoh::{
     query::{Query, Queryable},
 };
 
-/// Answers `map/{map}/version` with one `MapChanged` for each map that the query's key expression names.
+/// Answers `map/{map}/version` with one `MapChanged` for each map that the query's key expression
+/// names.
 pub(super) async fn answer_versions(
     session: &Session,
     keys: &Keys,

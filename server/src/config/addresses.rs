@@ -19,8 +19,8 @@ pub(super) fn zenoh_endpoint(asked: String, is_tls: bool) -> String {
     if asked.is_empty() { default.to_owned() } else { asked }
 }
 
-/// Whether it encrypts, and its address. Only `tcp/IP:PORT` and `tls/IP:PORT`: a host name could resolve to anything,
-/// and the other transports are not compiled in.
+/// Whether it encrypts, and its address. Only `tcp/IP:PORT` and `tls/IP:PORT`: a host name could
+/// resolve to anything, and the other transports are not compiled in.
 pub(super) fn zenoh_address(field: &'static str, endpoint: &str) -> Result<(bool, SocketAddr), ConfigError> {
     let parts = endpoint.split_once('/').filter(|(protocol, _)| ["tcp", "tls"].contains(protocol));
     let parsed = parts.and_then(|(protocol, rest)| Some((protocol == "tls", rest.parse().ok()?)));

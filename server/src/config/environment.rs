@@ -1,4 +1,5 @@
-//! Where data lies unless it is said, by the convention of the platform, and which variables are settings.
+//! Where data lies unless it is said, by the convention of the platform, and which variables are
+//! settings.
 
 use super::{NOT_SETTINGS, RawConfig};
 use figment::{Provider as _, providers::Serialized};
@@ -13,8 +14,9 @@ pub(super) const PREFIX: &str = "WAYMARK_";
 /// The folder of the program among those of others.
 const FOLDER: &str = "waymark";
 
-/// The folder for data of the user's programs: `$XDG_DATA_HOME/waymark` or `~/.local/share/waymark`, on macOS
-/// `~/Library/Application Support/waymark`, on Windows `%LOCALAPPDATA%\waymark`; `waymark-data` here where there is none.
+/// The folder for data of the user's programs: `$XDG_DATA_HOME/waymark` or
+/// `~/.local/share/waymark`, on macOS `~/Library/Application Support/waymark`, on Windows
+/// `%LOCALAPPDATA%\waymark`; `waymark-data` here where there is none.
 pub fn default_data() -> PathBuf {
     data_of(|name| std::env::var_os(name), std::env::consts::OS)
 }
@@ -32,7 +34,8 @@ fn data_of(variable: impl Fn(&str) -> Option<OsString>, system: &str) -> PathBuf
 }
 
 impl RawConfig {
-    /// Variables that begin like those of the settings and are none: a misspelt one, or one of another program.
+    /// Variables that begin like those of the settings and are none: a misspelt one, or one of
+    /// another program.
     pub fn unknown_variables() -> Vec<String> {
         let settings = names();
         let names = std::env::vars_os().filter_map(|(name, _)| name.into_string().ok());
@@ -42,8 +45,8 @@ impl RawConfig {
     }
 }
 
-/// Whether the rest of a variable's name is a setting or an option of the command line. What lies inside a group is left to
-/// the reading of the settings.
+/// Whether the rest of a variable's name is a setting or an option of the command line. What lies
+/// inside a group is left to the reading of the settings.
 pub(super) fn is_known(rest: &str, settings: &BTreeSet<String>) -> bool {
     let name = rest.to_lowercase();
     let group = name.split("__").next().unwrap_or_default();

@@ -9,8 +9,9 @@ use vision::model::MAX_LANDMARKS;
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Limits {
-    /// Largest message from a robot, in bytes. Up to 60 000 bytes fit one zenoh batch and are not fragmented. Raw colour of
-    /// 640 x 480 takes 921 600, of 1280 x 1024 (the default's largest) 3 932 160.
+    /// Largest message from a robot, in bytes. Up to 60 000 bytes fit one zenoh batch and are not
+    /// fragmented. Raw colour of 640 x 480 takes 921 600, of 1280 x 1024 (the default's largest) 3
+    /// 932 160.
     pub frame_bytes: usize,
     /// Largest frame, in pixels.
     pub frame_pixels: usize,
@@ -62,11 +63,11 @@ pub struct Limits {
     pub request_timeout_s: u64,
     /// Longest time for a request that brings or takes the bundle of a map, in seconds.
     pub bundle_timeout_s: u64,
-    /// Seconds for which a client may leave an answer unread before its connection is closed; event streams that have
-    /// nothing to send are not bound by it.
+    /// Seconds for which a client may leave an answer unread before its connection is closed; event
+    /// streams that have nothing to send are not bound by it.
     pub write_timeout_s: u64,
-    /// Requests at a time with a body of more than 64 KiB, or of unknown length: what their bodies take in memory is
-    /// bounded by this times the largest body.
+    /// Requests at a time with a body of more than 64 KiB, or of unknown length: what their bodies
+    /// take in memory is bounded by this times the largest body.
     pub uploads: usize,
     /// Seconds that such a request waits for its place before it is refused.
     pub upload_wait_s: u64,
@@ -92,8 +93,9 @@ pub struct Limits {
     pub audit_entries: usize,
     /// Seconds for which a part of the server may not go on before the server ends with an error.
     pub stalled_s: u64,
-    /// Used share of the disk of the data directory, in percent, from which on nothing is added: views, lessons, maps,
-    /// backups. Recognition and deletions go on. 100: only a full disk refuses.
+    /// Used share of the disk of the data directory, in percent, from which on nothing is added:
+    /// views, lessons, maps, backups. Recognition and deletions go on. 100: only a full disk
+    /// refuses.
     pub disk_percent: u32,
     /// A disk with more bytes free than this is not nearly full, whatever its used share.
     pub disk_spare_bytes: usize,

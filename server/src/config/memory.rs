@@ -1,21 +1,22 @@
-//! How much memory the server may take at most, beside its maps. In: the settings. Out: a sum of named shares, each a bound times
-//! what one item takes. It is told at the start, and measured under load (`waymark-lab bench load`).
+//! How much memory the server may take at most, beside its maps. In: the settings. Out: a sum of
+//! named shares, each a bound times what one item takes. It is told at the start, and measured
+//! under load (`waymark-lab bench load`).
 
 use super::Config;
 use engine::{decode::PICTURE_BYTES_PER_PX, live};
 
 /// The program itself: code, runtime, router, caches of the database.
 const PROGRAM_BYTES: usize = 96 << 20;
-/// What the analysis of a frame takes for each pixel: the picture, a part of it at full size, filters of its planes, edges,
-/// chains and features of quads.
+/// What the analysis of a frame takes for each pixel: the picture, a part of it at full size,
+/// filters of its planes, edges, chains and features of quads.
 const ANALYSIS_BYTES_PER_PX: usize = 2 * PICTURE_BYTES_PER_PX + 72;
-/// What a photograph takes for each pixel while it is decoded and searched: the picture as it is and upright, eight bytes of PNG
-/// with 16 bits, and the analysis at reduced size.
+/// What a photograph takes for each pixel while it is decoded and searched: the picture as it is
+/// and upright, eight bytes of PNG with 16 bits, and the analysis at reduced size.
 const PHOTOGRAPH_BYTES_PER_PX: usize = 2 * PICTURE_BYTES_PER_PX + 8 + 14;
 /// A request: its head, a body that needs no place, buffers of encryption.
 const CONNECTION_BYTES: usize = (32 << 10) + (64 << 10) + (64 << 10);
-/// A robot: its session at the router with encryption, epochs, fused pose, corrections, trajectories. 0.8 MB each are measured
-/// with a thousand.
+/// A robot: its session at the router with encryption, epochs, fused pose, corrections,
+/// trajectories. 0.8 MB each are measured with a thousand.
 const ROBOT_BYTES: usize = 1 << 20;
 /// The queue of readings of one live event stream.
 const STREAM_BYTES: usize = 256 << 10;

@@ -1,4 +1,5 @@
-//! Settings of robots of ROS 2: `[[ros2.robot]]`. In: names as people write them. Out: checked topics, frames and keys.
+//! Settings of robots of ROS 2: `[[ros2.robot]]`. In: names as people write them. Out: checked
+//! topics, frames and keys.
 
 use super::ConfigError;
 use protos::Name;
@@ -33,7 +34,8 @@ pub struct RawRos2 {
 pub struct RawRos2Robot {
     /// Name of the registered robot; needed.
     pub robot: String,
-    /// Whether the robot speaks DDS and is joined by zenoh-bridge-ros2dds; otherwise it runs `rmw_zenoh`.
+    /// Whether the robot speaks DDS and is joined by zenoh-bridge-ros2dds; otherwise it runs
+    /// `rmw_zenoh`.
     pub bridge: bool,
     /// `ROS_DOMAIN_ID`; not used with a bridge.
     pub domain: u32,
@@ -101,7 +103,8 @@ impl Default for RawRos2Robot {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PoseSource {
-    /// The fix of each frame, at its capture: a measurement for a filter that has the odometry already.
+    /// The fix of each frame, at its capture: a measurement for a filter that has the odometry
+    /// already.
     Fixes,
     /// The fused pose, at each odometry.
     Fused,
@@ -171,7 +174,8 @@ pub struct Ros2Robot {
 }
 
 impl Ros2Robot {
-    /// The prefix, if keys behind it are those of this robot alone: not where it is empty, or that of Waymark's own keys.
+    /// The prefix, if keys behind it are those of this robot alone: not where it is empty, or that
+    /// of Waymark's own keys.
     pub(crate) fn own_prefix(&self) -> Option<&str> {
         let first = self.key_prefix.split('/').next().unwrap_or_default();
         (!first.is_empty() && first != protos::keys::ROOT).then_some(self.key_prefix.as_str())

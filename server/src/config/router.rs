@@ -1,5 +1,5 @@
-//! `[router]`: a router of the operator that the server joins instead of being one. In: endpoints and paths of files. Out:
-//! checked endpoints, and which files are shown at encrypted ones.
+//! `[router]`: a router of the operator that the server joins instead of being one. In: endpoints
+//! and paths of files. Out: checked endpoints, and which files are shown at encrypted ones.
 
 use super::{ConfigError, RawRos2, Tls, addresses::is_loopback, invalid};
 use serde::{Deserialize, Serialize};
@@ -12,7 +12,8 @@ pub const MAX_ROUTER_ENDPOINTS: usize = 8;
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RawRouter {
-    /// Endpoints of a zenoh router, tried in turn: `tls/router.example.org:7447`. Empty: the server is the router.
+    /// Endpoints of a zenoh router, tried in turn: `tls/router.example.org:7447`. Empty: the server
+    /// is the router.
     pub connect: Vec<String>,
     /// PEM file of the certificate that is shown at `tls/` endpoints, followed by its chain.
     pub certificate: PathBuf,

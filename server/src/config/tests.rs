@@ -4,7 +4,8 @@ use super::*;
 use std::collections::BTreeSet;
 use vision::model::MAX_LANDMARKS;
 
-/// Paths of all keys, such as `limits.maps`. `algorithm` is one key: the method's pages list its parameters.
+/// Paths of all keys, such as `limits.maps`. `algorithm` is one key: the method's pages list its
+/// parameters.
 fn keys(settings: &serde_json::Value, prefix: &str) -> BTreeSet<String> {
     let entries = settings.as_object().into_iter().flatten();
     let nested = |(name, value): (&String, &serde_json::Value)| {

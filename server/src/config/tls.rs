@@ -1,4 +1,5 @@
-//! Settings of encryption. In: names and paths of files. Out: checked names, and which files are the operator's own.
+//! Settings of encryption. In: names and paths of files. Out: checked names, and which files are
+//! the operator's own.
 
 use super::{
     ConfigError,
@@ -21,16 +22,18 @@ const MAX_LABEL_BYTES: usize = 63;
 pub struct RawTls {
     /// Whether connections are encrypted.
     pub enabled: bool,
-    /// DNS names and addresses by which clients reach the server; `localhost` and loopback addresses are always added.
+    /// DNS names and addresses by which clients reach the server; `localhost` and loopback
+    /// addresses are always added.
     pub names: Vec<String>,
     /// PEM file of the operator's own: the server's certificate, followed by its chain.
     pub certificate: PathBuf,
     /// PEM file with its private key.
     pub key: PathBuf,
-    /// PEM file of the authorities whose certificates robots show. Empty: the built-in authority signs them.
+    /// PEM file of the authorities whose certificates robots show. Empty: the built-in authority
+    /// signs them.
     pub client_authority: PathBuf,
-    /// A plain endpoint on loopback beside the encrypted one, `tcp/127.0.0.1:7446`: whoever reaches it may speak for any
-    /// robot. Empty: none.
+    /// A plain endpoint on loopback beside the encrypted one, `tcp/127.0.0.1:7446`: any local
+    /// user can then impersonate any robot. Empty: none.
     pub local_zenoh: String,
 }
 

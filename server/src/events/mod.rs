@@ -1,5 +1,6 @@
-//! What changes on the server, numbered, so that readers can resume. In: what the parts of the server tell. Out: the newest
-//! events, from a bounded ring. Nobody who tells an event waits, and no reader holds up another.
+//! What changes on the server, numbered, so that readers can resume. In: what the parts of the
+//! server tell. Out: the newest events, from a bounded ring. Nobody who tells an event waits, and
+//! no reader holds up another.
 
 pub(crate) mod watch_changes;
 

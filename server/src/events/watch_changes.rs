@@ -1,4 +1,5 @@
-//! Tells what changes of maps, landmarks, robots and tokens: by what is published, so that the writer does no more work.
+//! Tells what changes of maps, landmarks, robots and tokens: by what is published, so that the
+//! writer does no more work.
 
 use super::EventLog;
 use crate::identity::TokenRegistry;

@@ -1,10 +1,11 @@
-//! Which of its maps a server serves to robots where others may have them, too. In: its maps, what others announce, the time.
-//! Out: for each map whether it is served.
+//! Which of its maps a server serves to robots where others may have them, too. In: its maps, what
+//! others announce, the time. Out: for each map whether it is served.
 //!
-//! A server announces that it *holds* a map, waits [`SETTLE`] so that all know, and serves only if no other holds it. One that
-//! serves goes on when another comes, which sees that and refuses. Two that come at the same time both refuse; two that both
-//! serve and meet both stop. Who has refused serves only once no other holds the map: two that refuse stay so until a person
-//! deletes or renames one of the maps, so that nothing can go back and forth.
+//! A server announces that it *holds* a map, waits [`SETTLE`] so that all know, and serves only if
+//! no other holds it. One that serves goes on when another comes, which sees that and refuses. Two
+//! that come at the same time both refuse; two that both serve and meet both stop. A server that
+//! refused may serve only once no other holds the map: two that refuse stay so until a person
+//! deletes or renames one of the maps, so that they cannot alternate.
 
 use super::peers::Peers;
 use protos::{Name, ServerToken};
@@ -15,7 +16,8 @@ use std::{
 
 /// From an announcement until everybody is taken to know it.
 pub(crate) const SETTLE: Duration = Duration::from_secs(1);
-/// After the connection to the router: so long others may take to come back before a map that was refused is taken.
+/// After the connection to the router: so long others may take to come back before a map that was
+/// refused is taken.
 pub(crate) const RETURN: Duration = Duration::from_secs(10);
 
 /// Whether a map is served.

@@ -1,5 +1,6 @@
-//! Several servers on one router. In: what they announce by liveliness tokens, and this server's own maps and robots. Out: what
-//! it announces, which messages of robots it answers, and what people are told of it. Knows no zenoh: [`crate::bus`] does.
+//! Several servers on one router. In: what they announce by liveliness tokens, and this server's
+//! own maps and robots. Out: what it announces, which messages of robots it answers, and what
+//! people are told of it. Knows no zenoh: [`crate::bus`] does.
 //!
 //! A server that is its own router has no such state, answers everything and announces nothing.
 
@@ -84,7 +85,8 @@ impl Fleet {
         }
     }
 
-    /// Moves on: whether there is a connection, how late it is. Gives the tokens that this server wants to be known by.
+    /// Moves on: whether there is a connection, how late it is. Gives the tokens that this server
+    /// wants to be known by.
     pub(crate) fn step(&self, is_connected: bool, now: Instant) -> BTreeSet<ServerToken> {
         let mut state = self.state();
         let state = &mut *state;
@@ -141,7 +143,10 @@ impl Fleet {
             registered: registered.as_deref(),
             is_announced: announced.is_some_and(|since| now.duration_since(*since) >= SETTLE),
         };
-        responsibility::responsibility(World { own: &self.own, claims: &state.claims, others: &state.others }, message)
+        responsibility::responsibility(
+            World { own: &self.own, claims: &state.claims, others: &state.others },
+            message,
+        )
     }
 
     /// Whether robots are answered on a map here.

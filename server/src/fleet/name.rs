@@ -1,7 +1,8 @@
-//! The server's name among those of a router. In: the setting, the data directory. Out: a name that stays the same.
+//! The server's name among those of a router. In: the setting, the data directory. Out: a name that
+//! stays the same.
 //!
-//! It is a file beside the database, and not in it: a backup that is restored on another machine makes no second server of
-//! the same name.
+//! It is a file beside the database, and not in it: a backup that is restored on another machine
+//! makes no second server of the same name.
 
 use crate::private_file;
 use getrandom::fill;

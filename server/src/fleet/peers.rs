@@ -1,5 +1,6 @@
-//! The other servers of the router. In: their liveliness tokens as they come and go. Out: who has which map and robot, and
-//! what servers had that are gone. Everything is bounded: a name beyond a bound is not known, and counted.
+//! The other servers of the router. In: their liveliness tokens as they come and go. Out: who has
+//! which map and robot, and what servers had that are gone. Everything is bounded: a name beyond a
+//! bound is not known, and counted.
 
 use protos::{Name, ServerToken};
 use std::collections::{BTreeMap, BTreeSet, VecDeque};

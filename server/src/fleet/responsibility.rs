@@ -1,6 +1,7 @@
-//! Which server answers a message of a robot. In: what this server serves and has registered, what others announce. Out:
-//! whether this one takes it, refuses it, or is silent because another one answers. Every server decides by itself, by the
-//! same rule and without a word to the others, so that exactly one answers.
+//! Which server answers a message of a robot. In: what this server serves and has registered, what
+//! others announce. Out: whether this one takes it, refuses it, or is silent because another one
+//! answers. Every server decides by itself, by the same rule and without a word to the others, so
+//! that exactly one answers.
 
 use super::{
     claims::{Claims, MapClaim},
@@ -101,7 +102,8 @@ fn by_registration(world: World<'_>, message: Addressed<'_>) -> Responsibility {
     }
 }
 
-/// A robot that is registered here alone, on a map that this server may not serve: then this one says so.
+/// A robot that is registered here alone, on a map that this server may not serve: then this one
+/// says so.
 fn on_own_map(World { own, claims, others }: World<'_>, map: &Name) -> Option<Responsibility> {
     match claims.of(map)? {
         MapClaim::Served => Some(Responsibility::Take),

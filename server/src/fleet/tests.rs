@@ -1,4 +1,5 @@
-//! Servers that hear each other's tokens at once, or not at all: of every message exactly one takes or refuses it.
+//! Servers that hear each other's tokens at once, or not at all: of every message exactly one takes
+//! or refuses it.
 
 use super::*;
 use protos::Code;

@@ -1,5 +1,5 @@
-//! The quads of a frame as observations for the tracker. In: an offered frame. Out: for each whole quad its icon, its place on
-//! the walls and its identity. A doubtful identity gives no view.
+//! The quads of a frame as observations for the tracker. In: an offered frame. Out: for each whole
+//! quad its icon, its place on the walls and its identity. A doubtful identity gives no view.
 
 use super::OfferedFrame;
 use crate::store::landmark_placement::StoredCapture;
@@ -97,8 +97,8 @@ pub(super) fn frame_observations(offered: &OfferedFrame, params: &Params) -> Fra
     observed
 }
 
-/// The landmark with verdict unique and enough confidence, with its corners. Those by points alone are not good enough
-/// to learn from.
+/// The landmark with verdict unique and enough confidence, with its corners. Those by points alone
+/// are not good enough to learn from.
 fn recognised(analysis: &QuadAnalysis, params: &Params) -> Option<(LandmarkId, SeenBorder)> {
     let result = analysis.recognition.as_ref()?;
     let Verdict::Unique(id) = result.verdict else { return None };
@@ -110,8 +110,8 @@ fn recognised(analysis: &QuadAnalysis, params: &Params) -> Option<(LandmarkId, S
         .map(|border| (id, border))
 }
 
-/// The covariances of corners, px^2: by the detector, in the order of a recognised landmark's corners; by alignment
-/// where the landmark was taught by another border than the detected one.
+/// The covariances of corners, px^2: by the detector, in the order of a recognised landmark's
+/// corners; by alignment where the landmark was taught by another border than the detected one.
 fn stated_covariance_px2(analysis: &QuadAnalysis, recognised: Option<SeenBorder>) -> [Matrix2<f64>; 4] {
     if let Some(aligned) = recognised.filter(|border| border.found_by == FoundBy::Alignment) {
         return aligned.covariance_px2;
@@ -122,7 +122,8 @@ fn stated_covariance_px2(analysis: &QuadAnalysis, recognised: Option<SeenBorder>
     covariance_px2
 }
 
-/// The place of a quad; `None` where the pose or the walls are not known. Errors: it is not flat on a wall.
+/// The place of a quad; `None` where the pose or the walls are not known. Errors: it is not flat on
+/// a wall.
 fn place(
     corners: &Corners,
     covariance_px2: &[Matrix2<f64>; 4],

@@ -1,5 +1,5 @@
-//! The gatherings' side of the workers' frame tap. In: analysed frames of robots that gather. Out: the same, queued and
-//! counted. Never waits.
+//! The gatherings' side of the workers' frame tap. In: analysed frames of robots that gather. Out:
+//! the same, queued and counted. Never waits.
 
 use crate::store::gatherings::GatheringRow;
 use arc_swap::ArcSwap;
@@ -85,7 +85,8 @@ pub struct ActiveGathering {
     /// Workers count here: held briefly only.
     pub(super) counts: Mutex<GatheringCounts>,
     pub(super) tracker: Mutex<ViewTracker>,
-    /// Tracks that were accepted or discarded since the last frame. The writer adds them here: held briefly only.
+    /// Tracks that were accepted or discarded since the last frame. The writer adds them here: held
+    /// briefly only.
     pub(super) decided: Mutex<Vec<u32>>,
 }
 

@@ -1,6 +1,6 @@
-//! Gathers training views while robots drive. In: analysed frames by a bounded queue; a frame that does not fit is dropped and
-//! counted. Out: tracks with views in the store. One task follows objects from frame to frame (`map::tracks`) and commits new
-//! views before it counts them.
+//! Gathers training views while robots drive. In: analysed frames by a bounded queue; a frame that
+//! does not fit is dropped and counted. Out: tracks with views in the store. One task follows
+//! objects from frame to frame (`map::tracks`) and commits new views before it counts them.
 //!
 //! A person decides about tracks (`store::track_acceptance`).
 
@@ -321,8 +321,8 @@ fn new_views(offered: &OfferedFrame, params: &Params) -> Vec<(StoredTrack, NewVi
     views
 }
 
-/// A view along the border of the track's first one. `None` where the picture shows something else there. A landmark
-/// is recognised along its own border.
+/// A view along the border of the track's first one. `None` where the picture shows something else
+/// there. A landmark is recognised along its own border.
 fn view_of(
     track: &Track,
     image: &GrayImage,

@@ -1,5 +1,6 @@
-//! Summaries of tracks, for a person's decision. In: tracks with their views, and the walls. Out: number and spread of the
-//! views, the place, the quality gates that a model of them would fail, and similar tracks.
+//! Summaries of tracks, for a person's decision. In: tracks with their views, and the walls. Out:
+//! number and spread of the views, the place, the quality gates that a model of them would fail,
+//! and similar tracks.
 
 use crate::{
     failed_gates::{self, Evidence},
@@ -109,7 +110,8 @@ fn summary(
     (candidate, model)
 }
 
-/// The failed quality gates. The gate on the number of views is left out: a lesson generates views where there are few.
+/// The failed quality gates. The gate on the number of views is left out: a lesson generates views
+/// where there are few.
 fn failed(model: Option<&LandmarkModel>, place: Option<&EstimatedPlace>) -> Vec<FailedGate> {
     let Some(model) = model else { return vec![failed_gates::no_views()] };
     let ModelStatus::Candidate(failures) = &model.status else { return vec![] };

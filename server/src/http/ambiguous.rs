@@ -1,6 +1,6 @@
-//! Requests that two programs read differently: a header twice, or one host in the first line and another in `Host`. In: a
-//! request. Out: a refusal that says what to send. A proxy in front may take the other one, and check something else than
-//! what is done.
+//! Requests that two programs read differently: a header twice, or one host in the first line and
+//! another in `Host`. In: a request. Out: a refusal that says what to send. A proxy in front may
+//! take the other one, and check something else than what is done.
 
 use super::error::ApiError;
 use axum::{

@@ -12,7 +12,8 @@ pub(super) fn row_major(matrix: &Matrix3<f64>) -> [f64; 9] {
     std::array::from_fn(|i| matrix[(i / 3, i % 3)])
 }
 
-/// A page from one row more than asked for, which only says that there is a next page; `total` are the items of all pages.
+/// A page from one row more than asked for, which only says that there is a next page; `total` are
+/// the items of all pages.
 pub(super) fn page<R, T>(
     mut rows: Vec<R>,
     limit: usize,
@@ -81,7 +82,8 @@ impl<T> Listed for (String, T) {
     }
 }
 
-/// The answer to a creation: `shown` of what `work` makes by one write. If the request has a key, it is kept with that write.
+/// The answer to a creation: `shown` of what `work` makes by one write. If the request has a key,
+/// it is kept with that write.
 pub(super) async fn created<T: 'static, B: Serialize, E: Into<ApiError>>(
     shown: impl Fn(&T) -> (StatusCode, B) + Clone + Send + Sync + 'static,
     work: impl Future<Output = Result<T, E>>,

@@ -15,7 +15,8 @@ pub(super) fn router() -> OpenApiRouter<AppState> {
     OpenApiRouter::new().routes(routes!(list)).routes(routes!(check))
 }
 
-/// Lists changes, newest first: who, when, what. An entry is written in the transaction of its change.
+/// Lists changes, newest first: who, when, what. An entry is written in the transaction of its
+/// change.
 #[utoipa::path(get, path = "/audit", operation_id = "listAuditEntries", tag = "audit", params(AuditQuery),
     responses((status = 200, body = Page<AuditEntry>),
     (status = 422, body = Problem, description = "out_of_range, invalid_value")))]
@@ -32,8 +33,9 @@ async fn list(
     Ok(Json(page(rows, limit, total, |row| row.seq.to_string(), AuditEntry::from)))
 }
 
-/// Computes the digest of every entry anew. `seq` and `sha256` of an earlier `head`, noted outside of the server, are
-/// compared as well: whoever can write the database could write another chain, but not one with that digest.
+/// Computes the digest of every entry anew. `seq` and `sha256` of an earlier `head`, noted outside
+/// of the server, are compared as well: whoever can write the database could write another chain,
+/// but not one with that digest.
 #[utoipa::path(get, path = "/audit/check", operation_id = "checkAudit", tag = "audit", params(AuditHeadQuery),
     responses((status = 200, body = AuditCheck), (status = 422, body = Problem, description = "invalid_value")))]
 async fn check(

@@ -1,5 +1,6 @@
-//! Around every operation of the API: who asks, and whether the authorisation table allows it. In: a request that has
-//! found its route. Out: the same with its [`Principal`], or 401, 403, or 404 for what the principal may not see.
+//! Around every operation of the API: who asks, and whether the authorisation table allows it. In:
+//! a request that has found its route. Out: the same with its [`Principal`], or 401, 403, or 404
+//! for what the principal may not see.
 
 use super::{
     API, App, AppState,
@@ -38,7 +39,8 @@ pub(super) struct Caller {
     pub(super) session: Option<String>,
 }
 
-/// The request with its principal, and who asks for a change if it may be one. Errors: the refusal as an answer.
+/// The request with its principal, and who asks for a change if it may be one. Errors: the refusal
+/// as an answer.
 pub(super) async fn authorise(
     app: &AppState,
     request: Request,
@@ -53,7 +55,8 @@ pub(super) async fn authorise(
     }
 }
 
-/// Who asks for a change, and why, for the audit log and the history of maps. Errors: the reason is none.
+/// Who asks for a change, and why, for the audit log and the history of maps. Errors: the reason is
+/// none.
 fn actor(parts: &Parts) -> Result<Option<Actor>, ApiError> {
     let principal = parts.extensions.get::<Principal>().filter(|_| !parts.method.is_safe());
     let Some(principal) = principal else { return Ok(None) };
@@ -111,7 +114,8 @@ fn principal(app: &AppState, parts: &Parts, role: Role) -> Result<Principal, Api
     Ok(principal)
 }
 
-/// The valid token that a request comes with, in its header or by its session. A header that is not valid hides the session.
+/// The valid token that a request comes with, in its header or by its session. A header that is not
+/// valid hides the session.
 pub(super) fn token(app: &App, headers: &HeaderMap, now: Instant) -> Option<TokenId> {
     let (tokens, now_ms) = (app.store.tokens(), now_ms());
     if let Some(value) = headers.get(header::AUTHORIZATION) {
@@ -121,7 +125,8 @@ pub(super) fn token(app: &App, headers: &HeaderMap, now: Instant) -> Option<Toke
     tokens.check(token, now_ms).is_ok().then_some(token)
 }
 
-/// Who asks for what everybody may ask for. `None` for a stranger, and for one whose token or session is not valid.
+/// Who asks for what everybody may ask for. `None` for a stranger, and for one whose token or
+/// session is not valid.
 pub(super) fn asker(app: &AppState, parts: &Parts) -> Option<Principal> {
     principal(app, parts, Role::Viewer).ok()
 }
@@ -131,7 +136,8 @@ pub(super) fn bearer(value: &HeaderValue) -> Option<&str> {
     credentials::bearer(value.to_str().ok()?)
 }
 
-/// A change by cookie must come from a script of the page: a browser sends the cookie with whatever asks.
+/// A change by cookie must come from a script of the page: a browser sends the cookie with whatever
+/// asks.
 pub(super) fn check_page(method: &Method, headers: &HeaderMap) -> Result<(), ApiError> {
     if method.is_safe() || headers.contains_key(PAGE_HEADER) {
         return Ok(());
@@ -141,7 +147,8 @@ pub(super) fn check_page(method: &Method, headers: &HeaderMap) -> Result<(), Api
     Err(ApiError::new(StatusCode::FORBIDDEN, "page_header_missing", detail).field(PAGE_HEADER.as_str()))
 }
 
-/// Whether the principal may see what the path names. What it may not see is answered as what does not exist.
+/// Whether the principal may see what the path names. What it may not see is answered as what does
+/// not exist.
 async fn check_scope(
     app: &AppState,
     parts: &mut Parts,
@@ -184,7 +191,8 @@ pub(super) fn check_map(principal: &Principal, map: &str) -> Result<(), ApiError
     if principal.may_see(map) { Ok(()) } else { Err(foreign().into()) }
 }
 
-/// 404 for a robot on a map that the principal may not see. One that does not exist is left to the handler.
+/// 404 for a robot on a map that the principal may not see. One that does not exist is left to the
+/// handler.
 pub(super) fn check_robot(app: &AppState, principal: &Principal, robot: &str) -> Result<(), ApiError> {
     let foreign = || StoreError::NotFound { what: Kind::Robot, name: robot.to_owned() };
     match app.store.snapshots().robot_map(robot) {

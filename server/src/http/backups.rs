@@ -27,8 +27,8 @@ pub(super) fn router() -> OpenApiRouter<AppState> {
     OpenApiRouter::new().routes(routes!(create, list)).routes(routes!(get, delete)).routes(routes!(file))
 }
 
-/// Begins a backup: one file with one committed state, and a manifest of its digests. Writes go on meanwhile. The oldest
-/// backups beyond `backup.keep` are removed when it is complete.
+/// Begins a backup: one file with one committed state, and a manifest of its digests. Writes go on
+/// meanwhile. The oldest backups beyond `backup.keep` are removed when it is complete.
 #[utoipa::path(post, path = "/backups", operation_id = "createBackup",
     tag = "backups", responses((status = 202, body = Backup),
     (status = 409, body = Problem, description = "in_use: another one is being made")))]

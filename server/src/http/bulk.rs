@@ -1,5 +1,5 @@
-//! `/maps/{map}/bulk`: several landmarks made or deleted in one transaction, all or none. Its paths have words of their own:
-//! below `/landmarks` every word is the name of a landmark.
+//! `/maps/{map}/bulk`: several landmarks made or deleted in one transaction, all or none. Its paths
+//! have words of their own: below `/landmarks` every word is the name of a landmark.
 
 use super::{
     AppState,
@@ -30,7 +30,8 @@ fn within_bound(count: usize) -> Result<(), ApiError> {
     Err(ApiError::invalid("out_of_range", "landmarks", format!("1 to {MAX_BULK} landmarks at a time")))
 }
 
-/// Creates landmarks without views: all, or none. The field of a refusal has the number of the landmark at fault, from 0.
+/// Creates landmarks without views: all, or none. The field of a refusal has the number of the
+/// landmark at fault, from 0.
 #[utoipa::path(post, path = "/maps/{map}/bulk/create-landmarks", operation_id = "createLandmarks",
     tag = "landmarks", params(("map" = String, Path)),
     request_body = NewLandmarks, responses((status = 201, body = BulkOutcome), (status = 404, body = Problem),
@@ -66,8 +67,8 @@ async fn create(
     created(|count: &u64| (StatusCode::CREATED, BulkOutcome { count: *count }), write).await
 }
 
-/// Deletes landmarks with their views and models: all, or none. The field of a refusal has the number of the landmark at
-/// fault, from 0.
+/// Deletes landmarks with their views and models: all, or none. The field of a refusal has the
+/// number of the landmark at fault, from 0.
 #[utoipa::path(post, path = "/maps/{map}/bulk/delete-landmarks", operation_id = "deleteLandmarks",
     tag = "landmarks", params(("map" = String, Path)),
     request_body = LandmarkDeletions, responses((status = 200, body = BulkOutcome), (status = 404, body = Problem),

@@ -47,7 +47,8 @@ impl From<BundleError> for ApiError {
     }
 }
 
-/// The whole map as one file, a bundle: a zip with JSON, GeoJSON, pictures and models (docs/BUNDLE.md).
+/// The whole map as one file, a bundle: a zip with JSON, GeoJSON, pictures and models
+/// (docs/BUNDLE.md).
 #[utoipa::path(get, path = "/maps/{map}/bundle", operation_id = "saveBundle",
     tag = "maps", params(("map" = String, Path)),
     responses((status = 200, content_type = "application/zip"), (status = 404, body = Problem),
@@ -77,8 +78,9 @@ async fn save(
     Ok((headers, Body::from_stream(parts)).into_response())
 }
 
-/// Makes a new map of a bundle: with landmarks, views, models, walls, underlay, reference runs and settings, as one commit. A
-/// bundle of which anything is wrong is refused as a whole, with the file in it as `field`.
+/// Makes a new map of a bundle: with landmarks, views, models, walls, underlay, reference runs and
+/// settings, as one commit. A bundle of which anything is wrong is refused as a whole, with the
+/// file in it as `field`.
 #[utoipa::path(post, path = "/bundles", operation_id = "loadBundle", tag = "maps", params(BundleQuery),
     request_body(content = Vec<u8>, content_type = "application/zip"), responses((status = 201, body = Map),
     (status = 404, body = Problem, description = "unknown_map: the map that it lies in"),

@@ -1,4 +1,5 @@
-//! `/robots/{robot}/cameras`: what is known of a robot's cameras, and their calibration from views of landmarks.
+//! `/robots/{robot}/cameras`: what is known of a robot's cameras, and their calibration from views
+//! of landmarks.
 
 use super::{
     AppState,
@@ -70,8 +71,8 @@ async fn list(
     Ok(Json(Cameras { cameras }))
 }
 
-/// Calibrates a camera, from uploaded corners or from the views of landmarks kept of its own frames. Nothing is changed:
-/// a robot sends its intrinsics with its frames.
+/// Calibrates a camera, from uploaded corners or from the views of landmarks kept of its own
+/// frames. Nothing is changed: a robot sends its intrinsics with its frames.
 #[utoipa::path(post, path = "/robots/{robot}/cameras/{camera}/calibrate", operation_id = "calibrateCamera",
     tag = "robots",
     params(("robot" = String, Path), ("camera" = String, Path)), request_body = CalibrationRequest,

@@ -1,5 +1,6 @@
-//! Parameters, headers and items of pages that operations of the OpenAPI document share: each stands once in `components`, and
-//! operations refer to it. In: the whole document. Out: the same contract, shorter.
+//! Parameters, headers and items of pages that operations of the OpenAPI document share: each
+//! stands once in `components`, and operations refer to it. In: the whole document. Out: the same
+//! contract, shorter.
 
 use std::collections::BTreeMap;
 use utoipa::openapi::{
@@ -70,8 +71,8 @@ fn refer_to_items(schemas: &mut BTreeMap<String, RefOr<Schema>>) {
     }
 }
 
-/// The parameters and headers that more than one operation has in the same words. Of several of one name, those that most
-/// operations have.
+/// The parameters and headers that more than one operation has in the same words. Of several of one
+/// name, those that most operations have.
 fn shared(document: &mut OpenApi) -> (BTreeMap<String, Parameter>, BTreeMap<String, Header>) {
     let mut parameters: Vec<(usize, Parameter)> = Vec::new();
     let mut headers: BTreeMap<String, (usize, Header)> = BTreeMap::new();
@@ -99,7 +100,8 @@ fn shared(document: &mut OpenApi) -> (BTreeMap<String, Parameter>, BTreeMap<Stri
     (parameters, headers.map(|(name, (_, header))| (name, header)).collect())
 }
 
-/// The name of a parameter in `components`: where it stands in a request, and what it is called there.
+/// The name of a parameter in `components`: where it stands in a request, and what it is called
+/// there.
 fn name_of(parameter: &Parameter) -> String {
     let place = match parameter.parameter_in {
         ParameterIn::Path => "path",

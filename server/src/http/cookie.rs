@@ -1,9 +1,11 @@
-//! The cookie of a session of the page. In: the headers of a request. Out: its value, and the header that sets it.
+//! The cookie of a session of the page. In: the headers of a request. Out: its value, and the
+//! header that sets it.
 
 use axum::http::{HeaderMap, HeaderValue, header};
 use protos::credentials;
 
-/// Begins the name of the cookie; the port follows: a browser keeps cookies of all servers of a host in one place.
+/// Begins the name of the cookie; the port follows: a browser keeps cookies of all servers of a
+/// host in one place.
 const COOKIE: &str = "waymark_session_";
 
 /// Name of the cookie on this host and port.
@@ -15,7 +17,8 @@ fn cookie_name(headers: &HeaderMap) -> String {
     format!("{COOKIE}{port}")
 }
 
-/// Sets the cookie; an age of 0 removes it. One that was set over an encrypted connection is sent over such ones alone.
+/// Sets the cookie; an age of 0 removes it. One that was set over an encrypted connection is sent
+/// over such ones alone.
 pub(super) fn set_cookie(
     headers: &HeaderMap,
     is_encrypted: bool,

@@ -1,4 +1,5 @@
-//! `Idempotency-Key`: a creation that is repeated with its key is answered as the first time, and made once.
+//! `Idempotency-Key`: a creation that is repeated with its key is answered as the first time, and
+//! made once.
 
 use super::{
     API, AppState, error::ApiError, extract::too_large, reference_runs::PATH_BYTES, room,
@@ -33,8 +34,9 @@ const LOAD: &str = "/bundles";
 /// The largest body of a request, in bytes.
 type LargestBody = fn(&Limits) -> usize;
 
-/// Every POST that creates stored rows: its path below [`API`], and its largest body. The others ask, or begin what is there
-/// once at most (a mapping, a recording), so that a repeat is refused by itself; a token's secret is kept nowhere.
+/// Every POST that creates stored rows: its path below [`API`], and its largest body. The others
+/// ask, or begin what is there once at most (a mapping, a recording), so that a repeat is refused
+/// by itself; a token's secret is kept nowhere.
 pub(super) const CREATIONS: &[(&str, LargestBody)] = &[
     ("/maps", json),
     ("/maps/{map}/copies", json),
@@ -87,7 +89,8 @@ async fn once(app: &AppState, request: Request, max: usize, next: Next) -> Resul
     .await
 }
 
-/// The answer to a creation, of `work` or of an earlier request. Without a key that is always `work`.
+/// The answer to a creation, of `work` or of an earlier request. Without a key that is always
+/// `work`.
 pub(super) async fn under_key(
     app: &AppState,
     head: &Parts,

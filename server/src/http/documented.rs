@@ -1,5 +1,6 @@
-//! What every operation of the OpenAPI document may answer beside its own: the refusals of the guard, of the extractors and of
-//! the store. They stand once in `components`; an operation refers to them, and says which codes are its own.
+//! What every operation of the OpenAPI document may answer beside its own: the refusals of the
+//! guard, of the extractors and of the store. They stand once in `components`; an operation refers
+//! to them, and says which codes are its own.
 
 use super::error::PROBLEM_JSON;
 use axum::http::StatusCode;
@@ -10,7 +11,8 @@ use utoipa::openapi::{
     response::ResponseBuilder,
 };
 
-/// Refusals with one status: the name of the response, and the codes that any operation may give with it.
+/// Refusals with one status: the name of the response, and the codes that any operation may give
+/// with it.
 struct Refusal {
     status: &'static str,
     name: &'static str,
@@ -21,7 +23,8 @@ const fn refusal(status: &'static str, name: &'static str, codes: &'static str) 
     Refusal { status, name, codes }
 }
 
-/// What any request may be answered with: by the guard, for its token, and by a server that fails, stops or has no room.
+/// What any request may be answered with: by the guard, for its token, and by a server that fails,
+/// stops or has no room.
 const ANY: Refusal = refusal(
     "default",
     "Refused",
@@ -91,8 +94,8 @@ fn add_refusals(operation: &mut Operation) {
     refer(responses);
 }
 
-/// Puts a reference in the place of every refusal. It keeps the codes that the shared response does not name; a status that
-/// any request may be answered with, and no codes of its own, is left out.
+/// Puts a reference in the place of every refusal. It keeps the codes that the shared response does
+/// not name; a status that any request may be answered with, and no codes of its own, is left out.
 fn refer(responses: &mut BTreeMap<String, RefOr<Response>>) {
     responses.retain(|status, response| {
         let RefOr::T(own) = &*response else { return true };
@@ -111,7 +114,8 @@ fn refer(responses: &mut BTreeMap<String, RefOr<Response>>) {
     });
 }
 
-/// OpenAPI asks for a description of every response: where a handler gives none, the words of its status.
+/// OpenAPI asks for a description of every response: where a handler gives none, the words of its
+/// status.
 fn describe(operation: &mut Operation) {
     for (status, response) in &mut operation.responses.responses {
         if let RefOr::T(response) = response

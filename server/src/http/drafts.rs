@@ -1,4 +1,5 @@
-//! `/maps/{map}/drafts`: maps that are taught and edited beside one in use, and published to it as one commit.
+//! `/maps/{map}/drafts`: maps that are taught and edited beside one in use, and published to it as
+//! one commit.
 
 use super::{
     AppState,
@@ -107,8 +108,8 @@ async fn difference(
     }))
 }
 
-/// Publishes a draft: what it has changed of the map, by one commit; then the draft is gone. A roll back of that commit makes
-/// the map what it was.
+/// Publishes a draft: what it has changed of the map, by one commit; then the draft is gone. A roll
+/// back of that commit makes the map what it was.
 #[utoipa::path(post, path = "/maps/{map}/drafts/{draft}/publish", operation_id = "publishDraft", tag = "history",
     params(("map" = String, Path), ("draft" = String, Path)), responses((status = 200, body = RollbackOutcome),
     (status = 404, body = Problem, description = "unknown_draft"),

@@ -1,5 +1,6 @@
-//! Encryption of HTTP. In: an accepted connection. Out: what is spoken on it: TLS, plain text by a client of this machine, or
-//! plain text that would have been readable on the way, which is refused.
+//! Encryption of HTTP. In: an accepted connection. Out: what is spoken on it: TLS, plain text by a
+//! client of this machine, or plain text that would have been readable on the way, which is
+//! refused.
 
 use super::error::ApiError;
 use axum::{Router, http::StatusCode};

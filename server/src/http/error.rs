@@ -1,5 +1,5 @@
-//! Errors as `application/problem+json` (RFC 9457): a stable `code`, the `field` at fault, a sentence. What a 5xx was
-//! caused by is logged, never sent.
+//! Errors as `application/problem+json` (RFC 9457): a stable `code`, the `field` at fault, a
+//! sentence. What a 5xx was caused by is logged, never sent.
 
 use crate::store::{StoreError, kind::Kind};
 use axum::{

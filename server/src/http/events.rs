@@ -53,8 +53,8 @@ impl EventFilter {
     }
 }
 
-/// Whether an event is shown to whoever reads: those about a map to those who may see that map, the others to tokens for all
-/// maps, and of the server itself only to administrators.
+/// Whether an event is shown to whoever reads: those about a map to those who may see that map, the
+/// others to tokens for all maps, and of the server itself only to administrators.
 fn may_hear(principal: &Principal, what: &ServerEventBody) -> bool {
     let sees_all = principal.maps.is_none();
     match what {
@@ -105,10 +105,11 @@ impl Reader {
     }
 }
 
-/// Follows what changes on the server: maps, landmarks, jobs, robots that come and go, gatherings; for administrators backups
-/// and tokens, too. The first event is `ready`. A reader that was cut off gives the id of its last event (`Last-Event-ID`)
-/// and gets what it has missed; where that is more than is remembered (1024 events), an event `reset` says to read anew.
-/// Only what the token may see is sent.
+/// Follows what changes on the server: maps, landmarks, jobs, robots that come and go, gatherings;
+/// for administrators backups and tokens, too. The first event is `ready`. A reader that was cut
+/// off gives the id of its last event (`Last-Event-ID`) and gets what it has missed; where that is
+/// more than is remembered (1024 events), an event `reset` says to read anew. Only what the token
+/// may see is sent.
 #[utoipa::path(get, path = "/events", operation_id = "followEvents", tag = "maps", params(EventQuery,
     ("Last-Event-ID" = Option<String>, Header, description = "Id of the last event that was received.")),
     responses((status = 200, content_type = "text/event-stream", body = ServerEvent),

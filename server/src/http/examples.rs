@@ -1,5 +1,5 @@
-//! Examples of request bodies, from `examples.json` into the OpenAPI document. A test sends each of them. In a form, `@` and
-//! a name stand for a file, as in curl.
+//! Examples of request bodies, from `examples.json` into the OpenAPI document. A test sends each of
+//! them. In a form, `@` and a name stand for a file, as in curl.
 
 use serde_json::Value;
 use std::collections::BTreeMap;

@@ -1,5 +1,5 @@
-//! From bytes to checked values: JSON bodies within their bound, names in paths, pages in queries. Every failure is a
-//! problem with a code and a field.
+//! From bytes to checked values: JSON bodies within their bound, names in paths, pages in queries.
+//! Every failure is a problem with a code and a field.
 
 use super::{AppState, error::ApiError, objects::Objects};
 use crate::label::{LabelError, check_label};
@@ -22,7 +22,8 @@ impl<T: DeserializeOwned + Send + 'static> FromRequest<AppState> for Body<T> {
     }
 }
 
-/// A JSON body of at most so many bytes, for a route that promises to take more than `limits.json_bytes`.
+/// A JSON body of at most so many bytes, for a route that promises to take more than
+/// `limits.json_bytes`.
 pub(super) struct BodyUpTo<T, const BYTES: usize>(pub(super) T);
 
 impl<T: DeserializeOwned + Send + 'static, const BYTES: usize> FromRequest<AppState> for BodyUpTo<T, BYTES> {
@@ -72,8 +73,8 @@ pub(super) fn too_large(max: usize) -> ApiError {
     ApiError::new(StatusCode::PAYLOAD_TOO_LARGE, "too_large", detail).field("body")
 }
 
-/// Reads JSON; what is wrong is named by its path, inside `outer` if that is not empty. A list is no object anywhere
-/// ([`Objects`]): every body and every part of a form comes this way.
+/// Reads JSON; what is wrong is named by its path, inside `outer` if that is not empty. A list is
+/// no object anywhere ([`Objects`]): every body and every part of a form comes this way.
 pub(super) fn json<T: DeserializeOwned>(bytes: &[u8], outer: &str) -> Result<T, ApiError> {
     let mut reader = serde_json::Deserializer::from_slice(bytes);
     let value = serde_path_to_error::deserialize(Objects(&mut reader)).map_err(|error| {
@@ -114,7 +115,8 @@ pub(super) fn label(field: impl Into<String>, text: &str, max: usize) -> Result<
     })
 }
 
-/// Path parameters. A path with wrong percent-encoding or a number that is none is a thing that does not exist.
+/// Path parameters. A path with wrong percent-encoding or a number that is none is a thing that
+/// does not exist.
 pub(super) struct PathParams<T>(pub(super) T);
 
 impl<T: DeserializeOwned + Send> FromRequestParts<AppState> for PathParams<T> {

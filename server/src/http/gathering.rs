@@ -1,4 +1,5 @@
-//! `/maps/{map}/gatherings`: views gathered by a robot that drives past, and a person's decision on them.
+//! `/maps/{map}/gatherings`: views gathered by a robot that drives past, and a person's decision on
+//! them.
 
 use super::{
     AppState,
@@ -80,8 +81,9 @@ fn with_counts(row: GatheringRow, counts: Option<GatheringCounts>) -> Gathering 
     }
 }
 
-/// Begins to gather views with a robot: while it drives, flat four-sided things are followed from frame to frame, and of
-/// each the views that say something new are kept, until it is stopped. Nothing becomes a landmark by itself.
+/// Begins to gather views with a robot: while it drives, flat four-sided things are followed from
+/// frame to frame, and of each the views that say something new are kept, until it is stopped.
+/// Nothing becomes a landmark by itself.
 #[utoipa::path(post, path = "/maps/{map}/gatherings", operation_id = "startGathering",
     tag = "gathering", params(("map" = String, Path)),
     request_body = NewGatheringBody, responses((status = 201, body = Gathering),
@@ -229,7 +231,8 @@ async fn show_icon(
 /// Most tracks of one decision.
 const MAX_PICKS: usize = 64;
 
-/// Makes landmarks of tracks, or adds views to the landmarks they show; places them; and learns them. All or nothing.
+/// Makes landmarks of tracks, or adds views to the landmarks they show; places them; and learns
+/// them. All or nothing.
 #[utoipa::path(post, path = "/maps/{map}/gatherings/{gathering}/accept", operation_id = "acceptTracks",
     tag = "gathering",
     params(("map" = String, Path), ("gathering" = i64, Path)), request_body = AcceptRequest,

@@ -1,8 +1,9 @@
-//! Around every request: an id, a log line, a bound of how often is asked, an answer that is kept, a deadline, a place for a
-//! large body, safe headers, and a refusal of what other web pages send.
+//! Around every request: request id, log line, rate limit, response cache, deadline, limit on large
+//! bodies, safe headers, and a refusal of requests from other web pages.
 //!
-//! A browser reaches the server on behalf of any page it shows; so a request must name this server as its host and, if it
-//! changes anything, come from its own pages or from no page at all. Who asks is the matter of `authorise`.
+//! A browser reaches the server on behalf of any page it shows; so a request must name this server
+//! as its host and, if it changes anything, come from its own pages or from no page at all. Who
+//! asks is the matter of `authorise`.
 
 use super::{
     App, ambiguous, authorise,
@@ -32,7 +33,8 @@ const LIVENESS: &str = "/healthz";
 /// Bodies up to this size need no place, bytes.
 const SMALL_BODY: u64 = 64 << 10;
 
-/// What is around a request: `inner` answers it if the guard lets it pass and no earlier answer is kept.
+/// What is around a request: `inner` answers it if the guard lets it pass and no earlier answer is
+/// kept.
 pub(super) async fn guard<Answering: Future<Output = Response>>(
     app: &App,
     mut request: Request,
@@ -42,7 +44,8 @@ pub(super) async fn guard<Answering: Future<Output = Response>>(
     request.extensions_mut().insert(RequestId(id.clone()));
     let (method, uri) = (request.method().clone(), request.uri().clone());
     let started = Instant::now();
-    // With TLS, plain text comes from this machine alone, and a certificate proves the name that a page was asked by.
+    // With TLS, plain text comes from this machine alone, and a certificate proves the name that a
+    // page was asked by.
     let peer = request.extensions().get::<Peer>().copied();
     let is_loopback = app.config.tls.is_some() || app.config.http_addr.ip().to_canonical().is_loopback();
     let loopback = is_loopback && !peer.is_some_and(|peer| peer.is_encrypted);
@@ -79,7 +82,8 @@ pub(super) async fn guard<Answering: Future<Output = Response>>(
     response
 }
 
-/// Handles a request until its deadline. What is logged meanwhile has its id; how it ended is for traces.
+/// Handles a request until its deadline. What is logged meanwhile has its id; how it ended is for
+/// traces.
 async fn in_span<Answering: Future<Output = Response>>(
     app: &App,
     (request, uploader): (Request, Uploader),
@@ -105,12 +109,14 @@ fn deadline_s(limits: &Limits, path: &str) -> u64 {
     if is_bundle { limits.bundle_timeout_s } else { limits.request_timeout_s }
 }
 
-/// Whether something was changed. Some questions are put by POST: they are answered with 200, creations are not.
+/// Whether something was changed. Some questions are put by POST: they are answered with 200,
+/// creations are not.
 fn is_change(method: &Method, status: StatusCode) -> bool {
     status.is_success() && !method.is_safe() && (*method != Method::POST || status != StatusCode::OK)
 }
 
-/// Handles a request. One with a large body has a place from before its body is read until it is answered.
+/// Handles a request. One with a large body has a place from before its body is read until it is
+/// answered.
 async fn placed<Answering: Future<Output = Response>>(
     app: &App,
     (request, uploader): (Request, Uploader),
@@ -128,7 +134,8 @@ async fn placed<Answering: Future<Output = Response>>(
     inner(request).await
 }
 
-/// 408. A change that had not begun is not made any more; one that had is made all the same, and nobody is told.
+/// 408. A change that had not begun is not made any more; one that had is made all the same, and
+///      nobody is told.
 fn timed_out(method: &Method, deadline: Duration) -> ApiError {
     let seconds = deadline.as_secs();
     if method.is_safe() {
@@ -144,7 +151,8 @@ fn timed_out(method: &Method, deadline: Duration) -> ApiError {
 fn check_origin(method: &Method, headers: &HeaderMap, loopback: bool) -> Result<(), ApiError> {
     let text = |name: HeaderName| headers.get(name).and_then(|v| v.to_str().ok());
     let host = text(header::HOST).unwrap_or_default();
-    // A name that a stranger's DNS points at 127.0.0.1 must not make this server part of the stranger's site.
+    // A name that a stranger's DNS points at 127.0.0.1 must not make this server part of the
+    // stranger's site.
     if loopback && !is_loopback_host(host) {
         let detail = "without encryption this server answers only to a loopback host";
         return Err(ApiError::new(StatusCode::FORBIDDEN, "host_not_allowed", detail).field("host"));

@@ -29,12 +29,12 @@ async fn healthz() -> Json<Health> {
     Json(Health { status: "ok".to_owned() })
 }
 
-/// Every part of the server runs and goes on, and the database answers. 503: a part has ended or stands still, and the
-/// process is about to end with an error, too, unless the part goes on again.
+/// Every part of the server runs and goes on, and the database answers. 503: a part has ended or
+/// stands still, and the process is about to end with an error, too, unless the part goes on again.
 ///
-/// Open to everybody, so that monitors need no token: without a valid one the answer has status and counts. A token or a
-/// session adds the names of what its maps contain; one for all maps the parts, the reason of a failed backup and the name
-/// of the newest.
+/// Open to everybody, so that monitors need no token: without a valid one the answer has status and
+/// counts. A token or a session adds the names of what its maps contain; one for all maps the
+/// parts, the reason of a failed backup and the name of the newest.
 #[utoipa::path(get, path = "/readyz", operation_id = "getReadiness",
     tag = "health", responses((status = 200, body = Readiness),
     (status = 503, body = Problem, description = "storage_failed, part_ended, part_stalled")))]
@@ -90,7 +90,8 @@ async fn readyz(State(app): State<AppState>, parts: Parts) -> Result<Json<Readin
     }))
 }
 
-/// What the check of the database has found. Names of rows, paths and backups are for who sees all maps.
+/// What the check of the database has found. Names of rows, paths and backups are for who sees all
+/// maps.
 fn database_check(app: &AppState, sees_all: bool, newest: Option<&str>) -> DatabaseCheckBody {
     let check = app.store.last_check().get();
     let state = check.state();

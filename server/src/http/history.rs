@@ -1,4 +1,5 @@
-//! `/maps/{map}/commits`, `/difference`, `/rollback`: what was changed of a map, by whom and why, and the way back.
+//! `/maps/{map}/commits`, `/difference`, `/rollback`: what was changed of a map, by whom and why,
+//! and the way back.
 
 use super::{
     API, AppState,
@@ -55,7 +56,8 @@ pub(super) fn shown(row: CommitRow) -> Commit {
     }
 }
 
-/// Lists the kept commits of a map, newest first. `limits.kept_commits` and `limits.history_bytes` say how many are kept.
+/// Lists the kept commits of a map, newest first. `limits.kept_commits` and `limits.history_bytes`
+/// say how many are kept.
 #[utoipa::path(get, path = "/maps/{map}/commits", operation_id = "listCommits",
     tag = "history", params(("map" = String, Path), PageQuery),
     responses((status = 200, body = Page<Commit>), (status = 404, body = Problem)))]
@@ -151,8 +153,9 @@ fn landmark(change: LandmarkChange) -> LandmarkDifference {
     }
 }
 
-/// Makes a map what it was at a kept commit: landmarks with their views, pictures, models and thresholds, walls, underlay,
-/// reference runs and settings. It is a commit of its own, which can be taken back. The map keeps its name.
+/// Makes a map what it was at a kept commit: landmarks with their views, pictures, models and
+/// thresholds, walls, underlay, reference runs and settings. It is a commit of its own, which can
+/// be taken back. The map keeps its name.
 #[utoipa::path(post, path = "/maps/{map}/rollback", operation_id = "rollBackMap",
     tag = "history", params(("map" = String, Path)),
     request_body = Rollback, responses((status = 200, body = RollbackOutcome),
@@ -216,7 +219,8 @@ pub(super) async fn newest(
     Ok(Json(RollbackOutcome { changed, commit }))
 }
 
-/// The reason that a request gives: text of one line, percent-encoded where it is not ASCII. Errors: `invalid_value`.
+/// The reason that a request gives: text of one line, percent-encoded where it is not ASCII.
+/// Errors: `invalid_value`.
 pub(super) fn why(headers: &HeaderMap) -> Result<Option<String>, ApiError> {
     let mut given = headers.get_all(WHY).iter();
     let Some(value) = given.next() else { return Ok(None) };

@@ -1,5 +1,6 @@
-//! The ratio of a landmark's sides: what its photographs show, against the size that is stated (method 16.7). A size that
-//! contradicts them is refused; where they do not determine the ratio, it is taken, and the landmark's `facts` say so.
+//! The ratio of a landmark's sides: what its photographs show, against the size that is stated
+//! (method 16.7). A size that contradicts them is refused; where they do not determine the ratio,
+//! it is taken, and the landmark's `facts` say so.
 
 use super::{App, error::ApiError};
 use crate::store::{StoreError, aspect_views::aspect_views, landmarks};
@@ -24,7 +25,8 @@ pub(super) async fn shown_by_views(
     Ok(aspect(&all))
 }
 
-/// Refuses a size that the views contradict: 409 `aspect_differs`, with what they show and what to do.
+/// Refuses a size that the views contradict: 409 `aspect_differs`, with what they show and what to
+/// do.
 pub(super) fn check(shown: Option<Aspect>, landmark: &str, stated: LandmarkSize) -> Result<(), ApiError> {
     let Some(shown) = shown else { return Ok(()) };
     let AspectAgreement::Differs { swapped } = shown.agreement(stated) else { return Ok(()) };
@@ -54,7 +56,8 @@ pub(super) fn check(shown: Option<Aspect>, landmark: &str, stated: LandmarkSize)
         .with("swapped", json!(swapped)))
 }
 
-/// Refuses a view that contradicts the size of its landmark, by hand or given with the view; nothing is made then.
+/// Refuses a view that contradicts the size of its landmark, by hand or given with the view;
+/// nothing is made then.
 pub(super) async fn check_view(
     app: &App,
     (map, landmark): &(String, String),

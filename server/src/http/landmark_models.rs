@@ -1,4 +1,5 @@
-//! What was learnt of a landmark: its model, its icon, its distances, and which landmarks of a map look alike.
+//! What was learnt of a landmark: its model, its icon, its distances, and which landmarks of a map
+//! look alike.
 
 use super::{
     AppState,
@@ -116,7 +117,8 @@ fn model_shown(landmark: String, learnt: &Learnt) -> LandmarkModelDetail {
     }
 }
 
-/// What was learnt of a landmark: thresholds with their error rates, keypoints, points, saliency, sizes.
+/// What was learnt of a landmark: thresholds with their error rates, keypoints, points, saliency,
+/// sizes.
 #[utoipa::path(get, path = "/maps/{map}/landmarks/{landmark}/model", operation_id = "getLandmarkModel",
     tag = "landmarks",
     params(("map" = String, Path), ("landmark" = String, Path)),
@@ -161,7 +163,8 @@ fn histogram(threshold: &Threshold, samples: &DistanceSamples) -> DistanceHistog
     }
 }
 
-/// Histograms of the distances that the thresholds were fitted to: of the landmark's own views, and of everything else.
+/// Histograms of the distances that the thresholds were fitted to: of the landmark's own views, and
+/// of everything else.
 #[utoipa::path(get, path = "/maps/{map}/landmarks/{landmark}/distances", operation_id = "getLandmarkDistances",
     tag = "landmarks",
     params(("map" = String, Path), ("landmark" = String, Path)),
@@ -213,7 +216,8 @@ fn evidence_in(answers: &[v1::Answer], landmark: String) -> LandmarkEvidence {
     shown
 }
 
-/// How strongly points spoke for a landmark in the newest stored answers: a histogram beside the threshold.
+/// How strongly points spoke for a landmark in the newest stored answers: a histogram beside the
+/// threshold.
 #[utoipa::path(get, path = "/maps/{map}/landmarks/{landmark}/evidence", operation_id = "getLandmarkEvidence",
     tag = "landmarks",
     params(("map" = String, Path), ("landmark" = String, Path)),
@@ -229,7 +233,8 @@ async fn evidence(
     Ok(Json(evidence_in(&answers, name)))
 }
 
-/// The learnt icon of a landmark that is nearest to the mean of its views, as PNG. `ETag` is the digest of its model.
+/// The learnt icon of a landmark that is nearest to the mean of its views, as PNG. `ETag` is the
+/// digest of its model.
 #[utoipa::path(get, path = "/maps/{map}/landmarks/{landmark}/icon", operation_id = "getLandmarkIcon",
     tag = "landmarks",
     params(("map" = String, Path), ("landmark" = String, Path)),
@@ -266,7 +271,8 @@ fn pairs(landmarks: &[Landmark]) -> BTreeMap<(String, String), f64> {
     pairs
 }
 
-/// Lists the landmarks of a map that look alike, in pairs by their names, as they were told apart in their last lessons.
+/// Lists the landmarks of a map that look alike, in pairs by their names, as they were told apart
+/// in their last lessons.
 #[utoipa::path(get, path = "/maps/{map}/duplicates", operation_id = "listDuplicates",
     tag = "landmarks", params(("map" = String, Path), DuplicateQuery),
     responses((status = 200, body = Page<DuplicatePair>), (status = 404, body = Problem),

@@ -255,8 +255,8 @@ async fn get(
     Ok(Revised(revision, landmark))
 }
 
-/// Renames it; sets or forgets size and place; sets how far it is trusted. Everything that belongs to it follows the name. A size whose
-/// ratio of sides its photographs contradict is refused.
+/// Renames it; sets or forgets size and place; sets how far it is trusted. Everything that belongs
+/// to it follows the name. A size whose ratio of sides its photographs contradict is refused.
 #[utoipa::path(patch, path = "/maps/{map}/landmarks/{landmark}", operation_id = "updateLandmark", tag = "landmarks",
     params(("map" = String, Path), ("landmark" = String, Path)), request_body = LandmarkPatch,
     responses((status = 200, body = Landmark), (status = 404, body = Problem),
@@ -301,8 +301,9 @@ async fn patch(
     Ok(Revised(revision, landmark))
 }
 
-/// Makes two landmarks one: this one gets the views of `from`, and the size and place that it lacks; `from` is deleted. Its
-/// model stays until it is learnt again; the history brings both back.
+/// Makes two landmarks one: this one gets the views of `from`, and the size and place that it
+/// lacks; `from` is deleted. Its model stays until it is learnt again; the history brings both
+/// back.
 #[utoipa::path(post, path = "/maps/{map}/landmarks/{landmark}/merge", operation_id = "mergeLandmarks",
     tag = "landmarks",
     params(("map" = String, Path), ("landmark" = String, Path)), request_body = LandmarkMerge,

@@ -1,5 +1,6 @@
-//! Connections of HTTP: a deadline for the handshake, for the head of a request and for the reading of an answer, a graceful end.
-//! axum's own `serve` installs no timer, so hyper's deadline would not work there.
+//! Connections of HTTP: a deadline for the handshake, for the head of a request and for the reading
+//! of an answer, a graceful end. axum's own `serve` installs no timer, so hyper's deadline would
+//! not work there.
 
 use super::{
     encryption::{self, WireProtocol},
@@ -41,7 +42,8 @@ struct Serving<Answer> {
     write_timeout: Duration,
 }
 
-/// Serves until `stopping` is true: with `tls`, encrypted, and plain text to clients of this machine alone.
+/// Serves until `stopping` is true: with `tls`, encrypted, and plain text to clients of this
+/// machine alone.
 pub(crate) async fn serve<Answering: Future<Output = Result<Response, Infallible>> + Send + 'static>(
     listener: TcpListener,
     answer: impl Fn(Request) -> Answering + Clone + Send + Sync + 'static,
@@ -110,7 +112,8 @@ where
     /// A stream that gives up when what it writes is not taken.
     fn timed(&self, stream: TcpStream) -> Pin<Box<TimeoutStream<TcpStream>>> {
         let mut stream = TimeoutStream::new(stream);
-        // Runs only while there is something to write, and starts again with every part that is taken.
+        // Runs only while there is something to write, and starts again with every part that is
+        // taken.
         stream.set_write_timeout(Some(self.write_timeout));
         Box::pin(stream)
     }

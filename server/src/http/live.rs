@@ -76,8 +76,9 @@ async fn answer(
     Ok(Json(v1::Answer { server: app.server.to_string(), ..answer }))
 }
 
-/// Where a robot was lately, by source: fused poses, odometry alone, and the truth where a simulator tells it. Oldest
-/// first, at most 2000 of each; empty for a robot that has not moved since the server started.
+/// Where a robot was lately, by source: fused poses, odometry alone, and the truth where a
+/// simulator tells it. Oldest first, at most 2000 of each; empty for a robot that has not moved
+/// since the server started.
 #[utoipa::path(get, path = "/robots/{robot}/trajectories", operation_id = "getTrajectories",
     tag = "robots", params(("robot" = String, Path)),
     responses((status = 200, body = TrajectoriesBody),
@@ -96,10 +97,11 @@ async fn trajectories(
     }))
 }
 
-/// Follows a map: events `answer`, `pose`, `odometry`, `truth`, `presence`, `map_changed` as they happen. A `pose` has the
-/// word of its `trust`: `unspecified`, `unsupported`, `supported`, `stale` or `contradicted`, as in the list of robots. In an
-/// `answer`, `sighting` of a quad says whether the picture alone names its landmark (`global`) or the pose known before
-/// (`guided`). A reader that is too slow misses events and gets `missed` with their number.
+/// Follows a map: events `answer`, `pose`, `odometry`, `truth`, `presence`, `map_changed` as they
+/// happen. A `pose` has the word of its `trust`: `unspecified`, `unsupported`, `supported`, `stale`
+/// or `contradicted`, as in the list of robots. In an `answer`, `sighting` of a quad says whether
+/// the picture alone names its landmark (`global`) or the pose known before (`guided`). A reader
+/// that is too slow misses events and gets `missed` with their number.
 #[utoipa::path(get, path = "/maps/{map}/live", operation_id = "followMap",
     tag = "maps", params(("map" = String, Path)),
     responses((status = 200, content_type = "text/event-stream", body = LiveEventData), (status = 404, body = Problem),

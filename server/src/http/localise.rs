@@ -53,9 +53,10 @@ struct Sensed {
     scan: Option<Scan>,
 }
 
-/// Finds where a robot is by one picture, one laser scan or both, without knowing anything of it before. A picture needs the
-/// camera's intrinsics and its mounting. "No match" is an answer, with its reason; nothing is stored and no robot's pose
-/// changes. A scan alone is searched for in the whole map, for at most 10 s.
+/// Finds where a robot is by one picture, one laser scan or both, without knowing anything of it
+/// before. A picture needs the camera's intrinsics and its mounting. "No match" is an answer, with
+/// its reason; nothing is stored and no robot's pose changes. A scan alone is searched for in the
+/// whole map, for at most 10 s.
 #[utoipa::path(post, path = "/maps/{map}/localise", operation_id = "localiseRobot",
     tag = "recognition", params(("map" = String, Path)),
     request_body(content = LocaliseForm, content_type = "multipart/form-data"),

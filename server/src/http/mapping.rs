@@ -64,9 +64,10 @@ fn shown(progress: MappingProgress) -> MappingProgressBody {
     }
 }
 
-/// Begins to make the walls of a map from the scans of a robot. While it lasts, they are mapped and localise nothing. The map
-/// stays as it is until the mapping is finished. The scans are kept on disk until then: after a restart of the server the
-/// mapping goes on by itself (`resuming`), with a robot whose software went on; `journal_error` says if they cannot be.
+/// Begins to make the walls of a map from the scans of a robot. While it lasts, they are mapped and
+/// localise nothing. The map stays as it is until the mapping is finished. The scans are kept on
+/// disk until then: after a restart of the server the mapping goes on by itself (`resuming`), with
+/// a robot whose software went on; `journal_error` says if they cannot be.
 #[utoipa::path(post, path = "/maps/{map}/mapping", operation_id = "startMapping",
     tag = "maps", params(("map" = String, Path)),
     request_body = NewMapping, responses((status = 201, body = MappingProgressBody),
@@ -115,7 +116,8 @@ async fn get(
     Ok(Json(MappingProgressBody { walls, ..progress }))
 }
 
-/// Gives it up, or forgets one that failed: the map stays as it is, what was kept of the scans is removed.
+/// Gives it up, or forgets one that failed: the map stays as it is, what was kept of the scans is
+/// removed.
 #[utoipa::path(delete, path = "/maps/{map}/mapping", operation_id = "cancelMapping",
     tag = "maps", params(("map" = String, Path)),
     responses((status = 204), (status = 404, body = Problem, description = "unknown_map, not_mapping")))]
@@ -128,8 +130,9 @@ async fn cancel(
     if open { Ok(StatusCode::NO_CONTENT) } else { Err(refused(MappingError::None)) }
 }
 
-/// Ends the drive: everything is fitted once more, and the walls replace those of the map in one transaction, or are held until
-/// this is asked again. Answers at once; `stage` says when they are stored or held.
+/// Ends the drive: everything is fitted once more, and the walls replace those of the map in one
+/// transaction, or are held until this is asked again. Answers at once; `stage` says when they are
+/// stored or held.
 #[utoipa::path(post, path = "/maps/{map}/mapping/finish", operation_id = "finishMapping",
     tag = "maps", params(("map" = String, Path), FinishMappingQuery),
     responses((status = 202, body = MappingProgressBody), (status = 404, body = Problem, description = "unknown_map, not_mapping")))]
@@ -161,7 +164,8 @@ async fn finish(
     Ok((StatusCode::ACCEPTED, Json(shown(progress))))
 }
 
-/// The walls when they come, as they are computed with and as they are stored, or why there are none to be stored.
+/// The walls when they come, as they are computed with and as they are stored, or why there are
+/// none to be stored.
 async fn found(
     app: &App,
     walls: oneshot::Receiver<Result<Walls, String>>,

@@ -236,8 +236,9 @@ async fn delete(
     Ok(StatusCode::NO_CONTENT)
 }
 
-/// Makes a new map of all that a map has: landmarks with their views, photographs and models, walls, underlay, reference runs
-/// and settings. Robots stay where they are, and the copy begins a history of its own.
+/// Makes a new map of all that a map has: landmarks with their views, photographs and models,
+/// walls, underlay, reference runs and settings. Robots stay where they are, and the copy begins a
+/// history of its own.
 #[utoipa::path(post, path = "/maps/{map}/copies", operation_id = "copyMap",
     tag = "maps", params(("map" = String, Path)), request_body = NewCopy,
     responses((status = 201, body = Map), (status = 404, body = Problem),
@@ -261,7 +262,8 @@ fn pose_shown(p: &Pose2Covariance) -> TransformedPose {
     TransformedPose { x_m: p.pose.x_m, y_m: p.pose.y_m, theta_rad: p.pose.theta_rad, covariance }
 }
 
-/// How a map lies in another, by the links of both up to a map that both hang on; and a pose in that other map's frame.
+/// How a map lies in another, by the links of both up to a map that both hang on; and a pose in
+/// that other map's frame.
 #[utoipa::path(get, path = "/maps/{map}/transform", operation_id = "getMapTransform",
     tag = "maps", params(("map" = String, Path), TransformQuery),
     responses((status = 200, body = TransformResponse), (status = 400, body = Problem, description = "bad_query"),

@@ -1,5 +1,5 @@
-//! `GET /metrics`: for Prometheus, in its text format. Also below `/api/v1`, and on a listener of its
-//! own if the settings name one.
+//! `GET /metrics`: for Prometheus, in its text format. Also below `/api/v1`, and on a listener of
+//! its own if the settings name one.
 
 use super::{App, AppState, error::ApiError, guard};
 use crate::metrics;
@@ -23,7 +23,8 @@ pub(super) fn at_root() -> Router<AppState> {
     Router::new().route("/metrics", get(metrics))
 }
 
-/// A service of metrics alone, for a listener that only trusted programs reach: it asks for no token.
+/// A service of metrics alone, for a listener that only trusted programs reach: it asks for no
+/// token.
 pub(crate) fn alone(app: &Arc<App>) -> Router {
     let guarded = |State(app): State<AppState>, request: Request, next: Next| async move {
         guard::guard(&app, request, |request| next.run(request)).await

@@ -1,7 +1,8 @@
 //! The HTTP face: administrators, teachers and pages. axum appears only here.
 //!
-//! `/api/v1`, JSON with `snake_case` names, `application/problem+json` errors with a stable `code` and the `field`, lists in
-//! pages. Handlers parse, call the store, the jobs or the engine, and shape the answer; they decide nothing.
+//! `/api/v1`, JSON with `snake_case` names, `application/problem+json` errors with a stable `code`
+//! and the `field`, lists in pages. Handlers parse, call the store, the jobs or the engine, and
+//! shape the answer; they decide nothing.
 
 mod answers;
 mod audit;
@@ -270,7 +271,8 @@ impl App {
         })
     }
 
-    /// Ends when the server stops, the session is logged out, or the token is revoked, expires or is for other maps.
+    /// Ends when the server stops, the session is logged out, or the token is revoked, expires or
+    /// is for other maps.
     fn ended_for(&self, Caller { principal, session }: Caller) -> impl Future<Output = ()> + Send + use<> {
         let (tokens, sessions, stopped) =
             (self.store.tokens().clone(), self.sessions.clone(), self.stopped());

@@ -1,4 +1,5 @@
-//! `/maps/{map}/modalities`: which modality is best where, as runs have shown; the areas that somebody named; what is fused.
+//! `/maps/{map}/modalities`: which modality is best where, as runs have shown; the areas that
+//! somebody named; what is fused.
 
 use super::{
     AppState,

@@ -1,8 +1,9 @@
-//! Objects alone where a field is known by its name. In: any reader of serde. Out: the same, but for structs from lists.
+//! Objects alone where a field is known by its name. In: any reader of serde. Out: the same, but
+//! for structs from lists.
 //!
-//! serde's derive takes a list of values in the order of the fields for a struct. No schema of this interface says so, the
-//! order is no promise, and a body that is taken by accident is a change that nobody meant. A list gets the error of any
-//! other wrong type, and a path to it.
+//! serde's derive takes a list of values in the order of the fields for a struct. No schema of this
+//! interface says so, the order is no promise, and a body that is taken by accident is a change
+//! that nobody meant. A list gets the error of any other wrong type, and a path to it.
 
 use serde::de::{
     DeserializeSeed, Deserializer, EnumAccess, Error, MapAccess, SeqAccess, VariantAccess, Visitor,

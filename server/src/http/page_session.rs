@@ -1,5 +1,5 @@
-//! Sessions of the page: links that open it once, the form that takes a token, logging out. A session is a cookie that
-//! scripts cannot read and other sites cannot make a browser send.
+//! Sessions of the page: links that open it once, the form that takes a token, logging out. A
+//! session is a cookie that scripts cannot read and other sites cannot make a browser send.
 
 use super::{
     AppState,
@@ -138,7 +138,8 @@ async fn logout(State(app): State<AppState>, parts: Parts) -> Response {
     (StatusCode::NO_CONTENT, [(header::SET_COOKIE, cookie(&parts, "", 0))]).into_response()
 }
 
-/// A session for a token: its cookie. One that cannot be stored, on a full disk, lasts until the server stops.
+/// A session for a token: its cookie. One that cannot be stored, on a full disk, lasts until the
+/// server stops.
 async fn begun(app: &AppState, parts: &Parts, token: TokenId) -> Result<HeaderValue, ApiError> {
     let (value, sha256) = app.sessions.open(token, Instant::now()).map_err(|e| ApiError::internal(&e))?;
     let now = now_ms();

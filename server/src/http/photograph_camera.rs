@@ -1,5 +1,6 @@
-//! The camera of an uploaded picture. In: the part `intrinsics` of a form: `Intrinsics` of frames as JSON, with the size of
-//! the pictures that they are of (`width_px`, `height_px`) where that is known. Out: intrinsics of the picture that came.
+//! The camera of an uploaded picture. In: the part `intrinsics` of a form: `Intrinsics` of frames
+//! as JSON, with the size of the pictures that they are of (`width_px`, `height_px`) where that is
+//! known. Out: intrinsics of the picture that came.
 
 use super::{error::ApiError, extract::json};
 use protos::{Code, Rejection, convert::geometry, v1};

@@ -1,5 +1,5 @@
-//! Pictures as answers, with their digest as `ETag`. A client that has the picture already (`If-None-Match`) gets 304 and no
-//! bytes.
+//! Pictures as answers, with their digest as `ETag`. A client that has the picture already
+//! (`If-None-Match`) gets 304 and no bytes.
 
 use super::{AppState, error::ApiError};
 use crate::store::pictures::{digest, hex};

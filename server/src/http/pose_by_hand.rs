@@ -51,9 +51,10 @@ fn not_heard(robot: &Name) -> ApiError {
     ApiError::new(StatusCode::CONFLICT, "no_odometry", detail).field("robot")
 }
 
-/// Puts a robot where a person says it is on its map, in place of the pose that it may have. The pose is unsupported until
-/// a landmark that the picture alone names agrees with it; landmarks that contradict it replace it as they would any other
-/// pose. The robot has to send odometry, which carries the pose on.
+/// Puts a robot where a person says it is on its map, in place of the pose that it may have. The
+/// pose is unsupported until a landmark that the picture alone names agrees with it; landmarks that
+/// contradict it replace it as they would any other pose. The robot has to send odometry, which
+/// carries the pose on.
 #[utoipa::path(put, path = "/robots/{robot}/pose", operation_id = "setRobotPose",
     tag = "robots", params(("robot" = String, Path)),
     request_body = PoseByHand, responses((status = 200, body = RobotPose), (status = 404, body = Problem),

@@ -1,4 +1,5 @@
-//! `/robots/{robot}/recording` and `/maps/{map}/reference-runs`: runs whose path is known, to learn which modality to trust where.
+//! `/robots/{robot}/recording` and `/maps/{map}/reference-runs`: runs whose path is known, to learn
+//! which modality to trust where.
 
 use super::{
     App, AppState,
@@ -27,7 +28,8 @@ use utoipa_axum::{router::OpenApiRouter, routes};
 /// Usual standard deviations of a reference: metres, radians.
 const USUAL: [f64; 2] = [0.01, 0.005];
 
-/// Most bytes of one pose in JSON: 20 digits of the time, three numbers of up to 25 characters, and what is between them.
+/// Most bytes of one pose in JSON: 20 digits of the time, three numbers of up to 25 characters, and
+/// what is between them.
 const POSE_BYTES: usize = 112;
 /// Most bytes of a path: that of [`MAX_REFERENCE`] poses, and the rest of the object.
 pub(super) const PATH_BYTES: usize = MAX_REFERENCE * POSE_BYTES + 1024;
@@ -49,8 +51,8 @@ fn refused(error: RecordingError) -> ApiError {
     ApiError::new(status, code, error.to_string()).field("robot")
 }
 
-/// Begins to record a run of a robot on its map: odometry, and what landmarks and the laser say. It lies in memory until
-/// the path is told.
+/// Begins to record a run of a robot on its map: odometry, and what landmarks and the laser say. It
+/// lies in memory until the path is told.
 #[utoipa::path(post, path = "/robots/{robot}/recording", operation_id = "startRecording",
     tag = "robots", params(("robot" = String, Path)),
     responses((status = 201, body = RecordingStatusBody), (status = 404, body = Problem),
@@ -147,9 +149,9 @@ fn reference_of(path: ReferenceTrajectoryBody) -> Result<ReferenceTrajectory, Ap
     })
 }
 
-/// Ends the recording by telling the path, once what it shows is stored; until then it stays, whatever becomes of the request.
-/// What each modality was off by, and claimed, is kept by square metre and heading,
-/// and robots on this map are fused by it from now on.
+/// Ends the recording by telling the path, once what it shows is stored; until then it stays,
+/// whatever becomes of the request. What each modality was off by, and claimed, is kept by square
+/// metre and heading, and robots on this map are fused by it from now on.
 #[utoipa::path(post, path = "/robots/{robot}/recording/reference", operation_id = "finishRecording",
     tag = "robots", params(("robot" = String, Path)),
     request_body = ReferenceTrajectoryBody, responses((status = 201, body = ReferenceRunBody),

@@ -1,4 +1,5 @@
-//! `/maps/{map}/landmarks/{landmark}/refused-views`: photographs that were not taken, and why. Uploads and lessons keep them.
+//! `/maps/{map}/landmarks/{landmark}/refused-views`: photographs that were not taken, and why.
+//! Uploads and lessons keep them.
 
 use super::{
     API, App, AppState,
@@ -70,7 +71,8 @@ pub(super) async fn keep_refused(
     }
 }
 
-/// Keeps a photograph that was not added. What fails is logged: the upload is answered all the same.
+/// Keeps a photograph that was not added. What fails is logged: the upload is answered all the
+/// same.
 pub(super) async fn keep(app: &App, (map, landmark): (String, String), refused: RefusedUpload) {
     let store = app.store.clone();
     // In a task of its own: it is no change in anybody's name, and no answer to a creation.
@@ -141,8 +143,8 @@ fn shown(at: &str, row: RefusedViewRow) -> RefusedView {
     RefusedView { id, refused_ms, by, reason, sentence, advice: advice.to_owned(), view, icon }
 }
 
-/// Lists the photographs of a landmark that uploads refused or its last lesson left out, newest first, each with the reason
-/// and what to do. The newest 50 stay.
+/// Lists the photographs of a landmark that uploads refused or its last lesson left out, newest
+/// first, each with the reason and what to do. The newest 50 stay.
 #[utoipa::path(get, path = "/maps/{map}/landmarks/{landmark}/refused-views", operation_id = "listRefusedViews",
     tag = "landmarks",
     params(("map" = String, Path), ("landmark" = String, Path)),

@@ -31,8 +31,9 @@ fn missing(need: MissingCondition) -> MissingConditionBody {
     }
 }
 
-/// Where a robot may be that sees only things which look like several landmarks: places with covariance and probability,
-/// and what is missing before one of them is its pose. The answers to its frames say the same (`hypotheses`).
+/// Where a robot may be that sees only things which look like several landmarks: places with
+/// covariance and probability, and what is missing before one of them is its pose. The answers to
+/// its frames say the same (`hypotheses`).
 #[utoipa::path(get, path = "/robots/{robot}/relocalisation", operation_id = "getRelocalisation",
     tag = "robots", params(("robot" = String, Path)),
     responses((status = 200, body = RelocalisationStatus), (status = 404, body = Problem)))]

@@ -25,9 +25,10 @@ pub(super) fn router() -> OpenApiRouter<AppState> {
     OpenApiRouter::new().routes(routes!(tried))
 }
 
-/// Answers the last frames of the map's robots by the map and by the draft, and reports what differs. Nothing is changed, and no
-/// robot is told. Each frame is taken as that of a robot without an earlier pose. The server keeps the frames of stored answers
-/// in memory (`limits.replay_bytes`); after a start there are none.
+/// Answers the last frames of the map's robots by the map and by the draft, and reports what
+/// differs. Nothing is changed, and no robot is told. Each frame is taken as that of a robot
+/// without an earlier pose. The server keeps the frames of stored answers in memory
+/// (`limits.replay_bytes`); after a start there are none.
 #[utoipa::path(post, path = "/maps/{map}/drafts/{draft}/replay", operation_id = "replayDraft", tag = "history",
     params(("map" = String, Path), ("draft" = String, Path), ReplayQuery), responses((status = 200, body = Replay),
     (status = 404, body = Problem, description = "unknown_draft"), (status = 422, body = Problem, description = "out_of_range")))]

@@ -1,4 +1,5 @@
-//! The id of a request: that of the client if it is harmless, or the next number. In: the headers. Out: a [`RequestId`].
+//! The id of a request: that of the client if it is harmless, or the next number. In: the headers.
+//! Out: a [`RequestId`].
 
 use axum::http::{HeaderMap, HeaderName, HeaderValue};
 use std::sync::atomic::{AtomicU64, Ordering};

@@ -1,5 +1,6 @@
-//! How often may be asked over HTTP: by each token, and by each address for requests without a valid token. In: a request, before
-//! its route is looked for. Out: nothing, or 429 with `Retry-After`. The local token is not bound.
+//! How often may be asked over HTTP: by each token, and by each address for requests without a
+//! valid token. In: a request, before its route is looked for. Out: nothing, or 429 with
+//! `Retry-After`. The local token is not bound.
 
 use super::{error::ApiError, peer::Peer};
 use crate::{config::Limits, identity::TokenId};

@@ -1,11 +1,13 @@
-//! Answers to reads of maps, kept until anything is committed or published: pages and robots ask for the same again and again.
-//! In: a read that was authorised. Out: the answer of an earlier equal read by the same token, or a new one, which is kept.
+//! Response cache for reads of maps, valid until the next commit or publication: pages and robots
+//! repeat the same requests. In: an authorised read. Out: the cached answer of an equal read by the
+//! same token, or a new one, which is cached.
 //!
-//! An answer here is a function of committed rows and published snapshots alone. The [`Stamp`] of both is taken before the
-//! rows are read; so an answer that is older than its stamp says is never kept.
+//! An answer here is a function of committed rows and published snapshots alone. The [`Stamp`] of
+//! both is taken before the rows are read; so an answer that is older than its stamp says is never
+//! kept.
 //!
-//! A kept answer is given at the door, before the request has found its route: tokens do not change but by their end, which
-//! is looked at each time, and what is kept was asked by the same token before.
+//! Cache hits are served before routing. A token's rights never change; its expiry is checked on
+//! each hit.
 
 use super::{App, AppState, authorise::Caller, safe_headers};
 use crate::identity::TokenId;
@@ -21,7 +23,8 @@ use std::{
     sync::{Mutex, MutexGuard, PoisonError},
 };
 
-/// What is kept, as the router writes it: reads that rest on committed rows and published snapshots alone.
+/// What is kept, as the router writes it: reads that rest on committed rows and published snapshots
+/// alone.
 const REUSED: [&str; 5] = [
     "/api/v1/maps/{map}",
     "/api/v1/maps/{map}/landmarks",
@@ -108,7 +111,8 @@ fn stamp(app: &App) -> Stamp {
     Stamp { commits: app.store.commits(), publications: app.store.snapshots().publications() }
 }
 
-/// The kept answer to a read with this valid token. `None` for everything else: it goes on to its route.
+/// The kept answer to a read with this valid token. `None` for everything else: it goes on to its
+/// route.
 pub(super) fn kept(app: &App, request: &Request, token: TokenId) -> Option<Answer> {
     let path = request.uri().path();
     if request.method() != Method::GET || !BEGINNINGS.iter().any(|beginning| path.starts_with(beginning)) {

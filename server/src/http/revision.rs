@@ -1,4 +1,5 @@
-//! `ETag` and `If-Match`: a change is meant for what its editor has seen, and is refused if somebody was faster.
+//! `ETag` and `If-Match`: a change is meant for what its editor has seen, and is refused if
+//! somebody was faster.
 
 use super::{
     API, AppState,
@@ -20,7 +21,8 @@ use utoipa::openapi::{
 /// Most revisions of one condition.
 const MAX_REVISIONS: usize = 8;
 
-/// What has a revision: its path below [`API`], and the methods that change it. A way back is a change of the map.
+/// What has a revision: its path below [`API`], and the methods that change it. A way back is a
+/// change of the map.
 pub(super) const REVISED: &[(&str, &[&str])] = &[
     ("/maps/{map}", &["patch", "delete"]),
     ("/maps/{map}/walls", &["put"]),

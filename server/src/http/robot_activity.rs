@@ -57,8 +57,8 @@ fn unknown_shown(robot: UnknownRobot) -> api::UnknownRobot {
     }
 }
 
-/// Robots that send messages and are refused because they are not registered, by name: at most 64, those that were heard
-/// last. One that is registered is not among them any more.
+/// Robots that send messages and are refused because they are not registered, by name: at most 64,
+/// those that were heard last. One that is registered is not among them any more.
 #[utoipa::path(get, path = "/unknown-robots", operation_id = "listUnknownRobots",
     tag = "robots", responses((status = 200, body = api::UnknownRobots)))]
 async fn unknown(State(app): State<AppState>) -> Result<Json<api::UnknownRobots>, ApiError> {

@@ -38,9 +38,9 @@ pub(super) fn router() -> OpenApiRouter<AppState> {
     OpenApiRouter::new().routes(routes!(enrol, list)).routes(routes!(revoke))
 }
 
-/// Signs a robot's request for a certificate, with which it connects to the encrypted listener. The robot's private key stays
-/// where it was made. Other connections of robots are interrupted for about a second. A repeat without a key makes another
-/// certificate.
+/// Signs a robot's request for a certificate, with which it connects to the encrypted listener. The
+/// robot's private key stays where it was made. Other connections of robots are interrupted for
+/// about a second. A repeat without a key makes another certificate.
 #[utoipa::path(post, path = "/robots/{robot}/certificates", operation_id = "createCertificate",
     tag = "identity", params(("robot" = String, Path)),
     request_body = CertificateRequest, responses((status = 201, body = EnrolledRobot),
@@ -120,7 +120,8 @@ async fn list(
     Ok(Json(page(rest, limit, total, |row| row.serial.clone(), |row| row)))
 }
 
-/// Revokes a certificate: messages of the robot are refused at once if it has no other, and its connection is closed.
+/// Revokes a certificate: messages of the robot are refused at once if it has no other, and its
+/// connection is closed.
 #[utoipa::path(delete, path = "/robots/{robot}/certificates/{serial}", operation_id = "revokeCertificate",
     tag = "identity",
     params(("robot" = String, Path), ("serial" = String, Path)), responses((status = 204),
@@ -136,8 +137,9 @@ async fn revoke(
     Ok(StatusCode::NO_CONTENT)
 }
 
-/// Waits until robots' connections follow a change of certificates or robots, where they are encrypted: whoever connects after
-/// the answer finds it, and meets no listener that is about to open again.
+/// Waits until robots' connections follow a change of certificates or robots, where they are
+/// encrypted: whoever connects after the answer finds it, and meets no listener that is about to
+/// open again.
 pub(super) async fn access_control(app: &AppState) {
     if app.enrolment.is_some() && !app.store.certificates().applied().await {
         tracing::warn!(follows = "messages of revoked certificates are refused", "access_control_is_late");

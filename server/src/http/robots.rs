@@ -109,8 +109,8 @@ async fn put(
     Ok(Json(robot_shown(row, &app.motion, &app.live)))
 }
 
-/// Lists robots by name, with what is known of each: whether its software is connected, whether a second program uses its
-/// name, its pose, how old that is and how far it is trusted.
+/// Lists robots by name, with what is known of each: whether its software is connected, whether a
+/// second program uses its name, its pose, how old that is and how far it is trusted.
 #[utoipa::path(get, path = "/robots", operation_id = "listRobots", tag = "robots", params(ListQuery),
     responses((status = 200, body = Page<Robot>),
     (status = 422, body = Problem, description = "out_of_range, invalid_value: it is sorted by name only")))]
@@ -166,10 +166,11 @@ async fn delete(
     Ok(StatusCode::NO_CONTENT)
 }
 
-/// What the robot's pose rests on, and what became of its fixes: by landmarks that were named without the pose
-/// (`landmarks`), by landmarks that were named by the pose (`guided`), and by laser scans laid on the map's walls (`laser`).
-/// A guided fix corrects a pose that the others support; it never starts, supports or replaces one. Since the server
-/// started; the latest 200 of each modality.
+/// What the robot's pose rests on, and what became of its fixes: by landmarks that were named
+/// without the pose (`landmarks`), by landmarks that were named by the pose (`guided`), and by
+/// laser scans laid on the map's walls (`laser`). A guided fix corrects a pose that the others
+/// support; it never starts, supports or replaces one. Since the server started; the latest 200 of
+/// each modality.
 #[utoipa::path(get, path = "/robots/{robot}/corrections", operation_id = "listCorrections",
     tag = "robots", params(("robot" = String, Path)),
     responses((status = 200, body = CorrectionsBody), (status = 404, body = Problem)))]

@@ -1,4 +1,5 @@
-//! Operations that add data are refused while the disk of the data directory is nearly full; all others go on.
+//! Operations that add data are refused while the disk of the data directory is nearly full; all
+//! others go on.
 
 use super::{API, AppState, error::ApiError};
 use axum::{
@@ -7,8 +8,8 @@ use axum::{
     response::{IntoResponse, Response},
 };
 
-/// What adds data that may be large or many: method and path below [`API`]. Whatever else changes something is small, bounded,
-/// takes away or mends.
+/// What adds data that may be large or many: method and path below [`API`]. Whatever else changes
+/// something is small, bounded, takes away or mends.
 const ADDING: &[(&str, &str)] = &[
     ("POST", "/backups"),
     ("POST", "/bundles"),

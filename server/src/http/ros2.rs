@@ -14,8 +14,8 @@ pub(super) fn router() -> OpenApiRouter<AppState> {
     OpenApiRouter::new().routes(routes!(ros2))
 }
 
-/// What became of the messages of a robot of ROS 2 since the start: how many came and went on each topic, and what was
-/// not used for which reason.
+/// What became of the messages of a robot of ROS 2 since the start: how many came and went on each
+/// topic, and what was not used for which reason.
 #[utoipa::path(get, path = "/robots/{robot}/ros2", operation_id = "getRos2Status",
     tag = "robots", params(("robot" = String, Path)),
     responses((status = 200, body = Ros2Status), (status = 404, body = Problem)))]

@@ -114,7 +114,8 @@ impl Service {
     pub(crate) async fn answer(self, request: Request) -> Response {
         let Self { app, routes } = self;
         let panics = app.store.vitals().panics();
-        // The guard is no layer: what it answers itself costs neither a copy of the routes nor a look for one of them.
+        // The guard is no layer: what it answers itself costs neither a copy of the routes nor a
+        // look for one of them.
         let inner = |request| async move {
             match AssertUnwindSafe(routes.oneshot(request)).catch_unwind().await {
                 Ok(Ok(response)) => response,
@@ -146,7 +147,8 @@ fn routes(app: &AppState) -> Router {
         .with_state(app.clone())
 }
 
-/// Around every operation. One layer and not three: each layer copies all that is below it, for each request.
+/// Around every operation. One layer and not three: each layer copies all that is below it, for
+/// each request.
 pub(super) async fn operation(State(app): State<AppState>, request: Request, next: Next) -> Response {
     let route = request.extensions().get::<MatchedPath>().cloned();
     let mut response = admitted(&app, request, next).await;

@@ -1,5 +1,5 @@
-//! What every answer tells a browser that it must not do with it. In: the headers of an answer, with its content type. Out: the
-//! same with a policy.
+//! What every answer tells a browser that it must not do with it. In: the headers of an answer,
+//! with its content type. Out: the same with a policy.
 
 use super::API;
 use axum::http::{HeaderMap, HeaderName, HeaderValue, header};
@@ -16,7 +16,8 @@ const OF_DOCS: HeaderValue = HeaderValue::from_static(
     "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; \
      connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
 );
-/// What is no page loads nothing, wherever a browser shows it: a floor plan in SVG is somebody's upload.
+/// What is no page loads nothing, wherever a browser shows it: a floor plan in SVG is somebody's
+/// upload.
 const OF_DATA: HeaderValue = HeaderValue::from_static("default-src 'none'; frame-ancestors 'none'");
 const NOSNIFF: HeaderValue = HeaderValue::from_static("nosniff");
 const NO_REFERRER: HeaderValue = HeaderValue::from_static("no-referrer");
@@ -25,7 +26,8 @@ const RESOURCE_POLICY: HeaderName = HeaderName::from_static("cross-origin-resour
 
 /// Sets them. `path` is that of the request.
 pub(super) fn set(headers: &mut HeaderMap, path: &str) {
-    // "Not modified" has no type, and its headers replace those that the browser keeps with the page.
+    // "Not modified" has no type, and its headers replace those that the browser keeps with the
+    // page.
     let is_html = |kind: &HeaderValue| kind.as_bytes().starts_with(b"text/html");
     let is_page = headers.get(header::CONTENT_TYPE).map_or(!path.starts_with(API), is_html);
     let policy = match (is_page, path.starts_with("/api/docs")) {

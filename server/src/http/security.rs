@@ -1,4 +1,5 @@
-//! What the authorisation table says, in the OpenAPI document: the way to send a token, and the role that each operation needs.
+//! What the authorisation table says, in the OpenAPI document: the way to send a token, and the
+//! role that each operation needs.
 
 use crate::identity::authorisation::{Access, Scope, access};
 use utoipa::openapi::{
@@ -11,7 +12,8 @@ const SCHEME: &str = "token";
 /// What stands beside the role where a token for all maps is needed.
 const ALL_MAPS: &str = "all_maps";
 
-/// Says of every operation that needs a token which role is needed, and whether the token must be for all maps.
+/// Says of every operation that needs a token which role is needed, and whether the token must be
+/// for all maps.
 pub(super) fn with_security(mut document: OpenApi, root: &str) -> OpenApi {
     let scheme =
         HttpBuilder::new().scheme(HttpAuthScheme::Bearer).bearer_format("wmk_ID_SECRET").description(Some(

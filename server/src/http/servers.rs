@@ -10,8 +10,8 @@ pub(super) fn router() -> OpenApiRouter<AppState> {
     OpenApiRouter::new().routes(routes!(servers))
 }
 
-/// This server and those that share its router, with their maps, and what more than one of them has. A server that is its own
-/// router is alone.
+/// This server and those that share its router, with their maps, and what more than one of them
+/// has. A server that is its own router is alone.
 #[utoipa::path(get, path = "/servers", operation_id = "listServers",
     tag = "health", responses((status = 200, body = Servers)))]
 async fn servers(State(app): State<AppState>) -> Json<Servers> {

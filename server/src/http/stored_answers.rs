@@ -47,8 +47,8 @@ fn summary(row: AnswerRow) -> StoredAnswerSummary {
     }
 }
 
-/// Lists stored answers to frames, newest first. Of each camera the first answer of every kind is stored, and one in ten
-/// seconds; at most one a second. The newest `limits.stored_answers` stay.
+/// Lists stored answers to frames, newest first. Of each camera the first answer of every kind is
+/// stored, and one in ten seconds; at most one a second. The newest `limits.stored_answers` stay.
 #[utoipa::path(get, path = "/answers", operation_id = "listAnswers", tag = "recognition", params(StoredAnswerQuery),
     responses((status = 200, body = Page<StoredAnswerSummary>),
     (status = 422, body = Problem, description = "out_of_range, invalid_value")))]
@@ -76,8 +76,9 @@ async fn list(
     Ok(Json(page(rows, limit, total, |row| row.id.to_string(), summary)))
 }
 
-/// One stored answer: quads, the candidates with their distances and thresholds, the gates that refused, the poses, that before
-/// the frame, too, and for each quad the paths of its icon and of those of the candidates, and matched points.
+/// One stored answer: quads, the candidates with their distances and thresholds, the gates that
+/// refused, the poses, that before the frame, too, and for each quad the paths of its icon and of
+/// those of the candidates, and matched points.
 #[utoipa::path(get, path = "/answers/{answer}", operation_id = "getAnswer",
     tag = "recognition", params(("answer" = i64, Path)),
     responses((status = 200, body = StoredAnswer), (status = 404, body = Problem)))]

@@ -205,8 +205,9 @@ async fn hold_writer(store: &Catalogue) -> tokio::sync::oneshot::Sender<()> {
     release
 }
 
-/// The caller hangs up at several points between the reading of the recording and the write. The write never begins
-/// before that, because the writer is held, so the drive must still be there each time.
+/// The caller hangs up at several points between the reading of the recording and the write. The
+/// write never begins before that, because the writer is held, so the drive must still be there
+/// each time.
 #[tokio::test(flavor = "multi_thread")]
 async fn a_recorded_drive_outlives_a_client_that_hangs_up() {
     let service = Service::start(Limits::default()).await;
@@ -323,8 +324,8 @@ async fn a_known_path_may_be_as_long_as_it_is_promised() {
     assert_eq!((status, &problem["code"]), (422, &"too_many".into()), "{problem}");
 }
 
-/// A robot whose odometry says that it is 7 m less far than it is: a frame a second with the landmark of this number, that
-/// puts it there.
+/// A robot whose odometry says that it is 7 m less far than it is: a frame a second with the
+/// landmark of this number, that puts it there.
 fn framed(service: &Service, seconds: u64, (landmark, x_m): (u64, f64)) {
     use engine::motion::{FrameFixes, FrameStamp};
     use map::{

@@ -1,7 +1,8 @@
-//! Places for requests with large bodies. In: who sends one. Out: a place among all, and one among their own, or 503.
+//! Places for requests with large bodies. In: who sends one. Out: a place among all, and one among
+//! their own, or 503.
 //!
-//! One token holds at most half of the places, and so does one address without a valid token: whoever sends slowly, until the
-//! deadline of the request, leaves the other half to others.
+//! One token holds at most half of the places, and so does one address without a valid token:
+//! whoever sends slowly, until the deadline of the request, leaves the other half to others.
 
 use super::{error::ApiError, peer::Peer, request_rates::site};
 use crate::identity::TokenId;

@@ -1,4 +1,5 @@
-//! `/maps/{map}/landmarks/{landmark}/views`: photographs to learn from, each with the corners of the landmark.
+//! `/maps/{map}/landmarks/{landmark}/views`: photographs to learn from, each with the corners of
+//! the landmark.
 
 use super::{
     App, AppState,
@@ -95,12 +96,13 @@ enum LandmarkRegion {
     Corners(Corners),
 }
 
-/// Adds a view. Without corners the server looks for the landmark itself and takes the one dominant quad; if there is
-/// none or more than one, the refusal lists what it saw. The same picture with the same corners a second time is
-/// answered with 200 and the view that is there; so is a near-duplicate of a view, which is not stored, as it would teach
-/// nothing (`outcome` says which). With `create` the landmark is made, too, if there is none of this name: nothing is made
-/// where the view is refused. A size is set where the landmark has none by hand; another one is refused, and so is one whose
-/// ratio of sides the photographs contradict.
+/// Adds a view. Without corners the server looks for the landmark itself and takes the one dominant
+/// quad; if there is none or more than one, the refusal lists what it saw. The same picture with
+/// the same corners a second time is answered with 200 and the view that is there; so is a
+/// near-duplicate of a view, which is not stored, as it would teach nothing (`outcome` says which).
+/// With `create` the landmark is made, too, if there is none of this name: nothing is made where
+/// the view is refused. A size is set where the landmark has none by hand; another one is refused,
+/// and so is one whose ratio of sides the photographs contradict.
 #[utoipa::path(post, path = "/maps/{map}/landmarks/{landmark}/views", operation_id = "createView", tag = "landmarks",
     params(("map" = String, Path), ("landmark" = String, Path)),
     request_body(content = NewViewForm, content_type = "multipart/form-data"),
@@ -178,7 +180,8 @@ async fn repeated(app: &App, at: (String, String), reason: &'static str, (view, 
     refused_views::keep(app, at, RefusedUpload { reason, view: Some(view), picture: Some(seen) }).await;
 }
 
-/// Tells readers of events that the views of a landmark are others: that makes no new version of the map.
+/// Tells readers of events that the views of a landmark are others: that makes no new version of
+/// the map.
 fn tell_changed(app: &App, (map, landmark): (String, String)) {
     let change = LandmarkChange::Changed;
     app.store.events().tell(ServerEventBody::LandmarkChanged { map, landmark, change });
@@ -250,7 +253,8 @@ fn prepare(
     view_of(app, bytes, (&picture, capture), extent).map_err(of_photograph)
 }
 
-/// The view of a decoded photograph. The mounting of its camera says which corner of a quad is the top-left one.
+/// The view of a decoded photograph. The mounting of its camera says which corner of a quad is the
+/// top-left one.
 fn view_of(
     app: &App,
     bytes: &Bytes,

@@ -49,8 +49,8 @@ fn name_of(map: &MapSnapshot, id: LandmarkId) -> String {
     map.landmarks.get(&id).map(|l| l.name.clone()).unwrap_or_default()
 }
 
-/// The area on the floor from which a landmark is seen, as a GeoJSON feature in map metres: by the map's camera
-/// (`/maps/{map}/visibility-settings`), or by another for this question.
+/// The area on the floor from which a landmark is seen, as a GeoJSON feature in map metres: by the
+/// map's camera (`/maps/{map}/visibility-settings`), or by another for this question.
 #[utoipa::path(get, path = "/maps/{map}/landmarks/{landmark}/visibility", operation_id = "getLandmarkVisibility",
     tag = "landmarks",
     params(("map" = String, Path), ("landmark" = String, Path), VisibilitySettingsBody), responses(
@@ -123,7 +123,8 @@ fn visible_from(
     Ok(VisibleResponse { map_version: map.version, landmarks: seen })
 }
 
-/// Which landmarks are seen along a path, and where none is. The robot drives forward and pans its camera.
+/// Which landmarks are seen along a path, and where none is. The robot drives forward and pans its
+/// camera.
 #[utoipa::path(post, path = "/maps/{map}/coverage", operation_id = "computeCoverage",
     tag = "maps", params(("map" = String, Path)),
     request_body = CoverageRequest, responses((status = 200, body = CoverageResponse), (status = 404, body = Problem),
@@ -181,8 +182,9 @@ fn aim(map: &MapSnapshot, c: &GazeTarget) -> GazeTargetBody {
     }
 }
 
-/// Which landmarks are worth looking at from a pose, best first, with the pan and tilt that centre them. Robots ask over
-/// zenoh (`rpc/gaze`) and are kept to one landmark until another is clearly better; this question leaves no trace.
+/// Which landmarks are worth looking at from a pose, best first, with the pan and tilt that centre
+/// them. Robots ask over zenoh (`rpc/gaze`) and are kept to one landmark until another is clearly
+/// better; this question leaves no trace.
 #[utoipa::path(post, path = "/maps/{map}/gaze", operation_id = "rankGaze",
     tag = "maps", params(("map" = String, Path)),
     request_body = GazeQueryBody, responses((status = 200, body = GazeRankingBody), (status = 404, body = Problem),

@@ -1,5 +1,5 @@
-//! The camera that looks for a map's landmarks, and what counts as seen: the setting of each map, and others for one
-//! question.
+//! The camera that looks for a map's landmarks, and what counts as seen: the setting of each map,
+//! and others for one question.
 
 use super::{
     AppState,
@@ -115,8 +115,8 @@ async fn get(
     Ok(Revised(visibility_settings::revision(settings), shown(settings)))
 }
 
-/// Says which camera looks for a map's landmarks; what is absent is that of a usual robot. The areas of all landmarks are
-/// made anew and are those of the map's next version.
+/// Says which camera looks for a map's landmarks; what is absent is that of a usual robot. The
+/// areas of all landmarks are made anew and are those of the map's next version.
 #[utoipa::path(put, path = "/maps/{map}/visibility-settings", operation_id = "setVisibilitySettings",
     tag = "maps", params(("map" = String, Path)), request_body = VisibilitySettingsBody,
     responses((status = 200, body = VisibilitySettingsBody), (status = 404, body = Problem),
@@ -141,8 +141,8 @@ async fn put(
 
 pub(super) type Areas = BTreeMap<LandmarkId, Arc<VisibilityMap>>;
 
-/// The areas that a question asks for: the map's own, or those for another camera of the landmarks that `near` (the place,
-/// and how far it could be seen) says may matter.
+/// The areas that a question asks for: the map's own, or those for another camera of the landmarks
+/// that `near` (the place, and how far it could be seen) says may matter.
 pub(super) fn areas(
     map: &MapSnapshot,
     other: Option<&VisibilitySettings>,

@@ -1,4 +1,5 @@
-//! `/maps/{map}/walls`: the walls, replaced and read as a whole; and those of a file, before any is stored.
+//! `/maps/{map}/walls`: the walls, replaced and read as a whole; and those of a file, before any is
+//! stored.
 
 use super::{
     AppState,
@@ -74,7 +75,8 @@ async fn get(
     Ok(Revised(revision, WallsBody { segments: stored.into_iter().map(shown).collect() }))
 }
 
-/// Reads the walls of another program's file, and stores nothing: to be looked at before they replace any.
+/// Reads the walls of another program's file, and stores nothing: to be looked at before they
+/// replace any.
 #[utoipa::path(post, path = "/maps/{map}/walls/read", operation_id = "readWallFile",
     tag = "maps", params(("map" = String, Path), WallFileQuery),
     request_body(content = Vec<u8>, content_type = "application/octet-stream"),

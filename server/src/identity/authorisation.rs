@@ -1,5 +1,5 @@
-//! The authorisation table: what each operation of the HTTP interface needs. An operation without a row is refused, and
-//! fails a test. `docs/AUTHORISATION.md` is made of it.
+//! The authorisation table: what each operation of the HTTP interface needs. An operation without a
+//! row is refused, and fails a test. `docs/AUTHORISATION.md` is made of it.
 
 use super::Principal;
 use protos::api::Role::{self, Admin, Operator, Robot, Teacher, Viewer};
@@ -94,7 +94,8 @@ pub(crate) const TABLE: &[Rule] = &[
     map("PATCH", "/maps/{map}", Operator),
     map("DELETE", "/maps/{map}", Admin),
     server("POST", "/maps/{map}/copies", Operator),
-    // All photographs of a place at once, with what surrounds the landmarks, and much work: more than looking at one.
+    // All photographs of a place at once, with what surrounds the landmarks, and much work: more
+    // than looking at one.
     map("GET", "/maps/{map}/bundle", Teacher),
     server("POST", "/bundles", Operator),
     map("GET", "/maps/{map}/transform", Viewer),
@@ -210,8 +211,8 @@ pub(crate) fn access(method: &str, path: &str) -> Option<Access> {
     BY_PATH.get(path)?.iter().find(|rule| rule.method == method).map(|rule| rule.access)
 }
 
-/// Why a principal may not do what it asks for. What it may not see looks to it as what does not exist, which is not
-/// decided here.
+/// Why a principal may not do what it asks for. What it may not see looks to it as what does not
+/// exist, which is not decided here.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Forbidden {
     /// The operation needs this role.

@@ -1,5 +1,6 @@
-//! The file `local-token` in the data directory: an administrator's token for programs of this user on this machine.
-//! It is written anew at each start, readable by its owner alone, and removed at the end.
+//! The file `local-token` in the data directory: an administrator's token for programs of this user
+//! on this machine. It is written anew at each start, readable by its owner alone, and removed at
+//! the end.
 
 use super::{
     private_file,
@@ -41,8 +42,8 @@ pub(crate) struct LocalToken {
 }
 
 impl LocalToken {
-    /// Writes a fresh token for the server on this port. A full disk or a read-only one does not keep the server from starting:
-    /// then the file comes later ([`LocalToken::write_again`]).
+    /// Writes a fresh token for the server on this port. A full disk or a read-only one does not
+    /// keep the server from starting: then the file comes later ([`LocalToken::write_again`]).
     pub(crate) fn write(data: &Path, port: u16) -> Result<Self, LocalTokenError> {
         let secret = Secret::random()?;
         let text = TokenText::local(port, &secret);
@@ -54,7 +55,8 @@ impl LocalToken {
         let text = format!("{text}\n");
         let written = match private_file::write(&path, &text) {
             Err(error) if error.kind() == io::ErrorKind::StorageFull => {
-                // That of an earlier start opens nothing any more, and its place is as large. Fails where there is none.
+                // That of an earlier start opens nothing any more, and its place is as large. Fails
+                // where there is none.
                 drop(fs::remove_file(&path));
                 private_file::write(&path, &text)
             }

@@ -1,8 +1,10 @@
-//! Who asks and what they may do. In: credentials of a request. Out: a [`Principal`], or the reason why there is none.
+//! Who asks and what they may do. In: credentials of a request. Out: a [`Principal`], or the reason
+//! why there is none.
 //!
-//! A principal is known by a token (of the database, or the local one of this start) or by a session of the page, which
-//! stands for the token that opened it and outlives a restart. Tokens are read from memory ([`registry`]); the publication fills it after each
-//! commit, so a revoked token is refused by the next request.
+//! A principal is known by a token (of the database, or the local one of this start) or by a
+//! session of the page, which stands for the token that opened it and outlives a restart. Tokens
+//! are read from memory ([`registry`]); the publication fills it after each commit, so a revoked
+//! token is refused by the next request.
 //!
 //! The server's own certificate and those of robots come of [`certificates`].
 

@@ -1,4 +1,5 @@
-//! Random secrets and the texts of tokens. Neither is ever shown by `Debug`; only digests are stored and compared.
+//! Random secrets and the texts of tokens. Neither is ever shown by `Debug`; only digests are
+//! stored and compared.
 
 use base64::{Engine as _, prelude::BASE64_URL_SAFE_NO_PAD};
 use protos::credentials::{self, LOCAL_PREFIX, TOKEN_PREFIX, TokenOf};
@@ -61,7 +62,8 @@ pub(crate) struct TokenText {
 }
 
 impl TokenText {
-    /// `wmk_{number}_{secret}`; of a local token `wmk_local-{port}_{secret}`. `None` for everything else.
+    /// `wmk_{number}_{secret}`; of a local token `wmk_local-{port}_{secret}`. `None` for everything
+    /// else.
     pub(crate) fn parse(text: &str) -> Option<Self> {
         let (of, secret) = credentials::token(text)?;
         let id = match of {
@@ -76,8 +78,9 @@ impl TokenText {
         format!("{TOKEN_PREFIX}{id}_{}", secret.expose())
     }
 
-    /// The text of the local token of a server that listens on this port. A client compares the port with the one that
-    /// it asks: a program on another port cannot make it send a token that is meant for this server.
+    /// The text of the local token of a server that listens on this port. A client compares the
+    /// port with the one that it asks: a program on another port cannot make it send a token that
+    /// is meant for this server.
     pub(crate) fn local(port: u16, secret: &Secret<32>) -> String {
         format!("{TOKEN_PREFIX}{LOCAL_PREFIX}{port}_{}", secret.expose())
     }

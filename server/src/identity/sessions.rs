@@ -1,6 +1,7 @@
-//! Sessions of the page, in memory: opened by a code that is valid once or by a token, ended by logging out, by age, or
-//! with the token that opened them. Codes and cookies are found by their digests. The store keeps the sessions for the next
-//! start (`store/page_sessions.rs`); a code ends with the server.
+//! Sessions of the page, in memory: opened by a code that is valid once or by a token, ended by
+//! logging out, by age, or with the token that opened them. Codes and cookies are found by their
+//! digests. The store keeps the sessions for the next start (`store/page_sessions.rs`); a code ends
+//! with the server.
 
 use super::{
     TokenId,

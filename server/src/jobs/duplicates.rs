@@ -1,8 +1,9 @@
-//! Landmarks that look like one in use. In: models whose icons the thresholds do not separate, with their places. Out: the
-//! landmarks of the lesson that are refused, each with the one that it looks like.
+//! Landmarks that look like one in use. In: models whose icons the thresholds do not separate, with
+//! their places. Out: the landmarks of the lesson that are refused, each with the one that it looks
+//! like.
 //!
-//! Two landmarks at different places are two objects: a known pose tells them apart, and both stay. Otherwise nothing ever
-//! would, so the newer one is refused and the one in use stays as it is.
+//! Two landmarks at different places are two objects: a known pose tells them apart, and both stay.
+//! Otherwise nothing ever would, so the newer one is refused and the one in use stays as it is.
 
 use super::{look_alikes::LookAlike, negatives::Negatives};
 use map::place::LandmarkPlace;
@@ -26,8 +27,8 @@ pub(super) struct Suspect {
     pub(super) was_in_use: bool,
 }
 
-/// Of the taught landmarks those that look like one that stays. Landmarks outside of the lesson stay, then those that were in
-/// use, then the one with the lowest number.
+/// Of the taught landmarks those that look like one that stays. Landmarks outside of the lesson
+/// stay, then those that were in use, then the one with the lowest number.
 pub(super) fn refused(
     suspects: &[Suspect],
     negatives: &Negatives,
@@ -63,8 +64,8 @@ fn takes(landmark: &Suspect, other: &Suspect, negatives: &Negatives, p: &Params)
     add_negatives(&landmark.model, negatives.of(other.model.id), p).overlaps_others()
 }
 
-/// Whether both have places, at which they cannot be one object: farther apart than half the longer side, or facing away from
-/// one another.
+/// Whether both have places, at which they cannot be one object: farther apart than half the longer
+/// side, or facing away from one another.
 fn are_apart(a: &Suspect, b: &Suspect) -> bool {
     let Some((a, b)) = a.place.zip(b.place) else { return false };
     let reach_m = |l: &LandmarkPlace| 0.5 * l.size.width_m.max(l.size.height_m);

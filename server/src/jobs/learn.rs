@@ -1,8 +1,10 @@
-//! A lesson: learns models of some or all landmarks of a map. In: stored training views. Out: models, thresholds and the end
-//! of the job in one commit. The work runs on threads of its own, off the runtime; each decodes one stored picture at a time.
+//! A lesson: learns models of some or all landmarks of a map. In: stored training views. Out:
+//! models, thresholds and the end of the job in one commit. The work runs on threads of its own,
+//! off the runtime; each decodes one stored picture at a time.
 //!
-//! Negatives are collected once for all landmarks. Landmarks that are not in the lesson keep their models and get the new
-//! icons as further negatives. A landmark that looks like one in use is refused (`duplicates`), and changes no other.
+//! Negatives are collected once for all landmarks. Landmarks that are not in the lesson keep their
+//! models and get the new icons as further negatives. A landmark that looks like one in use is
+//! refused (`duplicates`), and changes no other.
 
 use super::{
     JobError, ProgressReporter,
@@ -168,8 +170,9 @@ fn targets(
     Ok(ids)
 }
 
-/// Passes over the landmarks, each over all threads: views with their points, negatives, models, thresholds. The thresholds
-/// are fitted a second time where landmarks are refused: their icons are negatives of nobody.
+/// Passes over the landmarks, each over all threads: views with their points, negatives, models,
+/// thresholds. The thresholds are fitted a second time where landmarks are refused: their icons are
+/// negatives of nobody.
 fn compute(m: &Material, reporter: &ProgressReporter) -> Result<Learnt, JobError> {
     let inputs = each_of(&m.targets, m.workers, reporter, (0.0, 0.3, "views"), |id| learning_input(m, *id))?;
     let of_targets = || m.targets.iter().copied();
@@ -215,8 +218,8 @@ fn fit(
     })?;
     let others: Vec<LandmarkId> =
         m.snapshot.learnt.keys().filter(|id| !m.targets.contains(id)).copied().collect();
-    // A landmark that is learnt again is added a second time, and its older icons stay: thresholds only become stricter.
-    // Learning the whole map resets them.
+    // A landmark that is learnt again is added a second time, and its older icons stay: thresholds
+    // only become stricter. Learning the whole map resets them.
     let refitted = each_of(&others, m.workers, reporter, (0.9, 0.99, "thresholds of the others"), |id| {
         m.targets.iter().fold(LandmarkModel::clone(&m.snapshot.learnt[id].model), |model, target| {
             add_negatives(&model, negatives.of(*target), p)
@@ -321,7 +324,8 @@ fn collect_negatives(
             if let Some(views) = views.get(id) {
                 return spread(views, count).map(|v| prepare(&v.icon)).collect();
             }
-            // Not in the lesson: its photographs and, where those are few, the exemplars of its model.
+            // Not in the lesson: its photographs and, where those are few, the exemplars of its
+            // model.
             let photographs = spread(&m.views[id], count).map(|l| prepare(&l.crop.icon));
             let learnt =
                 m.snapshot.learnt.get(id).into_iter().flat_map(|l| l.model.features(&m.params.recognise));

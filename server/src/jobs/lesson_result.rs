@@ -1,4 +1,5 @@
-//! What a lesson comes to: models, thresholds, refusals. It is stored in one commit with the end of the job.
+//! What a lesson comes to: models, thresholds, refusals. It is stored in one commit with the end of
+//! the job.
 
 use super::look_alikes::LookAlike;
 use crate::{
@@ -38,7 +39,8 @@ pub(super) struct Learnt {
     pub(super) left_out: BTreeMap<LandmarkId, Vec<SkippedView>>,
 }
 
-/// Stores models, thresholds and the end of the job. Errors: `Changed` where the job was cancelled meanwhile.
+/// Stores models, thresholds and the end of the job. Errors: `Changed` where the job was cancelled
+/// meanwhile.
 pub(super) async fn commit(
     store: &Catalogue,
     map: MapRow,

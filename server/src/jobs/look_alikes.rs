@@ -1,5 +1,5 @@
-//! Look-alikes among the models of a map, by pairs. In: a model and the icons of the other landmarks. Out: the landmarks whose
-//! icons limit its threshold, so that a person can check them.
+//! Look-alikes among the models of a map, by pairs. In: a model and the icons of the other
+//! landmarks. Out: the landmarks whose icons limit its threshold, so that a person can check them.
 
 use super::negatives::Negatives;
 use vision::{
@@ -11,14 +11,16 @@ use vision::{
 /// Look-alikes of one landmark that are named: the most similar.
 const MAX_LOOK_ALIKES: usize = 5;
 
-/// A landmark whose icons are nearer to a model than the threshold that the model would have without look-alikes.
+/// A landmark whose icons are nearer to a model than the threshold that the model would have
+/// without look-alikes.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct LookAlike {
     pub(super) other: LandmarkId,
     pub(super) gradient_similarity: f64,
 }
 
-/// The landmarks that look like `model`, most similar first; none if no negative limits its threshold.
+/// The landmarks that look like `model`, most similar first; none if no negative limits its
+/// threshold.
 pub(super) fn look_alikes(model: &LandmarkModel, negatives: &Negatives, p: &Params) -> Vec<LookAlike> {
     let nearest = model.likeness_evidence.nearest_others.first().map_or(f64::INFINITY, |d| f64::from(*d));
     let reach = p.learn.likeness_cap / p.learn.threshold.nearest_share;

@@ -1,8 +1,9 @@
-//! The life of jobs: long work that is accepted with 202 and stored as a row, so that a crash only delays it. One job runs at
-//! a time, with progress that can be watched and a flag that cancels it. What a job does is in its own file.
+//! The life of jobs: long work that is accepted with 202 and stored as a row, so that a crash only
+//! delays it. One job runs at a time, with progress that can be watched and a flag that cancels it.
+//! What a job does is in its own file.
 //!
-//! The next job is the first open row whose pause is over. A job that the end of the process interrupted starts again after a
-//! pause, and fails after [`MAX_ATTEMPTS`].
+//! The next job is the first open row whose pause is over. A job that the end of the process
+//! interrupted starts again after a pause, and fails after [`MAX_ATTEMPTS`].
 
 pub(crate) mod duplicates;
 mod learn;
@@ -81,8 +82,9 @@ pub(crate) enum JobError {
 
 /// How often a job starts that ends the process each time.
 const MAX_ATTEMPTS: u32 = 5;
-/// The server runs for this long before a job that was interrupted once starts again; twice as long for each further time.
-/// So the server can be used, and the job cancelled, even if the job ends the process each time.
+/// The server runs for this long before a job that was interrupted once starts again; twice as long
+/// for each further time. So the server can be used, and the job cancelled, even if the job ends
+/// the process each time.
 const PAUSE: Duration = Duration::from_secs(1);
 /// Pause after a failed read or write of the table.
 const RETRY: Duration = Duration::from_secs(5);
@@ -163,8 +165,8 @@ impl Jobs {
         self.store.events().tell(ServerEventBody::Job { map: row.map.clone(), job: row.id, state });
     }
 
-    /// A job with its progress while it is open. Its row ends in the transaction of its models; here it has ended once those
-    /// are published, so whoever asks next is answered by them.
+    /// A job with its progress while it is open. Its row ends in the transaction of its models;
+    /// here it has ended once those are published, so whoever asks next is answered by them.
     pub(crate) async fn get(&self, id: i64) -> Result<(JobRow, Option<JobProgress>), StoreError> {
         Ok(self.with_progress(jobs::get(self.store.reads(), id).await?))
     }
@@ -215,7 +217,8 @@ impl Jobs {
         let write = self.store.write(move |tx| {
             Box::pin(async move {
                 if jobs::end(tx, id, &cancelled()).await? {
-                    // It may have started meanwhile: then it finds its row ended and stores nothing.
+                    // It may have started meanwhile: then it finds its row ended and stores
+                    // nothing.
                     tx.after(move || {
                         if !jobs.stop_running(id) {
                             jobs.leave(id);

@@ -1,5 +1,6 @@
-//! Negatives of a lesson: icons of every other landmark, evenly chosen, and distractors of the pictures. They are collected
-//! once for the whole lesson, ordered by landmark, so that the icons of one landmark are one range.
+//! Negatives of a lesson: icons of every other landmark, evenly chosen, and distractors of the
+//! pictures. They are collected once for the whole lesson, ordered by landmark, so that the icons
+//! of one landmark are one range.
 
 use crate::store::{
     pictures::Digest,
@@ -15,7 +16,8 @@ use vision::{
     recognise::IconFeatures,
 };
 
-/// Other landmarks' icons compared with each model, about. 300 are needed to speak of 1 % (method 8).
+/// Other landmarks' icons compared with each model, about. 300 are needed to speak of 1 % (method
+/// 8).
 const WANTED: usize = 2_000;
 /// Icons of one landmark at least, however many landmarks there are.
 const EACH_MIN: usize = 3;
@@ -90,8 +92,9 @@ impl Negatives {
         }
     }
 
-    /// `model` with the distractors as negatives, except those that are as near as its own views are to one another: those show
-    /// the landmark itself, in the background of another landmark's picture.
+    /// `model` with the distractors as negatives, except those that are as near as its own views
+    /// are to one another: those show the landmark itself, in the background of another landmark's
+    /// picture.
     pub(super) fn with_distractors(&self, model: &LandmarkModel, p: &Params) -> LandmarkModel {
         let own = &model.correlation_evidence.own;
         let near = own.get(own.len() / 2).map_or(0.0, |d| f64::from(*d));

@@ -11,7 +11,8 @@ pub(crate) struct Request {
     /// Names; `None` means every landmark that has views.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) landmarks: Option<Vec<String>>,
-    /// Views generated from each photograph; `None` fills up to thirty views where photographs are few.
+    /// Views generated from each photograph; `None` fills up to thirty views where photographs are
+    /// few.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) generated_views: Option<usize>,
 }

@@ -13,9 +13,9 @@ use std::{
 /// A thread that leaves its place to robots looks so often whether they still need it.
 const STANDING_BACK: Duration = Duration::from_millis(100);
 
-/// `work` on every item, over `threads` threads, results in the order of the items. Progress goes from and to the
-/// given shares. For a thread of the class `Background`, whose priority the threads inherit. While robots are served, half of
-/// them stand back between two items.
+/// `work` on every item, over `threads` threads, results in the order of the items. Progress goes
+/// from and to the given shares. For a thread of the class `Background`, whose priority the threads
+/// inherit. While robots are served, half of them stand back between two items.
 pub(super) fn each_of<T: Sync, R: Send>(
     items: &[T],
     threads: usize,

@@ -1,5 +1,6 @@
-//! Requests over HTTP by method, route and status, and how long they took. In: each request, when it is answered. Out: counts
-//! and histograms. Routes are those of the router, not what clients write, so the number of series is bounded.
+//! Requests over HTTP by method, route and status, and how long they took. In: each request, when
+//! it is answered. Out: counts and histograms. Routes are those of the router, not what clients
+//! write, so the number of series is bounded.
 
 use engine::histogram::Times;
 use std::{
@@ -8,7 +9,8 @@ use std::{
     time::Duration,
 };
 
-/// Most series: beyond it, requests are counted under [`OTHER`]. Routes times a few statuses are fewer.
+/// Most series: beyond it, requests are counted under [`OTHER`]. Routes times a few statuses are
+/// fewer.
 const MAX_SERIES: usize = 2048;
 /// The route of what matches none: pages, and addresses that do not exist.
 pub(crate) const OTHER: &str = "other";

@@ -1,6 +1,6 @@
-//! Metrics for Prometheus: what the counters of the server say at one time. In: the parts of the server. Out: the text of
-//! `GET /metrics`. Nothing is counted here but requests; names begin with `waymark_`, those of the process as exporters of
-//! Prometheus name them.
+//! Metrics for Prometheus: what the counters of the server say at one time. In: the parts of the
+//! server. Out: the text of `GET /metrics`. Nothing is counted here but requests; names begin with
+//! `waymark_`, those of the process as exporters of Prometheus name them.
 
 mod exposition;
 pub(crate) mod http_times;

@@ -1,5 +1,5 @@
-//! What the process takes of its machine, and how full its disk is. Reads `/proc` and asks the file system: not for an async
-//! thread. What a system does not tell is left out.
+//! What the process takes of its machine, and how full its disk is. Reads `/proc` and asks the file
+//! system: not for an async thread. What a system does not tell is left out.
 
 use super::exposition::Exposition;
 use std::{

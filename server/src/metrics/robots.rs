@@ -1,4 +1,5 @@
-//! Metrics of robots, frames and maps. Series by robot and by map are those of the registered ones, which the settings bound.
+//! Metrics of robots, frames and maps. Series by robot and by map are those of the registered ones,
+//! which the settings bound.
 
 use super::exposition::Exposition;
 use crate::http::App;

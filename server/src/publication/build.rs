@@ -1,6 +1,6 @@
-//! Builds the next version of a map from rows. What has not changed is taken over from the version before: walls by their
-//! version number, models by their digests, visibility areas by place, walls and camera. A damaged or outdated model is named
-//! and left out, never matched.
+//! Builds the next version of a map from rows. What has not changed is taken over from the version
+//! before: walls by their version number, models by their digests, visibility areas by place, walls
+//! and camera. A damaged or outdated model is named and left out, never matched.
 
 use crate::store::{
     StoreError,
@@ -24,7 +24,8 @@ use vision::{
     recognise::DistanceKind,
 };
 
-/// The current version of a map as it is in the database, without what is derived from it; `None` if the map is gone.
+/// The current version of a map as it is in the database, without what is derived from it; `None`
+/// if the map is gone.
 pub(super) async fn snapshot(
     conn: &mut SqliteConnection,
     id: i64,
@@ -166,7 +167,8 @@ fn look_alikes(kind: DistanceKind, same_models: Option<&MapSnapshot>) -> (Arc<Lo
 
 type Visibility = BTreeMap<LandmarkId, Arc<VisibilityMap>>;
 
-/// The visibility areas that are still those of their landmarks, and whether others are to be computed.
+/// The visibility areas that are still those of their landmarks, and whether others are to be
+/// computed.
 fn visibility(
     landmarks: &BTreeMap<LandmarkId, LandmarkInfo>,
     head: &MapHead,
@@ -191,7 +193,8 @@ fn visibility(
 
 type Models = (BTreeMap<LandmarkId, StoredModel>, BTreeMap<LandmarkId, String>);
 
-/// Models of a map, read only where the digest is not that of the previous snapshot; and those that must not be used.
+/// Models of a map, read only where the digest is not that of the previous snapshot; and those that
+/// must not be used.
 async fn models(
     conn: &mut SqliteConnection,
     map_id: i64,
@@ -247,7 +250,8 @@ pub(super) mod tests {
     use std::cell::RefCell;
 
     thread_local! {
-        /// Where building a snapshot panics on this thread: the name of a map, or what is read of it.
+        /// Where building a snapshot panics on this thread: the name of a map, or what is read of
+        /// it.
         static PLANTED: RefCell<Option<String>> = const { RefCell::new(None) };
     }
 

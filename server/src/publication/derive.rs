@@ -1,7 +1,7 @@
-//! Derives data from a version of a map, off the runtime and outside of the writer: visibility areas, then look-alike classes.
-//! Each is published as soon as it is computed, as the same version of the map with more data. If a newer version replaces it
-//! meanwhile, that version takes over what still holds. Areas are stored when they are published, so that a start computes none
-//! again.
+//! Derives data from a version of a map, off the runtime and outside of the writer: visibility
+//! areas, then look-alike classes. Each is published as soon as it is computed, as the same version
+//! of the map with more data. If a newer version replaces it meanwhile, that version takes over
+//! what still holds. Areas are stored when they are published, so that a start computes none again.
 
 use super::{build::digests, visibility_areas as areas};
 use crate::store::{
@@ -32,7 +32,8 @@ pub(super) async fn run(
 ) {
     let pulse = vitals.begin(PART);
     let mut last = Last::new();
-    // Versions whose classes could not be derived: they stay pending, and the next version tries again.
+    // Versions whose classes could not be derived: they stay pending, and the next version tries
+    // again.
     let mut failed: BTreeMap<String, u64> = BTreeMap::new();
     loop {
         tokio::select! {
@@ -109,9 +110,10 @@ async fn with_areas(
     panics.ended(Edge::Publication, what, follows, made).ok()
 }
 
-/// `map` with one more kind of derived data, and areas that are to be stored. The next version tries again what fails. Until then, areas that fail are left
-/// out, since whoever waits for areas would wait for ever. Look-alike classes that fail stay pending: without them a known
-/// pose names nothing.
+/// `map` with one more kind of derived data, and areas that are to be stored. The next version
+/// tries again what fails. Until then, areas that fail are left out, since whoever waits for areas
+/// would wait for ever. Look-alike classes that fail stay pending: without them a known pose names
+/// nothing.
 async fn derived(
     map: Arc<MapSnapshot>,
     before: Option<Arc<MapSnapshot>>,
@@ -156,7 +158,8 @@ fn look_alikes(map: &MapSnapshot, before: Option<&MapSnapshot>) -> Arc<LookAlike
 pub(super) mod planting {
     use std::sync::{Mutex, PoisonError};
 
-    /// Derivations that panic: name of the map, and what is derived. Tests that plant use maps of their own names.
+    /// Derivations that panic: name of the map, and what is derived. Tests that plant use maps of
+    /// their own names.
     static PLANTED: Mutex<Vec<(&str, &str)>> = Mutex::new(Vec::new());
 
     /// Plants a panic.

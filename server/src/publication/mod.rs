@@ -1,9 +1,11 @@
-//! Publication: makes committed rows the snapshots that the workers read. In: changes from the store's writer. Out: the next
-//! version of a map in [`Snapshots`], and after it the data derived from that version.
+//! Publication: makes committed rows the snapshots that the workers read. In: changes from the
+//! store's writer. Out: the next version of a map in [`Snapshots`], and after it the data derived
+//! from that version.
 //!
-//! The order is commit -> [`build`] -> publish -> acknowledge; only what has changed is read again. Visibility areas and
-//! look-alike classes take longer: [`derive`] computes them outside the writer and publishes the same version once more. Until
-//! then they are absent ([`MapSnapshot::pending`]), never out of date.
+//! The order is commit -> [`build`] -> publish -> acknowledge; only what has changed is read again.
+//! Visibility areas and look-alike classes take longer: [`derive`] computes them outside the writer
+//! and publishes the same version once more. Until then they are absent ([`MapSnapshot::pending`]),
+//! never out of date.
 
 mod build;
 mod derive;

@@ -1,7 +1,7 @@
 //! Publishes the stored version of a map after each commit.
 //!
-//! A map that cannot be published stops nothing: its previous version stays in use (none at the start), the log and `/readyz`
-//! name the map, and the next write to it tries again.
+//! A map that cannot be published stops nothing: its previous version stays in use (none at the
+//! start), the log and `/readyz` name the map, and the next write to it tries again.
 
 use super::build;
 use crate::{
@@ -80,7 +80,8 @@ impl Publisher {
         Ok(())
     }
 
-    /// Publishes a map. Errors: `NotPublished` if it cannot be built; any other means that the database cannot be read.
+    /// Publishes a map. Errors: `NotPublished` if it cannot be built; any other means that the
+    /// database cannot be read.
     async fn map(&self, conn: &mut SqliteConnection, id: i64) -> Result<(), StoreError> {
         // Unwind safety: a panic drops the unfinished snapshot.
         let panics = self.vitals.panics();

@@ -57,7 +57,8 @@ async fn what_is_acknowledged_is_published_and_survives() {
     assert_eq!(landmarks::get(store.reads(), "a", "p1").await.unwrap().geometry, new);
 }
 
-/// Another connection, such as that of a backup program, keeps SQLite from emptying the log when the writer's closes.
+/// Another connection, such as that of a backup program, keeps SQLite from emptying the log when
+/// the writer's closes.
 #[tokio::test]
 async fn after_a_clean_stop_the_file_alone_holds_everything() {
     use sqlx::{ConnectOptions as _, sqlite::SqliteConnectOptions};

@@ -1,5 +1,6 @@
-//! Visibility areas of a map's landmarks. An area of an earlier snapshot is taken over where neither the camera, the landmark's
-//! place nor an obstacle within its reach has changed; so is a stored one whose inputs have the same digest.
+//! Visibility areas of a map's landmarks. An area of an earlier snapshot is taken over where
+//! neither the camera, the landmark's place nor an obstacle within its reach has changed; so is a
+//! stored one whose inputs have the same digest.
 
 use crate::store::{StoreError, visibility_areas::StoredArea};
 use engine::snapshot::MapSnapshot;
@@ -71,7 +72,8 @@ fn taken_over(
     missing
 }
 
-/// Adds the missing areas: those that are stored, and new ones for the others, which it gives as they are to be stored.
+/// Adds the missing areas: those that are stored, and new ones for the others, which it gives as
+/// they are to be stored.
 pub(super) fn complete(
     areas: &mut Areas,
     missing: Vec<Missing>,

@@ -6,7 +6,8 @@ use std::{
     sync::{Mutex, MutexGuard, PoisonError},
 };
 
-/// Most different reasons that are counted of a robot: topics times words, both bounded by the settings and the program.
+/// Most different reasons that are counted of a robot: topics times words, both bounded by the
+/// settings and the program.
 const MAX_REASONS: usize = 512;
 
 /// Shared by the robot's thread and zenoh's.

@@ -1,8 +1,8 @@
-//! The robot's graph as its liveliness tokens tell it, and the server's node in it. In: tokens that appear and go. Out:
-//! tokens to declare, and keys to send on.
+//! The robot's graph as its liveliness tokens tell it, and the server's node in it. In: tokens that
+//! appear and go. Out: tokens to declare, and keys to send on.
 //!
-//! With `rmw_zenoh` the server is a node: with a subscription for each publisher of a wanted topic, which lets publishers
-//! of images begin, and with a publisher for each topic that it sends on.
+//! With `rmw_zenoh` the server is a node: with a subscription for each publisher of a wanted topic,
+//! which lets publishers of images begin, and with a publisher for each topic that it sends on.
 
 use super::{outputs::Outgoing, wire::Wire};
 use crate::config::{Middleware, Ros2Robot};
@@ -15,7 +15,8 @@ use ros2::{
 };
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Most publishers of wanted topics that are remembered of a robot, and most subscriptions that are declared.
+/// Most publishers of wanted topics that are remembered of a robot, and most subscriptions that are
+/// declared.
 const MAX_PUBLISHERS: usize = 128;
 /// Numbers of entities that each robot's node has for itself in the server's session.
 const IDS_PER_ROBOT: u64 = 10_000;
@@ -31,7 +32,8 @@ pub(super) struct Follows {
     pub(super) declare: Vec<String>,
     /// The robot came (true) or went.
     pub(super) presence: Option<bool>,
-    /// A wanted topic, by its place in the settings, of which a publisher with another type was seen: that type.
+    /// A wanted topic, by its place in the settings, of which a publisher with another type was
+    /// seen: that type.
     pub(super) other_type: Option<(usize, String)>,
 }
 
@@ -51,7 +53,8 @@ pub(super) struct Graph {
 }
 
 impl Graph {
-    /// The graph before any token, with the tokens to declare. `index` is the robot's place among all of the session.
+    /// The graph before any token, with the tokens to declare. `index` is the robot's place among
+    /// all of the session.
     pub(super) fn new(
         robot: &Ros2Robot,
         zid: &str,

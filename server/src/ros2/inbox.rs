@@ -1,5 +1,5 @@
-//! What waits for the thread of one robot: messages and tokens of the robot, answers and poses for it. Bounded; whoever
-//! puts something in never waits.
+//! What waits for the thread of one robot: messages and tokens of the robot, answers and poses for
+//! it. Bounded; whoever puts something in never waits.
 
 use protos::{Name, v1};
 use std::{
@@ -66,8 +66,8 @@ impl Inbox {
         Ok(())
     }
 
-    /// An image: only the newest of a topic waits, and images wait until everything else is done, so that transforms
-    /// and odometry that came before them are there.
+    /// An image: only the newest of a topic waits, and images wait until everything else is done,
+    /// so that transforms and odometry that came before them are there.
     pub(super) fn put_image(&self, topic: usize, image: Sample) -> Result<(), Dropped> {
         let mut waiting = self.lock();
         if waiting.is_closed {

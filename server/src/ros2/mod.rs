@@ -1,8 +1,10 @@
-//! Robots of ROS 2, served on the router's own session: no bridge process beside `rmw_zenoh`. In: topics and liveliness
-//! tokens of each configured robot. Out: its frames, odometry and scans, to the same intake as those of native robots;
-//! and poses, transforms and detections on topics of the robot.
+//! Robots of ROS 2, served on the router's own session: no bridge process beside `rmw_zenoh`. In:
+//! topics and liveliness tokens of each configured robot. Out: its frames, odometry and scans, to
+//! the same intake as those of native robots; and poses, transforms and detections on topics of the
+//! robot.
 //!
-//! Each robot has one thread and one bounded inbox. Callbacks of zenoh put samples there and never wait.
+//! Each robot has one thread and one bounded inbox. Callbacks of zenoh put samples there and never
+//! wait.
 
 mod counts;
 mod inbox;

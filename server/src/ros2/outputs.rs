@@ -1,7 +1,7 @@
 //! What a robot of ROS gets for an answer or a fused pose. Pure: messages in, payloads out.
 //!
-//! Without a pose there is no message, and every pose has a covariance. Nothing is said of a fused pose that no landmark
-//! supports or that one contradicts.
+//! Without a pose there is no message, and every pose has a covariance. Nothing is said of a fused
+//! pose that no landmark supports or that one contradicts.
 
 use crate::config::{PoseSource, Ros2Outputs};
 use nalgebra::{Isometry3, Matrix3};
@@ -17,7 +17,8 @@ use ros2::{
     robot::{RobotAdapter, RobotSettings},
 };
 
-/// A jump of `map_from_odom` by more than this, metres, or by [`JUMP_RAD`], between supported poses is a relocalisation.
+/// A jump of `map_from_odom` by more than this, metres, or by [`JUMP_RAD`], between supported poses
+/// is a relocalisation.
 const JUMP_M: f64 = 0.5;
 /// See [`JUMP_M`]; radians.
 const JUMP_RAD: f64 = 0.35;
@@ -143,7 +144,8 @@ impl Outputs {
     fn transform(&mut self, map_from_odom: &Isometry3<f64>, robot: &RobotAdapter) -> Option<Outgoing> {
         let ahead_ns = self.settings.map_to_odom_ahead_ns?;
         let newest_ns = robot.newest_odometry_ns()?;
-        // A stamp that is not newer would be refused by tf2; one far back means that the robot's clock was set.
+        // A stamp that is not newer would be refused by tf2; one far back means that the robot's
+        // clock was set.
         let since_ns = self.last_transform_ns.map_or(i64::MAX, |last| newest_ns.saturating_sub(last));
         if (0..TRANSFORM_PERIOD_NS).contains(&since_ns) {
             return None;
@@ -191,8 +193,8 @@ fn detection<'a>(header: Header<'a>, quad: &'a v1::QuadAnswer) -> Detection2D<'a
     Detection2D { header, results: vec![result], bbox, id: &quad.landmark }
 }
 
-/// Waymark's covariances are over (rotation, translation), those of ROS over (translation, rotation); both perturb the
-/// rotation about the axes of the camera and the position by itself.
+/// Waymark's covariances are over (rotation, translation), those of ROS over (translation,
+/// rotation); both perturb the rotation about the axes of the camera and the position by itself.
 fn landmark_pose(pose: &v1::LandmarkPose) -> Option<PoseWithCovariance> {
     let camera_from_landmark = geometry::pose3(pose.camera_from_landmark.as_ref()?).ok()?;
     let ours: &[f64; 36] = pose.covariance.as_slice().try_into().ok()?;

@@ -1,5 +1,5 @@
-//! The thread of one robot: what it receives becomes messages of Waymark, and goes the way of those of native robots;
-//! answers and poses become messages of ROS.
+//! The thread of one robot: what it receives becomes messages of Waymark, and goes the way of those
+//! of native robots; answers and poses become messages of ROS.
 
 use super::{
     counts::Counters,

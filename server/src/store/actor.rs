@@ -1,5 +1,5 @@
-//! On whose behalf a write is made. In: the request or the work that a task does. Out: what the audit log and the history of
-//! maps name.
+//! On whose behalf a write is made. In: the request or the work that a task does. Out: what the
+//! audit log and the history of maps name.
 
 use std::{future::Future, sync::Arc};
 

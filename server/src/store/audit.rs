@@ -1,9 +1,10 @@
-//! The audit log: who changed what, in a chain of digests. In: every transaction that has changed something. Out: its entry
-//! in the same transaction, pages of entries, and whether the chain is whole.
+//! The audit log: who changed what, in a chain of digests. In: every transaction that has changed
+//! something. Out: its entry in the same transaction, pages of entries, and whether the chain is
+//! whole.
 //!
-//! The digest of an entry is SHA-256 over the digest before it, `seq`, `time_ms`, `actor`, `token`, `action`, `target` and
-//! `request`: numbers as 8 bytes little-endian, texts as their length in bytes (so, too) and their bytes, an absent value as
-//! the length `u64::MAX`.
+//! The digest of an entry is SHA-256 over the digest before it, `seq`, `time_ms`, `actor`, `token`,
+//! `action`, `target` and `request`: numbers as 8 bytes little-endian, texts as their length in
+//! bytes (so, too) and their bytes, an absent value as the length `u64::MAX`.
 
 use super::{StoreError, Tx, actor::Actor, now_ms, pictures::hex, statements::statements};
 use futures::TryStreamExt as _;
@@ -29,7 +30,8 @@ statements! {
              AND (?3 IS NULL OR time_ms >= ?3) AND (?4 IS NULL OR time_ms < ?4)";
 }
 
-/// Most entries that one transaction forgets: after `limits.audit_entries` was lowered, there may be many.
+/// Most entries that one transaction forgets: after `limits.audit_entries` was lowered, there may
+/// be many.
 const FORGOTTEN_AT_ONCE: u64 = 16;
 
 /// SHA-256.
@@ -191,7 +193,8 @@ pub(crate) async fn count(db: impl SqliteExecutor<'_>, filter: &AuditFilter) -> 
     Ok(count as u64)
 }
 
-/// Computes the digest of every entry anew. An entry that was `noted` elsewhere has to have its digest still.
+/// Computes the digest of every entry anew. An entry that was `noted` elsewhere has to have its
+/// digest still.
 pub(crate) async fn check(
     conn: &mut SqliteConnection,
     noted: Option<ChainLink>,

@@ -1,5 +1,6 @@
-//! The write-ahead log: written anew at the start, and moved into the file. SQLite would move it by itself after a commit, and
-//! tell nobody of an error in it; so it is told not to, and the store does it.
+//! The write-ahead log: written anew at the start, and moved into the file. SQLite would move it by
+//! itself after a commit, and tell nobody of an error in it; so it is told not to, and the store
+//! does it.
 
 use super::StoreError;
 use sqlx::SqliteConnection;
@@ -15,9 +16,10 @@ pub(super) const LOG_PAGES: i64 = 1000;
 /// Bytes that are written anew at a time.
 const PIECE_BYTES: usize = 1 << 20;
 
-/// Writes the log as it is once more, in its place, and syncs it. Before the database is opened: after an error of the disk the
-/// log may hold a commit that can be read and is not on the disk, since Linux takes pages whose sync has failed for clean. What
-/// is written after it would be lost with it by a power cut, and a file into which it was moved would be damaged.
+/// Writes the log as it is once more, in its place, and syncs it. Before the database is opened:
+/// after an error of the disk the log may hold a commit that can be read and is not on the disk,
+/// since Linux takes pages whose sync has failed for clean. What is written after it would be lost
+/// with it by a power cut, and a file into which it was moved would be damaged.
 pub(super) fn renew_log(log: &Path) -> io::Result<()> {
     let mut file = match File::options().read(true).write(true).open(log) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
@@ -39,7 +41,8 @@ pub(super) fn renew_log(log: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// Moves a log of at least `pages` pages into the file, as far as nobody reads it. Waits for nobody.
+/// Moves a log of at least `pages` pages into the file, as far as nobody reads it. Waits for
+/// nobody.
 pub(super) async fn move_long_log(conn: &mut SqliteConnection, pages: i64) -> Result<(), StoreError> {
     let at = || StoreError::during("look at the log");
     // Busy, pages of the log, pages that are in the file.
@@ -52,8 +55,8 @@ pub(super) async fn move_long_log(conn: &mut SqliteConnection, pages: i64) -> Re
     moved.map(drop).map_err(StoreError::during("move the log into the file"))
 }
 
-/// Moves the whole log into the file and empties it, so that the file alone is complete. Waits for readers. False: one still
-/// reads, and the log stays.
+/// Moves the whole log into the file and empties it, so that the file alone is complete. Waits for
+/// readers. False: one still reads, and the log stays.
 pub(super) async fn empty_log(conn: &mut SqliteConnection) -> Result<bool, sqlx::Error> {
     let busy: i64 = sqlx::query_scalar("PRAGMA wal_checkpoint(TRUNCATE)").fetch_one(conn).await?;
     Ok(busy == 0)

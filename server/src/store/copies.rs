@@ -1,7 +1,8 @@
-//! Copies of the database. In: the data directory of a running server, or a file. Out: a file with one committed state, or
-//! what a file holds and what is wrong with it.
+//! Copies of the database. In: the data directory of a running server, or a file. Out: a file with
+//! one committed state, or what a file holds and what is wrong with it.
 //!
-//! A copy reads one snapshot of the write-ahead log: the writer goes on, and what it commits meanwhile is not in the copy.
+//! A copy reads one snapshot of the write-ahead log: the writer goes on, and what it commits
+//! meanwhile is not in the copy.
 
 use super::{
     StoreError, audit,
@@ -71,7 +72,8 @@ pub(crate) struct Contents {
     pub(crate) pictures: u64,
 }
 
-/// Writes one committed state of the database in `data` to the new file `to`. Returns once it is on the disk.
+/// Writes one committed state of the database in `data` to the new file `to`. Returns once it is on
+/// the disk.
 pub(crate) async fn copy(data: &Path, to: &Path) -> Result<(), StoreError> {
     let at = || StoreError::during("copy the database");
     // SQLite writes into an empty file, and leaves its mode. An error here is one of the copy, too.
@@ -93,7 +95,8 @@ pub(crate) async fn open_file(file: &Path) -> Result<SqliteConnection, StoreErro
     read_options(file).immutable(true).connect().await.map_err(StoreError::during("open the copy"))
 }
 
-/// Reads the whole of a file: what it holds, and what is wrong with it, named. An error means that the reading broke off.
+/// Reads the whole of a file: what it holds, and what is wrong with it, named. An error means that
+/// the reading broke off.
 pub(crate) async fn examine(file: &Path) -> Result<(Contents, Vec<String>), StoreError> {
     let mut conn = open_file(file).await?;
     let mut faults = Vec::new();
@@ -192,8 +195,8 @@ async fn check_models(conn: &mut SqliteConnection, faults: &mut Vec<String>) -> 
     Ok(())
 }
 
-/// Names the views whose picture does not have its digest, unless that was known when the copy was made. Returns the number
-/// of pictures.
+/// Names the views whose picture does not have its digest, unless that was known when the copy was
+/// made. Returns the number of pictures.
 async fn check_pictures(conn: &mut SqliteConnection, faults: &mut Vec<String>) -> Result<u64, StoreError> {
     let at = || StoreError::during("check pictures");
     let (mut after, mut count) = (Vec::new(), 0);

@@ -1,5 +1,6 @@
-//! Claim: a damaged file is refused with the reason, or what is damaged of it is named and not used. Bytes are flipped, pages
-//! zeroed and files cut off, in the database and in the write-ahead log, by fixed seeds.
+//! Claim: a damaged file is refused with the reason, or what is damaged of it is named and not
+//! used. Bytes are flipped, pages zeroed and files cut off, in the database and in the write-ahead
+//! log, by fixed seeds.
 
 use super::{StoreError, landmarks, maps, open::FILE, pictures, teaching, views::NewView};
 use crate::{

@@ -1,9 +1,11 @@
-//! The part of the schema that follows from the tables of `migrations/`: tables of past rows, and the triggers that fill them,
-//! count edits of maps and landmarks, and delete contents that nothing refers to. It is made at the start from the columns that
-//! there are: what a step of the schema adds to a table is in the history.
+//! The part of the schema that follows from the tables of `migrations/`: tables of past rows, and
+//! the triggers that fill them, count edits of maps and landmarks, and delete contents that nothing
+//! refers to. It is made at the start from the columns that there are: what a step of the schema
+//! adds to a table is in the history.
 //!
-//! The first change of a row in a transaction stores it as it was; what changes nothing is no commit. The conflict clause of a
-//! statement also rules in triggers, so they ask whether a row is there.
+//! The first change of a row in a transaction stores it as it was; what changes nothing is no
+//! commit. The conflict clause of a statement also rules in triggers, so they ask whether a row is
+//! there.
 
 use super::{
     history::{CONTENTS, KeptColumn, KeptTable, MAPS, PARTS},
@@ -21,7 +23,8 @@ statements! {
 /// A trigger: its name, and what follows the name in its definition.
 type Trigger = (String, String);
 
-/// Makes what is missing and replaces what is otherwise, in one transaction. Where nothing is, it writes nothing.
+/// Makes what is missing and replaces what is otherwise, in one transaction. Where nothing is, it
+/// writes nothing.
 pub(super) async fn complete(conn: &mut SqliteConnection) -> Result<(), sqlx::Error> {
     let mut tx = conn.begin().await?;
     let mut triggers = Vec::new();
@@ -161,7 +164,8 @@ fn wall_triggers(columns: &[String]) -> [Trigger; 3] {
     })
 }
 
-/// What deletes a content with the last row that refers to it, live or past, also where a cascade deletes that row.
+/// What deletes a content with the last row that refers to it, live or past, also where a cascade
+/// deletes that row.
 fn content_triggers(content: &str, references: &[(String, String)]) -> Vec<Trigger> {
     let trigger = |(name, column): &(String, String)| {
         let unused: Vec<String> = references

@@ -1,8 +1,9 @@
-//! Whether the disk of the data directory has room for more. In: the free space, looked at every [`PERIOD`]. Out: a refusal of
-//! everything that adds data, from before the disk is full until there is room again.
+//! Whether the disk of the data directory has room for more. In: the free space, looked at every
+//! [`PERIOD`]. Out: a refusal of everything that adds data, from before the disk is full until
+//! there is room again.
 //!
-//! Reading, recognition, deletions, revocations and small edits go on. Pages of the database that deletions have freed count
-//! as room, since the file does not shrink and new data take them first.
+//! Reading, recognition, deletions, revocations and small edits go on. Pages of the database that
+//! deletions have freed count as room, since the file does not shrink and new data take them first.
 
 use super::StoreError;
 use crate::config::Limits;
@@ -196,7 +197,8 @@ pub(super) fn is_read_only(data: &Path) -> bool {
     measured(data).is_ok_and(|(.., is_read_only)| is_read_only)
 }
 
-/// Size and free bytes for this user of the file system of a directory, and whether it is read-only.
+/// Size and free bytes for this user of the file system of a directory, and whether it is
+/// read-only.
 #[cfg(unix)]
 fn measured(data: &Path) -> io::Result<(u64, u64, bool)> {
     use rustix::fs::{StatVfsMountFlags, statvfs};

@@ -3,7 +3,8 @@
 use super::{disk_guard::DiskSpace, kind::Kind};
 use vision::pose::LandmarkSize;
 
-/// Why a read or a write did not happen. Nothing was changed, except with [`StoreError::NotPublished`].
+/// Why a read or a write did not happen. Nothing was changed, except with
+/// [`StoreError::NotPublished`].
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum StoreError {
     /// It does not exist.
@@ -89,7 +90,8 @@ pub(crate) enum StoreError {
     /// The write panicked: it was rolled back.
     #[error("the server failed on this write; nothing was changed")]
     Panicked,
-    /// The write is on the disk, but the map cannot be published with it: its previous version stays in use.
+    /// The write is on the disk, but the map cannot be published with it: its previous version
+    /// stays in use.
     #[error("the change is stored, but map `{map}` cannot be made ready with it; see the server's log")]
     NotPublished {
         /// Name of the map.
@@ -154,7 +156,8 @@ const SQLITE_CORRUPT: i32 = 11;
 const SQLITE_FULL: i32 = 13;
 const SQLITE_NOTADB: i32 = 26;
 
-/// SQLite extended result codes of shared memory that cannot be made: it has nothing to do with what is stored.
+/// SQLite extended result codes of shared memory that cannot be made: it has nothing to do with
+/// what is stored.
 const SQLITE_IOERR_SHMOPEN: i32 = 4618;
 const SQLITE_IOERR_SHMSIZE: i32 = 4874;
 const SQLITE_IOERR_SHMMAP: i32 = 5386;
@@ -176,7 +179,8 @@ pub(super) fn is_without_room(error: &sqlx::Error) -> bool {
     ) || primary_code(error) == Some(SQLITE_CANTOPEN)
 }
 
-/// Whether the content of the file is wrong at the place that was read. Reading it again gives the same.
+/// Whether the content of the file is wrong at the place that was read. Reading it again gives the
+/// same.
 pub(super) fn is_damage(error: &sqlx::Error) -> bool {
     matches!(primary_code(error), Some(SQLITE_CORRUPT | SQLITE_NOTADB))
 }
@@ -205,8 +209,8 @@ impl StoreError {
         }
     }
 
-    /// Whether the state on disk is unknown after this. A failed fsync cannot be repeated, since it marks the pages clean. The
-    /// only safe way is to stop, and to open the file again.
+    /// Whether the state on disk is unknown after this. A failed fsync cannot be repeated, since it
+    /// marks the pages clean. The only safe way is to stop, and to open the file again.
     pub(crate) fn is_fatal(&self) -> bool {
         match self {
             Self::Database { source, .. } => {

@@ -1,5 +1,5 @@
-//! Gatherings: which robot gathers views of what, its tracks, and the views of each track, until a person accepts or
-//! discards them (`track_acceptance.rs`).
+//! Gatherings: which robot gathers views of what, its tracks, and the views of each track, until a
+//! person accepts or discards them (`track_acceptance.rs`).
 
 use super::{
     StoreError, Tx,
@@ -214,7 +214,8 @@ pub(crate) async fn open(db: impl SqliteExecutor<'_>) -> Result<Vec<GatheringRow
     rows.iter().map(gathering_row).collect::<Result<_, _>>().map_err(at())
 }
 
-/// Ends a gathering; its tracks wait for a decision, and later views are refused. One that has ended stays as it is.
+/// Ends a gathering; its tracks wait for a decision, and later views are refused. One that has
+/// ended stays as it is.
 pub(crate) async fn end(tx: &mut Tx, map: &str, id: i64, counts: &str) -> Result<GatheringRow, StoreError> {
     let row = get(&mut tx.conn, map, id).await?;
     if !row.open {

@@ -1,8 +1,9 @@
-//! The check of the whole file after each start: every page, every row, and every index against its table. In: the open store.
-//! Out: `running`, `ok`, or what is wrong, for `/readyz`, the metrics and the log.
+//! The check of the whole file after each start: every page, every row, and every index against its
+//! table. In: the open store. Out: `running`, `ok`, or what is wrong, for `/readyz`, the metrics
+//! and the log.
 //!
-//! The start itself compares no indexes (`open`): that reads the file once more, and robots would wait for it. An index that
-//! differs from its table makes a query miss rows, or find others.
+//! The start itself compares no indexes (`open`): that reads the file once more, and robots would
+//! wait for it. An index that differs from its table makes a query miss rows, or find others.
 
 use super::{Store, StoreError, now_ms, statements::statements};
 use protos::api::DatabaseCheckState;
@@ -20,7 +21,8 @@ statements! {
 
 /// Steps of SQLite between two looks at the clock.
 const STEPS: i32 = 2_000;
-/// The check works for this long, then pauses, so that it takes no more than a share of a core and of the disk from robots.
+/// The check works for this long, then pauses, so that it takes no more than a share of a core and
+/// of the disk from robots.
 const WORK: Duration = Duration::from_millis(10);
 const PAUSE: Duration = Duration::from_millis(20);
 
@@ -109,7 +111,8 @@ fn cause(error: &StoreError) -> String {
     std::error::Error::source(error).map_or_else(String::new, |cause| format!(": {cause}"))
 }
 
-/// What is wrong with the file. It is read as one state: the log grows meanwhile by what is written.
+/// What is wrong with the file. It is read as one state: the log grows meanwhile by what is
+/// written.
 async fn faults(store: &Store, stopping: watch::Receiver<bool>) -> Result<Vec<String>, StoreError> {
     let at = || StoreError::during("check the database");
     // A connection of its own: requests keep theirs.

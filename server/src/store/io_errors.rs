@@ -1,6 +1,7 @@
-//! Claim: an error of the disk ends the store. No change is acknowledged that a power cut could take back, and the next start
-//! finds all that was acknowledged, and nothing beside it. The writer runs over a layer below SQLite whose calls fail
-//! (`power_cut`): writes, syncs and truncations of the database and of its log, once or from then on.
+//! Claim: an error of the disk ends the store. No change is acknowledged that a power cut could
+//! take back, and the next start finds all that was acknowledged, and nothing beside it. The writer
+//! runs over a layer below SQLite whose calls fail (`power_cut`): writes, syncs and truncations of
+//! the database and of its log, once or from then on.
 
 use super::{
     landmarks,
@@ -17,7 +18,8 @@ use power_cut::{Call, Disk, IoError, OfFile, Random};
 use sqlx::{ConnectOptions as _, Connection as _, sqlite::SqliteConnectOptions};
 use std::{fs, path::Path, time::Duration};
 
-/// Numbers of calls that fail, of each kind, in each run of the tests and in the long one (`WAYMARK_LONG=1`).
+/// Numbers of calls that fail, of each kind, in each run of the tests and in the long one
+/// (`WAYMARK_LONG=1`).
 const NUMBERS: u64 = 10;
 const LONG_NUMBERS: u64 = 60;
 /// Calls at the start of a server, or at its stop, that fail.
@@ -108,7 +110,8 @@ async fn fail(template: &Path, error: IoError, seed: u64) -> u64 {
     acknowledged
 }
 
-/// The start after a kill. What it finds is on the disk for certain, for it is matched, and what is written next rests on it.
+/// The start after a kill. What it finds is on the disk for certain, for it is matched, and what is
+/// written next rests on it.
 async fn restart(
     left: &Disk,
     dir: &Path,

@@ -84,7 +84,8 @@ pub(super) async fn rename_landmark(tx: &mut Tx, map: &str, name: &str, new: &st
     renamed.map_err(StoreError::during("rename landmark in jobs")).map(drop)
 }
 
-/// Queues a job and deletes the oldest finished ones beyond `retained`. Errors: more than `max` open jobs.
+/// Queues a job and deletes the oldest finished ones beyond `retained`. Errors: more than `max`
+/// open jobs.
 pub(crate) async fn create(
     tx: &mut Tx,
     kind: &'static str,

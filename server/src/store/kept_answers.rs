@@ -1,8 +1,10 @@
-//! Creations with a key (`Idempotency-Key`), and the answers that are kept under their keys. An answer is stored in the
-//! transaction of its change: where there is one, there is the other. A repeat gets the answer and changes nothing.
+//! Creations with a key (`Idempotency-Key`), and the answers that are kept under their keys. An
+//! answer is stored in the transaction of its change: where there is one, there is the other. A
+//! repeat gets the answer and changes nothing.
 //!
-//! The key travels beside the functions that write. [`CreationKey::scope`] puts it into the task, [`answered`] says how the
-//! answer is made of what the write returns, and `Store::write` takes both along to the writer.
+//! The key travels beside the functions that write. [`CreationKey::scope`] puts it into the task,
+//! [`answered`] says how the answer is made of what the write returns, and `Store::write` takes
+//! both along to the writer.
 
 use super::{Store, StoreError, Tx, now_ms, statements::statements};
 use serde::Serialize;
@@ -101,7 +103,8 @@ pub(super) struct IdempotencyRecord {
     answer_of: Arc<AnswerOf>,
 }
 
-/// Does `work`, which writes once and gets a `T` of it. If the request has a key, `answer` to that is kept in the transaction.
+/// Does `work`, which writes once and gets a `T` of it. If the request has a key, `answer` to that
+/// is kept in the transaction.
 pub(crate) async fn answered<T: 'static, R>(
     answer: impl Fn(&T) -> Result<Answer, StoreError> + Send + Sync + 'static,
     work: impl Future<Output = R>,
@@ -156,7 +159,8 @@ impl Store {
         if !self.keys.lock().insert(key.to_owned()) {
             return Err(StoreError::KeyAtWork);
         }
-        // From here on no other request has this key: what it stores was stored before it was at work.
+        // From here on no other request has this key: what it stores was stored before it was at
+        // work.
         let key =
             CreationKey { key: key.to_owned(), request, at_work: self.keys.clone(), max: self.kept_answers };
         let at = || StoreError::during("look for an answer");

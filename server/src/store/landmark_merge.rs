@@ -1,4 +1,5 @@
-//! Two landmarks that are one object become one. In: the names of both. Out: the kept one, with the views of the other.
+//! Two landmarks that are one object become one. In: the names of both. Out: the kept one, with the
+//! views of the other.
 
 use super::{
     Store, StoreError, Tx,
@@ -14,7 +15,8 @@ use crate::store::kind::Kind;
 use std::sync::Arc;
 
 statements! {
-    // Numbers of views are not used again: each gets a new one. The same quad of the same picture counts once.
+    // Numbers of views are not used again: each gets a new one. The same quad of the same picture
+    // counts once.
     COPY_VIEWS = "INSERT INTO views (landmark_id, image_sha256, image_kind, width_px, height_px, corners_px, created_ms, \
                   icon_side, icon_scale, capture, icon) SELECT ?2, v.image_sha256, v.image_kind, v.width_px, v.height_px, \
                   v.corners_px, v.created_ms, v.icon_side, v.icon_scale, v.capture, v.icon FROM views v \
@@ -47,8 +49,9 @@ struct Prepared {
     placement: PlacementOutcome,
 }
 
-/// Moves the views of `from` to `into`, gives it the size and place that it lacks, places it anew unless its place is by
-/// hand, and deletes `from`, all in one transaction. Its model stays until it is learnt again. Errors: `ChangedMeanwhile`, `TooMany`.
+/// Moves the views of `from` to `into`, gives it the size and place that it lacks, places it anew
+/// unless its place is by hand, and deletes `from`, all in one transaction. Its model stays until
+/// it is learnt again. Errors: `ChangedMeanwhile`, `TooMany`.
 pub(crate) async fn merge(store: &Store, merge: Merge) -> Result<LandmarkRow, StoreError> {
     let merge = Arc::new(merge);
     let _turn = store.preparing().await;

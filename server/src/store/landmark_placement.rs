@@ -1,5 +1,6 @@
-//! Placement of landmarks by their views (method 11). In: views with a capture, and the walls of the map or a ceiling of given
-//! height. Out: a place with covariance, or why there is none. A place by hand is never replaced.
+//! Placement of landmarks by their views (method 11). In: views with a capture, and the walls of
+//! the map or a ceiling of given height. Out: a place with covariance, or why there is none. A
+//! place by hand is never replaced.
 
 use super::{
     StoreError, Tx,
@@ -54,8 +55,8 @@ pub(crate) struct StoredCapture {
     /// The landmark is under a ceiling so high, not on a wall.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     ceiling_height_m: Option<f64>,
-    /// Covariance of each corner by the noise of its edges, px^2: (uu, uv, vv), TL TR BR BL. The error of borders is added
-    /// whenever it is used.
+    /// Covariance of each corner by the noise of its edges, px^2: (uu, uv, vv), TL TR BR BL. The
+    /// error of borders is added whenever it is used.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     corner_covariance_px2: Option<[[f64; 3]; 4]>,
 }
@@ -107,7 +108,8 @@ impl StoredCapture {
         self.corner_covariance_px2 = Some(covariance_px2.map(|c| [c.m11, c.m12, c.m22]));
     }
 
-    /// Which corner of a quad, 0 to 3, is the landmark's top-left one. `None` where the mounting does not decide.
+    /// Which corner of a quad, 0 to 3, is the landmark's top-left one. `None` where the mounting
+    /// does not decide.
     pub(crate) fn top_left(&self, corners_px: &Corners) -> Option<usize> {
         let taken = self.checked().ok()?;
         Up::new(taken.extrinsics.camera_up())?.top_left(corners_px, Some(&taken.camera))
@@ -171,7 +173,8 @@ pub(crate) struct PlacementReport {
     pub(crate) placed: bool,
     /// Views with a robot pose that the place rests on.
     pub(crate) views_used: usize,
-    /// Why it was not: `by_hand` (a place by hand stays), or what is wrong with the views, with the residual.
+    /// Why it was not: `by_hand` (a place by hand stays), or what is wrong with the views, with the
+    /// residual.
     pub(crate) reason: Option<String>,
 }
 
@@ -245,13 +248,16 @@ pub(super) async fn put(
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct PlacementPreview {
     pub(crate) place: LandmarkPlace,
-    /// Indices of views that do not agree with the place: they show another border of the same object, or another object.
+    /// Indices of views that do not agree with the place: they show another border of the same
+    /// object, or another object.
     pub(crate) inconsistent: Vec<usize>,
-    /// Angles between the landmark's normal and the direction to the camera in the other views, rad.
+    /// Angles between the landmark's normal and the direction to the camera in the other views,
+    /// rad.
     pub(crate) angles_rad: Vec<f64>,
 }
 
-/// Places a track by its views: corners (px) and the JSON of the capture. A view without a capture agrees with any place.
+/// Places a track by its views: corners (px) and the JSON of the capture. A view without a capture
+/// agrees with any place.
 pub(crate) fn preview<'a>(
     views: impl Iterator<Item = (&'a Corners, Option<&'a str>)>,
     walls: &[LaserSegment],
@@ -286,7 +292,8 @@ fn view((corners, taken): &(Corners, CheckedCapture)) -> PosedView<'_> {
     }
 }
 
-/// A placement by walls, or by the ceiling that the first view states. `used` are indices of `views`.
+/// A placement by walls, or by the ceiling that the first view states. `used` are indices of
+/// `views`.
 fn placed(views: &[(Corners, CheckedCapture)], walls: &[LaserSegment]) -> Result<Placement, PlacementError> {
     let p = PlacementParams::default();
     // The newest view decides between wall and ceiling.

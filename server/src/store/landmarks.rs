@@ -49,7 +49,8 @@ statements! {
     NAME = "SELECT l.name FROM landmarks l JOIN maps m ON m.id = l.map_id WHERE m.name = ?1 AND l.id = ?2";
 }
 
-/// The place of a landmark, as it is stored: centre (map frame, m) and direction of the outward normal (rad).
+/// The place of a landmark, as it is stored: centre (map frame, m) and direction of the outward
+/// normal (rad).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct StoredPlace {
     pub(crate) x_m: f64,
@@ -114,7 +115,8 @@ impl LandmarkGeometry {
         SizeAndPlace { size, place }
     }
 
-    /// The place with its covariance. `None` without a size, or where stored numbers are out of range.
+    /// The place with its covariance. `None` without a size, or where stored numbers are out of
+    /// range.
     pub(crate) fn landmark_place(&self) -> Option<LandmarkPlace> {
         let (size, place) = self.size.zip(self.place)?;
         let centre = Vector3::new(place.x_m, place.y_m, place.z_m);
@@ -285,7 +287,8 @@ pub(crate) async fn create(
     get(&mut tx.conn, &map.name, name).await
 }
 
-/// One landmark by the names of its map and itself. A missing map is not told from a missing landmark.
+/// One landmark by the names of its map and itself. A missing map is not told from a missing
+/// landmark.
 pub(crate) async fn get(
     db: impl SqliteExecutor<'_>,
     map: &str,
@@ -313,7 +316,8 @@ pub(crate) async fn page(
     rows.iter().map(landmark_row).collect::<Result<_, _>>().map_err(StoreError::during("list landmarks"))
 }
 
-/// Sets a landmark's health and its finding, by a person or by robots. A new place or size makes it sound again ([`update`]).
+/// Sets a landmark's health and its finding, by a person or by robots. A new place or size makes it
+/// sound again ([`update`]).
 pub(crate) async fn set_health(
     tx: &mut Tx,
     map: &str,
@@ -354,7 +358,8 @@ pub(crate) async fn update(
     get(&mut tx.conn, &map.name, name).await
 }
 
-/// Gives a landmark another name, also in the jobs that wait for it; returns that name. Errors: `Exists`.
+/// Gives a landmark another name, also in the jobs that wait for it; returns that name. Errors:
+/// `Exists`.
 pub(crate) async fn rename(tx: &mut Tx, map: &str, name: &str, new: &str) -> Result<String, StoreError> {
     let map = maps::get(&mut tx.conn, map).await?;
     let landmark = get(&mut tx.conn, &map.name, name).await?;

@@ -63,7 +63,8 @@ pub(crate) fn links(all: &BTreeMap<String, MapLocation>) -> MapLinks<String> {
     all.iter().filter_map(|(map, location)| Some((map.clone(), location.link.clone()?))).collect()
 }
 
-/// Sets the location of a map. `change` gets the present one and returns the new one. Errors: the links would form a cycle.
+/// Sets the location of a map. `change` gets the present one and returns the new one. Errors: the
+/// links would form a cycle.
 pub(crate) async fn set(
     tx: &mut Tx,
     map: &str,

@@ -85,8 +85,8 @@ pub(crate) async fn head(conn: &mut SqliteConnection, id: i64) -> Result<Option<
     }))
 }
 
-/// The state of each of its landmarks. One row for all of them: reading a row costs more than what is in it, and this is read
-/// after every change of the map.
+/// The state of each of its landmarks. One row for all of them: reading a row costs more than what
+/// is in it, and this is read after every change of the map.
 pub(crate) async fn row_states(conn: &mut SqliteConnection, id: i64) -> Result<Vec<RowState>, StoreError> {
     let states: String = sqlx::query_scalar(ROWS)
         .bind(id)

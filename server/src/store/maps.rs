@@ -124,7 +124,8 @@ pub(crate) async fn page(
     rows.iter().map(map_row).collect::<Result<_, _>>().map_err(StoreError::during("list maps"))
 }
 
-/// Checks that a map was not deleted meanwhile, nor replaced by another of the same name; gives its present row.
+/// Checks that a map was not deleted meanwhile, nor replaced by another of the same name; gives its
+/// present row.
 pub(crate) async fn recheck(tx: &mut Tx, map: MapRow) -> Result<MapRow, StoreError> {
     let now = get(&mut tx.conn, &map.name).await?;
     if now.id == map.id { Ok(now) } else { Err(StoreError::NotFound { what: Kind::Map, name: map.name }) }
@@ -141,7 +142,8 @@ pub(crate) async fn bump(tx: &mut Tx, id: i64) -> Result<(), StoreError> {
     Ok(())
 }
 
-/// Gives a map another name. Errors: `Exists`; `InUse` while a robot, an open job or an open gathering has the present one.
+/// Gives a map another name. Errors: `Exists`; `InUse` while a robot, an open job or an open
+/// gathering has the present one.
 pub(crate) async fn rename(tx: &mut Tx, name: &str, new: &str) -> Result<(), StoreError> {
     let map = get(&mut tx.conn, name).await?;
     if name == new {
@@ -186,8 +188,8 @@ async fn no_robot_on(tx: &mut Tx, map: &MapRow) -> Result<(), StoreError> {
     }
 }
 
-/// Deletes a map and all that is in it. Errors: `InUse` while a robot is on it, another map is linked to it, or it has
-/// a draft.
+/// Deletes a map and all that is in it. Errors: `InUse` while a robot is on it, another map is
+/// linked to it, or it has a draft.
 pub(crate) async fn delete(tx: &mut Tx, name: &str) -> Result<(), StoreError> {
     let map = get(&mut tx.conn, name).await?;
     no_robot_on(tx, &map).await?;

@@ -1,5 +1,6 @@
-//! The steps from an empty database to the present schema: the files of `migrations/`, compiled in. Applied files are
-//! checksummed and never edited. A list and not `sqlx::migrate!`: the macro builds SQLite a second time, for the compiler.
+//! The steps from an empty database to the present schema: the files of `migrations/`, compiled in.
+//! Applied files are checksummed and never edited. A list and not `sqlx::migrate!`: the macro
+//! builds SQLite a second time, for the compiler.
 
 use sqlx::{
     SqlSafeStr as _,

@@ -1,8 +1,9 @@
 //! Everything durable, in one SQLite file: maps, landmarks, views, models, walls, robots, jobs.
 //!
-//! One task owns the only connection that writes ([`writer`]); reads take a separate, read-only pool. Every SQL text
-//! is a constant of its file and is prepared by a test against the migrated schema. One listener learns of every commit
-//! ([`on_commit`]); the store knows it by its trait alone.
+//! One task owns the only connection that writes ([`writer`]); reads take a separate, read-only
+//! pool. Every SQL text is a constant of its file and is prepared by a test against the migrated
+//! schema. One listener learns of every commit ([`on_commit`]); the store knows it by its trait
+//! alone.
 
 pub(crate) mod disk_guard;
 mod error;
@@ -110,7 +111,8 @@ pub(crate) struct WriterTask {
     task: tokio::task::JoinHandle<()>,
     close: oneshot::Sender<()>,
     reads: SqlitePool,
-    /// Held for as long as the writer runs: a second server on the same directory would be a second writer.
+    /// Held for as long as the writer runs: a second server on the same directory would be a second
+    /// writer.
     _lock: std::fs::File,
 }
 
@@ -135,8 +137,8 @@ impl WriterTask {
 }
 
 impl Store {
-    /// Opens or creates the database under `config.data`, migrates it, checks its settings and its integrity, and tells
-    /// `on_commit` of everything in it.
+    /// Opens or creates the database under `config.data`, migrates it, checks its settings and its
+    /// integrity, and tells `on_commit` of everything in it.
     pub(crate) async fn open(
         config: &Config,
         on_commit: Arc<dyn OnCommit>,
@@ -187,9 +189,10 @@ impl Store {
         &self.last_check
     }
 
-    /// Runs `write` in its own transaction. When this returns `Ok`, it is committed and visible. A caller that drops this
-    /// future before the transaction begins takes the write back; later it runs to its end. The answer to a creation with a key
-    /// is kept in the same transaction ([`kept_answers`]), and so is the entry of the audit log ([`audit`]).
+    /// Runs `write` in its own transaction. When this returns `Ok`, it is committed and visible. A
+    /// caller that drops this future before the transaction begins takes the write back; later it
+    /// runs to its end. The answer to a creation with a key is kept in the same transaction
+    /// ([`kept_answers`]), and so is the entry of the audit log ([`audit`]).
     pub(crate) async fn write<T, F>(&self, write: F) -> Result<T, StoreError>
     where
         T: Send + 'static,
@@ -229,7 +232,8 @@ impl Store {
         WriteQueue { waiting, last_wait: Duration::from_millis(self.probe_ms.load(Ordering::Relaxed)) }
     }
 
-    /// The turn to prepare a write from stored data: one at a time, so that no preparation makes another obsolete.
+    /// The turn to prepare a write from stored data: one at a time, so that no preparation makes
+    /// another obsolete.
     async fn preparing(&self) -> MutexGuard<'_, ()> {
         self.turn.lock().await
     }
@@ -244,7 +248,8 @@ impl Store {
         &self.reads
     }
 
-    /// How many writes were committed since the store was opened. A write is counted before it is acknowledged.
+    /// How many writes were committed since the store was opened. A write is counted before it is
+    /// acknowledged.
     pub(crate) fn commits(&self) -> u64 {
         self.commits.load(Ordering::Acquire)
     }
@@ -260,7 +265,8 @@ impl Store {
     }
 }
 
-/// Writes the newest place of the audit log to the server's own log: a note outside of the database.
+/// Writes the newest place of the audit log to the server's own log: a note outside of the
+/// database.
 async fn note_head(conn: &mut SqliteConnection, at: &str) -> Result<(), StoreError> {
     let head = AuditHead::from(audit::head(conn).await?);
     tracing::info!(seq = head.seq, sha256 = head.sha256, at, "audit_head");
@@ -277,7 +283,8 @@ fn within(count: i64, max: usize, what: &'static str) -> Result<(), StoreError> 
     if count as usize > max { Err(StoreError::Limit { what, max }) } else { Ok(()) }
 }
 
-/// The revision of a text: its digest, so that what is shown and what is stored can be compared wherever they are read.
+/// The revision of a text: its digest, so that what is shown and what is stored can be compared
+/// wherever they are read.
 fn text_revision(text: &str) -> String {
     let digest = Sha256::digest(text.as_bytes());
     digest[..12].iter().fold(String::new(), |mut hex, byte| {

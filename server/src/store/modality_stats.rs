@@ -161,8 +161,8 @@ pub(crate) async fn delete(tx: &mut Tx, map: &str, id: i64) -> Result<(), StoreE
     maps::bump(tx, map.id).await
 }
 
-/// Count of a map's reference runs, and the beginning of the digest of their numbers: runs never change and their numbers are
-/// never used for others.
+/// Count of a map's reference runs, and the beginning of the digest of their numbers: runs never
+/// change and their numbers are never used for others.
 pub(crate) async fn run_numbers(
     conn: &mut sqlx::SqliteConnection,
     map_id: i64,

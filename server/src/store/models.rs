@@ -1,5 +1,5 @@
-//! Models as bytes, stored once under their digest. The store does not interpret them. The schema deletes bytes with the last
-//! row that refers to them, of today or of a kept commit.
+//! Models as bytes, stored once under their digest. The store does not interpret them. The schema
+//! deletes bytes with the last row that refers to them, of today or of a kept commit.
 
 use super::{StoreError, Tx, kind::Kind, landmarks::ModelSummary, statements::statements};
 use sha2::{Digest as _, Sha256};
@@ -82,8 +82,8 @@ pub(crate) async fn refused(
     Ok(ids.into_iter().map(|id| LandmarkId(id as u64)).collect())
 }
 
-/// Landmark and digest of every model of a map, without those of refused landmarks. One row for all of them, as of the
-/// landmarks' revisions.
+/// Landmark and digest of every model of a map, without those of refused landmarks. One row for all
+/// of them, as of the landmarks' revisions.
 pub(crate) async fn digests(
     db: impl SqliteExecutor<'_>,
     map_id: i64,

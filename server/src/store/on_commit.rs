@@ -27,8 +27,9 @@ pub(crate) enum CommittedChange {
     },
 }
 
-/// Makes committed data visible. The writer calls it between commit and acknowledgement, so it is short: long computations
-/// come later. `NotPublished` is an answer to the caller of the write; any other error stops the store.
+/// Makes committed data visible. The writer calls it between commit and acknowledgement, so it is
+/// short: long computations come later. `NotPublished` is an answer to the caller of the write; any
+/// other error stops the store.
 pub(crate) trait OnCommit: Send + Sync + std::fmt::Debug {
     /// The store is open: everything in it is new.
     fn opened<'c>(&'c self, conn: &'c mut SqliteConnection) -> BoxFuture<'c, Result<(), StoreError>>;

@@ -1,5 +1,6 @@
-//! Opens the database: one writer connection and a read-only pool, with settings that survive a power cut. Each setting is
-//! read back. Errors: a SQLite with the write-ahead-log corruption bug, a damaged file, a second server.
+//! Opens the database: one writer connection and a read-only pool, with settings that survive a
+//! power cut. Each setting is read back. Errors: a SQLite with the write-ahead-log corruption bug,
+//! a damaged file, a second server.
 
 use sqlx::{
     ConnectOptions, Connection as _, Row, SqliteConnection, SqlitePool,
@@ -17,7 +18,8 @@ use super::{
 };
 use crate::private_file::{self, OpenToOthers};
 
-/// First version without the write-ahead-log corruption of 3.7.0 to 3.51.2 (sqlite.org/wal.html#walresetbug).
+/// First version without the write-ahead-log corruption of 3.7.0 to 3.51.2
+/// (sqlite.org/wal.html#walresetbug).
 pub(crate) const SQLITE_MIN: (u32, u32, u32) = (3, 51, 3);
 /// Connections that read at a time.
 const READERS: u32 = 4;
@@ -97,12 +99,13 @@ pub(super) struct Opened {
     pub(super) lock: File,
 }
 
-/// Layer of SQLite that keeps the index of the write-ahead log in memory and not in a file. It needs the file for itself, as
-/// the lock of the data directory gives it.
+/// Layer of SQLite that keeps the index of the write-ahead log in memory and not in a file. It
+/// needs the file for itself, as the lock of the data directory gives it.
 const WITHOUT_SHARED_MEMORY: &str = "unix-excl";
 
-/// Opens the database in `data` for reading and writing. A full disk does not keep it from opening: where there is no room for
-/// the file of the log's index, the index is in memory. On a read-only file system it opens for reading alone.
+/// Opens the database in `data` for reading and writing. A full disk does not keep it from opening:
+/// where there is no room for the file of the log's index, the index is in memory. On a read-only
+/// file system it opens for reading alone.
 pub(super) async fn open(data: &Path, vfs: Option<&'static str>) -> Result<Opened, OpenError> {
     if disk_guard::is_read_only(data) {
         return open_read_only(data).await;
@@ -129,13 +132,15 @@ pub(super) async fn open(data: &Path, vfs: Option<&'static str>) -> Result<Opene
     Ok(Opened { writer, reads, lock })
 }
 
-/// The connections, checked, on the present schema. After an error the writer is closed before this returns: what
-/// connections of a process share (the index of the log, and where that is) lives as long as one of them is open.
+/// The connections, checked, on the present schema. After an error the writer is closed before this
+/// returns: what connections of a process share (the index of the log, and where that is) lives as
+/// long as one of them is open.
 async fn connect(
     data: &Path,
     vfs: Option<&'static str>,
 ) -> Result<(SqliteConnection, SqlitePool), OpenError> {
-    // SQLite gives the log and its index the mode of the database. An error here is one of the next line, too.
+    // SQLite gives the log and its index the mode of the database. An error here is one of the next
+    // line, too.
     drop(private_file::open(&data.join(FILE)));
     let options = options(&data.join(FILE));
     let options = if let Some(vfs) = vfs { options.vfs(vfs) } else { options };
@@ -143,14 +148,16 @@ async fn connect(
     match prepare(&mut writer, options).await {
         Ok(reads) => Ok((writer, reads)),
         Err(error) => {
-            // A dropped connection is closed later, by its thread. This fails only where that has ended.
+            // A dropped connection is closed later, by its thread. This fails only where that has
+            // ended.
             drop(writer.close().await);
             Err(error)
         }
     }
 }
 
-/// Sets what reads or writes the file, checks it and brings it to the present schema; opens the connections that read.
+/// Sets what reads or writes the file, checks it and brings it to the present schema; opens the
+/// connections that read.
 async fn prepare(
     writer: &mut SqliteConnection,
     options: SqliteConnectOptions,
@@ -175,8 +182,9 @@ async fn prepare(
     Ok(reads)
 }
 
-/// Opens the database on a read-only file system: every write is refused by SQLite. After a clean stop the file alone is
-/// complete and nobody changes it. After a kill the log is read, which needs the file of its index.
+/// Opens the database on a read-only file system: every write is refused by SQLite. After a clean
+/// stop the file alone is complete and nobody changes it. After a kill the log is read, which needs
+/// the file of its index.
 async fn open_read_only(data: &Path) -> Result<Opened, OpenError> {
     let unreadable = |reason| OpenError::ReadOnly { path: data.to_owned(), reason };
     let at = |source| OpenError::Directory { path: data.to_owned(), source };
@@ -220,8 +228,8 @@ pub(super) fn read_options(file: &Path) -> SqliteConnectOptions {
     options(file).read_only(true)
 }
 
-/// Takes the data directory, which is made if it is not there, and closes it to other users: nobody else uses it while the
-/// file is held.
+/// Takes the data directory, which is made if it is not there, and closes it to other users: nobody
+/// else uses it while the file is held.
 pub(crate) fn lock(data: &Path) -> Result<File, OpenError> {
     let at = |source| OpenError::Directory { path: data.to_owned(), source };
     let was_open = private_file::data_directory(data).map_err(at)?;
@@ -275,8 +283,9 @@ async fn check_pragmas(conn: &mut SqliteConnection) -> Result<(), OpenError> {
     Ok(())
 }
 
-/// Checks every table but the pictures and the bytes of models, which are most of a large file. Each has a digest, which is
-/// compared whenever it is read: models in use at the start, pictures once by `pictures::check_all` after it.
+/// Checks every table but the pictures and the bytes of models, which are most of a large file.
+/// Each has a digest, which is compared whenever it is read: models in use at the start, pictures
+/// once by `pictures::check_all` after it.
 async fn check_integrity(conn: &mut SqliteConnection) -> Result<(), OpenError> {
     let tables = "SELECT name FROM sqlite_schema WHERE type = 'table' \
                   AND name NOT IN ('pictures', 'model_contents')";

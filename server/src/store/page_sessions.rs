@@ -1,4 +1,5 @@
-//! Sessions of the pages, by the digests of their cookies: what is in memory ([`Sessions`]) after a restart.
+//! Sessions of the pages, by the digests of their cookies: what is in memory ([`Sessions`]) after a
+//! restart.
 //!
 //! [`Sessions`]: crate::identity::Sessions
 

@@ -1,6 +1,7 @@
-//! Pictures by content: each is stored once, under its SHA-256. The schema deletes a picture with the last row that refers to
-//! it. Whoever reads one gets bytes of that digest, or [`StoreError::PictureDamaged`]: the damage is noted, `/readyz` names
-//! what shows the picture, and everything else goes on. The same picture, stored again, mends it.
+//! Pictures by content: each is stored once, under its SHA-256. The schema deletes a picture with
+//! the last row that refers to it. Whoever reads one gets bytes of that digest, or
+//! [`StoreError::PictureDamaged`]: the damage is noted, `/readyz` names what shows the picture, and
+//! everything else goes on. The same picture, stored again, mends it.
 
 use super::{Store, StoreError, Tx, error::is_damage, kind::Kind, now_ms, statements::statements};
 use sha2::{Digest as _, Sha256};
@@ -35,7 +36,8 @@ pub(crate) type Digest = [u8; 32];
 
 /// Places with a damaged picture that are named.
 const MAX_NAMED: i64 = 100;
-/// The check of all pictures reads this much a second, so that it takes no more than a share of the disk from robots.
+/// The check of all pictures reads this much a second, so that it takes no more than a share of the
+/// disk from robots.
 const CHECK_BYTES_PER_S: f64 = 32e6;
 
 /// The digest of a picture.
@@ -60,8 +62,8 @@ pub(crate) async fn put(tx: &mut Tx, sha256: &Digest, bytes: &[u8]) -> Result<()
     mend(tx, sha256, bytes).await
 }
 
-/// Gives a picture that is known to be damaged its bytes again. Errors: `PictureDamaged`, where the database itself is
-/// damaged at this place; nothing is changed then.
+/// Gives a picture that is known to be damaged its bytes again. Errors: `PictureDamaged`, where the
+/// database itself is damaged at this place; nothing is changed then.
 pub(super) async fn mend(tx: &mut Tx, sha256: &Digest, bytes: &[u8]) -> Result<(), StoreError> {
     let at = || StoreError::during("mend picture");
     let damaged: i64 =
@@ -84,7 +86,8 @@ fn not_readable(sha256: &Digest, error: sqlx::Error) -> StoreError {
     StoreError::during("read or store a picture")(error)
 }
 
-/// The bytes of a picture, checked. Errors: `PictureDamaged`, which is noted then; `NotFound` if no row refers to it any more.
+/// The bytes of a picture, checked. Errors: `PictureDamaged`, which is noted then; `NotFound` if no
+/// row refers to it any more.
 pub(crate) async fn read(store: &Store, sha256: &Digest) -> Result<Vec<u8>, StoreError> {
     let found = checked(store.reads(), sha256).await;
     if let Err(StoreError::PictureDamaged { reason, .. }) = &found {
@@ -120,8 +123,8 @@ async fn note(store: &Store, sha256: Digest, reason: String) {
     }
 }
 
-/// How many views, tracks and underlays show a damaged picture, and at most [`MAX_NAMED`] of those of these maps, or of
-/// all maps.
+/// How many views, tracks and underlays show a damaged picture, and at most [`MAX_NAMED`] of those
+/// of these maps, or of all maps.
 pub(crate) async fn damaged(
     db: impl SqliteExecutor<'_>,
     maps: Option<&[String]>,
@@ -142,8 +145,8 @@ pub(crate) async fn next(db: impl SqliteExecutor<'_>, after: &[u8]) -> Result<Op
     Ok(found.and_then(|bytes| bytes.try_into().ok()))
 }
 
-/// Reads every picture once, slowly, and notes damage: what the check at the start leaves out. Ends early when the server
-/// stops, or when the list of pictures cannot be read.
+/// Reads every picture once, slowly, and notes damage: what the check at the start leaves out. Ends
+/// early when the server stops, or when the list of pictures cannot be read.
 pub(crate) async fn check_all(store: Store, mut stopping: watch::Receiver<bool>) {
     let (mut after, mut count, mut damaged) = (Vec::new(), 0_u64, 0_u64);
     loop {

@@ -1,6 +1,6 @@
-//! Claim: what was acknowledged survives a power cut. The writer runs over a layer below SQLite that loses what was not synced
-//! (`power_cut`); the cut falls into commits and into checkpoints. A self-check shows that the same test finds a setting that
-//! loses commits.
+//! Claim: what was acknowledged survives a power cut. The writer runs over a layer below SQLite
+//! that loses what was not synced (`power_cut`); the cut falls into commits and into checkpoints. A
+//! self-check shows that the same test finds a setting that loses commits.
 
 use super::{landmarks, maps};
 use crate::{config::Config, publication::Catalogue, publication::tests::config};
@@ -31,7 +31,8 @@ struct Outcome {
     in_checkpoint: bool,
 }
 
-/// A directory in memory where the system has one: the layer below decides what is on the disk, and nothing is synced.
+/// A directory in memory where the system has one: the layer below decides what is on the disk, and
+/// nothing is synced.
 pub(super) fn folder() -> TempDir {
     let memory = Path::new("/dev/shm");
     if memory.is_dir() { TempDir::new_in(memory).unwrap() } else { TempDir::new().unwrap() }
@@ -149,7 +150,8 @@ async fn what_is_acknowledged_survives_a_power_cut() {
     let sum = |of: fn(&Outcome) -> u64| outcomes.iter().map(of).sum::<u64>();
     let (acknowledged, lost) = (sum(|o| o.acknowledged), sum(|o| o.lost));
     let in_checkpoint = outcomes.iter().filter(|o| o.in_checkpoint).count() as u64;
-    // Rule of three: with no loss in n cuts, fewer than 3 / n of all cuts lose something, at 95 % confidence.
+    // Rule of three: with no loss in n cuts, fewer than 3 / n of all cuts lose something, at 95 %
+    // confidence.
     eprintln!(
         "{count} power cuts (seeds 0 to {}), {in_checkpoint} in a checkpoint: {acknowledged} acknowledged, {lost} lost; at most \
          {:.2} % of cuts at 95 %",
@@ -163,7 +165,8 @@ async fn what_is_acknowledged_survives_a_power_cut() {
     assert!(in_checkpoint > count / 20, "too few cuts fell into a checkpoint: {in_checkpoint}");
 }
 
-/// The test of the test: a process that is killed loses nothing with this setting, a power cut does.
+/// The test of the test: a process that is killed loses nothing with this setting, a power cut
+/// does.
 #[tokio::test]
 async fn the_power_cuts_find_a_setting_that_loses_commits() {
     let outcomes = cuts(CHECKS, Some("NORMAL")).await;

@@ -1,5 +1,6 @@
-//! Photographs that were not taken for a landmark, or not in its last lesson: why, with a small picture. Only the newest of each
-//! landmark stay. They are no part of the map: no history has them, and no bundle.
+//! Photographs that were not taken for a landmark, or not in its last lesson: why, with a small
+//! picture. Only the newest of each landmark stay. They are no part of the map: no history has
+//! them, and no bundle.
 
 use super::{StoreError, Tx, kind::Kind, now_ms, statements::statements};
 use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};

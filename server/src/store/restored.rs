@@ -1,8 +1,10 @@
-//! A database that was restored takes the place of the one in use. In: a data directory in which a verified copy has been
-//! written completely. Out: the same with that copy as its database, and what it replaces in a folder beside it.
+//! A database that was restored takes the place of the one in use. In: a data directory in which a
+//! verified copy has been written completely. Out: the same with that copy as its database, and
+//! what it replaces in a folder beside it.
 //!
-//! The file `restored-TIME.sqlite` decides: from the moment that it has this name, whoever holds the lock finishes the
-//! replacement, the restoring program or the next start of the server. Each step may be done again.
+//! The file `restored-TIME.sqlite` decides: from the moment that it has this name, whoever holds
+//! the lock finishes the replacement, the restoring program or the next start of the server. Each
+//! step may be done again.
 
 use crate::private_file;
 use std::{
@@ -23,7 +25,8 @@ pub(crate) fn decided(data: &Path, time: &str) -> PathBuf {
     data.join(format!("{PREFIX}{time}{SUFFIX}"))
 }
 
-/// Finishes a replacement of the database `file` that was decided. Returns the folder with what was replaced, if there was any.
+/// Finishes a replacement of the database `file` that was decided. Returns the folder with what was
+/// replaced, if there was any.
 pub(crate) fn put_in_place(data: &Path, file: &str) -> io::Result<Option<PathBuf>> {
     let mut replaced = None;
     for entry in fs::read_dir(data)? {

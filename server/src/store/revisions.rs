@@ -1,5 +1,6 @@
-//! Revisions of what people edit. In: what it is. Out: a word that is another one after every edit or lesson, and never comes
-//! back for something else of the same name. What robots do by themselves changes none.
+//! Revisions of what people edit. In: what it is. Out: a word that is another one after every edit
+//! or lesson, and never comes back for something else of the same name. What robots do by
+//! themselves changes none.
 
 use super::{StoreError, Tx, landmarks, maps, modality_stats, statements::statements, visibility_settings};
 use sqlx::{Row, SqliteConnection};
@@ -56,7 +57,8 @@ pub(crate) async fn present(
     row.try_get(if *of == Subject::Walls { "walls" } else { "underlay" }).map_err(at())
 }
 
-/// Lets a change go on only if it is meant for what is there. Errors: `NotFound`, `ChangedMeanwhile`.
+/// Lets a change go on only if it is meant for what is there. Errors: `NotFound`,
+/// `ChangedMeanwhile`.
 pub(crate) async fn check(tx: &mut Tx, map: &str, of: &Subject, is: &Precondition) -> Result<(), StoreError> {
     let present = present(&mut tx.conn, map, of).await?;
     match is {

@@ -22,7 +22,8 @@ statements! {
                     WHERE revoked_ms IS NOT NULL OR expires_ms <= ?1 ORDER BY issued_ms LIMIT 1)";
 }
 
-/// Most certificates stored, with those that were revoked or have expired; of these the oldest make room.
+/// Most certificates stored, with those that were revoked or have expired; of these the oldest make
+/// room.
 pub(crate) const MAX_CERTIFICATES: usize = 4000;
 
 /// A certificate to be stored.
@@ -47,7 +48,8 @@ fn certificate_row(row: &SqliteRow) -> Result<RobotCertificate, sqlx::Error> {
     })
 }
 
-/// Stores a signed certificate. Errors: a robot that is not registered; more than [`MAX_CERTIFICATES`] in use.
+/// Stores a signed certificate. Errors: a robot that is not registered; more than
+/// [`MAX_CERTIFICATES`] in use.
 pub(crate) async fn create(tx: &mut Tx, new: CertificateInsert) -> Result<RobotCertificate, StoreError> {
     robots::get(&mut tx.conn, &new.robot).await?;
     if count(&mut tx.conn).await? as usize >= MAX_CERTIFICATES {

@@ -62,7 +62,8 @@ pub(crate) async fn page(
     rows.iter().map(robot_row).collect::<Result<_, _>>().map_err(StoreError::during("list robots"))
 }
 
-/// Notes in the audit log that a person says where a robot is. Poses are not stored: the row stays as it is.
+/// Notes in the audit log that a person says where a robot is. Poses are not stored: the row stays
+/// as it is.
 pub(crate) async fn note_pose(tx: &mut Tx, name: &str) -> Result<(), StoreError> {
     get(&mut tx.conn, name).await?;
     sqlx::query(TOUCH).bind(name).execute(&mut tx.conn).await.map_err(StoreError::during("note a pose"))?;

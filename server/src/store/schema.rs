@@ -64,7 +64,8 @@ mod tests {
         );
     }
 
-    /// What a new column of a landmark touches, as the list of typical changes in docs/ARCHITECTURE.md says.
+    /// What a new column of a landmark touches, as the list of typical changes in
+    /// docs/ARCHITECTURE.md says.
     #[test]
     fn a_column_of_a_landmark_is_named_in_few_files() {
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");

@@ -1,5 +1,5 @@
-//! SQL texts as constants, listed so that a test can prepare every one of them against the migrated schema: what the
-//! `query!` macros would check, without a database at build time.
+//! SQL texts as constants, listed so that a test can prepare every one of them against the migrated
+//! schema: what the `query!` macros would check, without a database at build time.
 
 /// Declares SQL constants and `ALL`, the list of them.
 macro_rules! statements {

@@ -1,5 +1,5 @@
-//! Answers to frames as rows: what was said, the icons of the quads with matched points, the pose before the frame. Only the
-//! newest stay.
+//! Answers to frames as rows: what was said, the icons of the quads with matched points, the pose
+//! before the frame. Only the newest stay.
 
 use super::{StoreError, Tx, kind::Kind, now_ms, statements::statements};
 use engine::{
@@ -150,7 +150,8 @@ fn prior_check_text(check: &prior_check::PriorCheck) -> String {
     serde_json::to_string(&shown).unwrap_or_default()
 }
 
-/// Stores answers with their icons, and deletes the oldest beyond `max`. Those of maps that are gone are left out.
+/// Stores answers with their icons, and deletes the oldest beyond `max`. Those of maps that are
+/// gone are left out.
 pub(crate) async fn add(tx: &mut Tx, records: &[AnswerRecord], max: usize) -> Result<(), StoreError> {
     let at = || StoreError::during("store answer");
     for AnswerRecord { key, answer, basis: AnswerBasis { icons, prior_check } } in records {

@@ -1,6 +1,7 @@
-//! Adds training views to landmarks. Novelty and placement of a view are computed before the write, from what is stored. The
-//! transaction compares a stamp of all that they rest on; if that has changed, everything is computed once more. Writes are
-//! prepared one at a time ([`Store::preparing`]), so only another kind of edit of the map causes a repetition.
+//! Adds training views to landmarks. Novelty and placement of a view are computed before the write,
+//! from what is stored. The transaction compares a stamp of all that they rest on; if that has
+//! changed, everything is computed once more. Writes are prepared one at a time
+//! ([`Store::preparing`]), so only another kind of edit of the map causes a repetition.
 
 use super::{
     Store, StoreError, Tx,
@@ -35,8 +36,8 @@ const SAME_SIZE_M: f64 = 1e-6;
 /// How often a write is prepared before its caller is told to try again.
 pub(crate) const ATTEMPTS: usize = 5;
 
-/// What a landmark's place and the novelty of its views rest on (optimistic locking). The revision changes with the views, and
-/// never comes back.
+/// What a landmark's place and the novelty of its views rest on (optimistic locking). The revision
+/// changes with the views, and never comes back.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Stamp {
     map: i64,
@@ -103,7 +104,8 @@ pub(crate) struct Teaching {
     pub(crate) max: usize,
     /// What counts as a near-duplicate; without it every view is stored.
     pub(crate) novelty: Option<NoveltyParams>,
-    /// Size of the landmark by hand. It is set where there is none by hand, and has to be the same else.
+    /// Size of the landmark by hand. It is set where there is none by hand, and has to be the same
+    /// else.
     pub(crate) size: Option<LandmarkSize>,
     /// Makes the landmark if there is none: the most that a map may have.
     pub(crate) create: Option<usize>,
@@ -146,8 +148,8 @@ struct Prepared {
 /// What came of a view: its row or that of the one it repeats, and the placement of its landmark.
 pub(crate) type Added = (ViewRow, UploadOutcome, Option<PlacementReport>);
 
-/// Stores a view, unless it is there already or is a near-duplicate of one; then gives that one. A view with a capture
-/// places its landmark in the same transaction.
+/// Stores a view, unless it is there already or is a near-duplicate of one; then gives that one. A
+/// view with a capture places its landmark in the same transaction.
 pub(crate) async fn add(store: &Store, teaching: Teaching) -> Result<Added, StoreError> {
     let teaching = Arc::new(teaching);
     let _turn = store.preparing().await;
@@ -177,7 +179,8 @@ async fn basis(
     Ok(Basis::NewLandmark { map, walls_version: walls::version(store.reads(), map).await? })
 }
 
-/// The landmark that gets the view: its number and that of its map. A new one is made, and one without a size gets it.
+/// The landmark that gets the view: its number and that of its map. A new one is made, and one
+/// without a size gets it.
 async fn landmark_for(tx: &mut Tx, new: &Teaching, prepared: &Prepared) -> Result<(i64, i64), StoreError> {
     let (Teaching { map, landmark, create, .. }, geometry) = (new, prepared.geometry);
     let now = stamp(&mut tx.conn, map, landmark).await?;
@@ -295,7 +298,8 @@ mod tests {
         Teaching { map, landmark, view, max: 9, novelty: None, size: None, create: None }
     }
 
-    /// Prepares a view, lets `meanwhile` happen, and writes: was it refused, so that it is prepared again?
+    /// Prepares a view, lets `meanwhile` happen, and writes: was it refused, so that it is prepared
+    /// again?
     async fn refused(store: &Catalogue, number: u8, meanwhile: impl AsyncFnOnce()) -> bool {
         let teaching = Arc::new(teaching(number));
         let prepared = prepare(store, &teaching).await.unwrap();

@@ -1,6 +1,7 @@
-//! Acceptance of gathered tracks. A track becomes a landmark with its views, or gives its views to the landmark that it shows;
-//! the landmarks are placed and their lesson is queued. All of it happens in one transaction, or nothing. Placements are
-//! computed before the transaction, as for an added view ([`super::teaching`]).
+//! Acceptance of gathered tracks. A track becomes a landmark with its views, or gives its views to
+//! the landmark that it shows; the landmarks are placed and their lesson is queued. All of it
+//! happens in one transaction, or nothing. Placements are computed before the transaction, as for
+//! an added view ([`super::teaching`]).
 
 use super::{
     Store, StoreError, Tx,
@@ -170,8 +171,8 @@ async fn held(store: &Store, landmark: i64) -> Result<Vec<PlacementView>, StoreE
     rows.iter().map(view).collect()
 }
 
-/// Indices of views that do not agree on the object's place. They show another border of it, or another object, and would
-/// spoil its model (rectangle consistency, method 7.1).
+/// Indices of views that do not agree on the object's place. They show another border of it, or
+/// another object, and would spoil its model (rectangle consistency, method 7.1).
 fn inconsistent(views: &[TrackView], walls: &[LaserSegment]) -> Vec<usize> {
     let captures = views.iter().map(|v| (&v.crop.corners_px, v.capture.as_deref()));
     // Without a place, no view is inconsistent.
@@ -255,8 +256,8 @@ async fn write(tx: &mut Tx, decision: &Decision, prepared: Prepared) -> Result<A
     Ok(AcceptanceResult { landmarks, job })
 }
 
-/// The landmark that gets a track's views: the track's own, a new one, or one of that name that has no views yet or was made
-/// by this decision.
+/// The landmark that gets a track's views: the track's own, a new one, or one of that name that has
+/// no views yet or was made by this decision.
 async fn landmark_of(
     tx: &mut Tx,
     (map, id): (&str, i64),

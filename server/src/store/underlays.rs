@@ -30,7 +30,8 @@ pub(crate) struct UnderlayRow {
     /// Width and height of the upright picture.
     pub(crate) size_px: [u32; 2],
     pub(crate) metres_per_pixel: f64,
-    /// `map_from_picture`: x, y (m) and heading (rad) of the lower left corner, x to the right, y up.
+    /// `map_from_picture`: x, y (m) and heading (rad) of the lower left corner, x to the right, y
+    /// up.
     pub(crate) map_from_picture: [f64; 3],
     pub(crate) created_ms: i64,
 }

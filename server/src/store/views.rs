@@ -1,4 +1,5 @@
-//! Training views of landmarks with their pictures, and the distractors beside the landmarks in those pictures.
+//! Training views of landmarks with their pictures, and the distractors beside the landmarks in
+//! those pictures.
 
 use super::{
     StoreError, Tx,

@@ -1,5 +1,6 @@
-//! Visibility areas as they were computed, by landmark: derived data, so that a start computes none again. In: digests of
-//! inputs, areas as bytes. Out: the bytes of the areas whose inputs are the same.
+//! Visibility areas as they were computed, by landmark: derived data, so that a start computes none
+//! again. In: digests of inputs, areas as bytes. Out: the bytes of the areas whose inputs are the
+//! same.
 
 use super::{Store, StoreError, statements::statements};
 use sqlx::{Row, SqlitePool};

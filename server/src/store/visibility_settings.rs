@@ -7,7 +7,8 @@ statements! {
     SET = "UPDATE maps SET sight = ?2 WHERE id = ?1";
 }
 
-/// Sets the visibility settings of a map; the defaults are stored as NULL. The map gets a new version with new areas.
+/// Sets the visibility settings of a map; the defaults are stored as NULL. The map gets a new
+/// version with new areas.
 pub(crate) async fn set(tx: &mut Tx, map: &str, settings: &VisibilitySettings) -> Result<(), StoreError> {
     let map = maps::get(&mut tx.conn, map).await?;
     let is_default = *settings == VisibilitySettings::default();
@@ -27,7 +28,8 @@ pub(crate) fn revision(settings: &VisibilitySettings) -> String {
     text_revision(&serde_json::to_string(settings).unwrap_or_default())
 }
 
-/// The stored settings. Unreadable or impossible ones (a file of another program) become the defaults.
+/// The stored settings. Unreadable or impossible ones (a file of another program) become the
+/// defaults.
 pub(super) fn read(map: &str, text: Option<&str>) -> VisibilitySettings {
     let Some(text) = text else { return VisibilitySettings::default() };
     let read: Result<VisibilitySettings, String> =

@@ -21,7 +21,8 @@ pub(crate) type Ends = [f64; 4];
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct StoredWall {
     pub(crate) ends: Ends,
-    /// Of its direction and its offset to the free side, about its middle: rad^2, rad m, m^2. `None`: measured by hand.
+    /// Of its direction and its offset to the free side, about its middle: rad^2, rad m, m^2.
+    /// `None`: measured by hand.
     pub(crate) covariance: Option<[f64; 3]>,
 }
 

@@ -1,13 +1,15 @@
-//! The only connection that writes, owned by one task. A write is a closure that runs inside BEGIN IMMEDIATE. The order is
-//! commit -> publish the snapshot -> acknowledge, so a crash undoes nothing that was matched or acknowledged.
+//! The only connection that writes, owned by one task. A write is a closure that runs inside BEGIN
+//! IMMEDIATE. The order is commit -> publish the snapshot -> acknowledge, so a crash undoes nothing
+//! that was matched or acknowledged.
 //!
-//! What a write changed of maps becomes commits of their history in the same transaction ([`history::close`]).
+//! What a write changed of maps becomes commits of their history in the same transaction
+//! ([`history::close`]).
 //!
-//! A write whose caller drops it before its transaction begins is skipped. After that it runs to its end in this task, with
-//! what must follow the commit ([`Tx::after`]).
+//! A write whose caller drops it before its transaction begins is skipped. After that it runs to
+//! its end in this task, with what must follow the commit ([`Tx::after`]).
 //!
-//! A panic inside a write is caught and rolled back. After a panic in the publication, the map's previous version stays in
-//! use, and the next write to that map tries again.
+//! A panic inside a write is caught and rolled back. After a panic in the publication, the map's
+//! previous version stays in use, and the next write to that map tries again.
 
 use super::{
     actor::Actor,
@@ -70,8 +72,8 @@ impl Tx {
         }
     }
 
-    /// Runs `then` after the commit and before the acknowledgement, whether or not the caller still waits. It does not run if
-    /// the transaction is rolled back.
+    /// Runs `then` after the commit and before the acknowledgement, whether or not the caller still
+    /// waits. It does not run if the transaction is rolled back.
     pub(crate) fn after(&mut self, then: impl FnOnce() + Send + 'static) {
         self.after.push(Box::new(then));
     }
@@ -79,7 +81,8 @@ impl Tx {
 
 type Acknowledge = Box<dyn FnOnce(Result<(), StoreError>) + Send>;
 
-/// The outcome of a write's closure. `acknowledge` holds its value or error until the transaction has ended.
+/// The outcome of a write's closure. `acknowledge` holds its value or error until the transaction
+/// has ended.
 pub(super) struct WriteOutcome {
     keep: bool,
     fatal: bool,
@@ -96,7 +99,7 @@ pub(super) enum Command {
     Write {
         /// What it does.
         run: Run,
-        /// It is wanted for as long as this is there.
+        /// The write is cancelled if the caller drops this before the transaction begins.
         caller: Weak<()>,
     },
     /// Shows that the writer goes on; writes nothing.
@@ -159,7 +162,8 @@ where
     (Command::Write { run, caller: Arc::downgrade(caller) }, answer)
 }
 
-/// Writes the audit log: of every change that somebody asked for, and of what the server changes for all to see.
+/// Writes the audit log: of every change that somebody asked for, and of what the server changes
+/// for all to see.
 async fn log(tx: &mut Tx, actor: Option<&Actor>, before: i64, max: usize) -> Result<(), StoreError> {
     let is_shown = tx.changes.iter().any(|change| *change != CommittedChange::Jobs);
     match actor {
@@ -206,7 +210,8 @@ impl Writer {
         Self { tx, commands, on_commit, vitals, jobs, commits, heart, log_pages }
     }
 
-    /// Runs until told to close and what is queued is done, or until an error after which nothing may be written.
+    /// Runs until told to close and what is queued is done, or until an error after which nothing
+    /// may be written.
     pub(super) async fn run(mut self, mut close: oneshot::Receiver<()>, pulse: Pulse) {
         let mut open = true;
         if let Err(error) = beat_with(&mut self.tx.conn, &self.heart).await {
@@ -267,7 +272,8 @@ impl Writer {
             self.vitals.panics().caught(Edge::Write, cause.as_ref(), "a write", follows);
         }
         if !outcome.keep {
-            // After some errors (a full disk) SQLite has already rolled back, and this returns an error.
+            // After some errors (a full disk) SQLite has already rolled back, and this returns an
+            // error.
             let rolled_back = self.execute("ROLLBACK", "roll back").await;
             (outcome.acknowledge)(Ok(()));
             return match rolled_back {
@@ -299,7 +305,8 @@ impl Writer {
         }
         match published {
             Ok(()) => (outcome.acknowledge)(Ok(())),
-            // Durable, but not visible: the caller gets this error, and a later write may publish the map.
+            // Durable, but not visible: the caller gets this error, and a later write may publish
+            // the map.
             Err(error @ StoreError::NotPublished { .. }) => (outcome.acknowledge)(Err(error)),
             // Durable, but not visible until the next start: not acknowledged.
             Err(error) => {
@@ -310,8 +317,9 @@ impl Writer {
         self.move_log().await
     }
 
-    /// After the answer: what is in the log is on the disk. An error of the disk ends the writer here, too: the log would grow
-    /// without an end, and the sync that has failed cannot be repeated.
+    /// After the answer: what is in the log is on the disk. An error of the disk ends the writer
+    /// here, too: the log would grow without an end, and the sync that has failed cannot be
+    /// repeated.
     async fn move_log(&mut self) -> Result<(), StoreError> {
         match move_long_log(&mut self.tx.conn, self.log_pages).await {
             Err(error) if error.is_fatal() => Err(error),

@@ -19,14 +19,15 @@ pub struct Shadow {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Conditions {
-    /// Angle between the picture's normal and the line of sight in the horizontal plane, at most `MAX_ANGLE_RAD`
-    /// either way.
+    /// Angle between the picture's normal and the line of sight in the horizontal plane, at most
+    /// `MAX_ANGLE_RAD` either way.
     pub yaw_rad: f64,
     /// The same in the vertical plane.
     pub pitch_rad: f64,
     /// Roll of the camera.
     pub roll_rad: f64,
-    /// Square root of the area that the picture would have from the front at the same distance, in pixels.
+    /// Square root of the area that the picture would have from the front at the same distance, in
+    /// pixels.
     pub size_px: f64,
     /// Offset of the picture's centre from the image's, in pixels.
     pub aim_px: [f64; 2],
@@ -69,8 +70,9 @@ impl Default for Conditions {
 }
 
 impl Conditions {
-    /// Typical conditions of a robot's camera: slightly tilted, with some blur, noise and compression, and light
-    /// that differs a little from that of the lesson. Another `draw` gives other conditions.
+    /// Typical conditions of a robot's camera: slightly tilted, with some blur, noise and
+    /// compression, and light that differs a little from that of the lesson. Another `draw` gives
+    /// other conditions.
     pub fn realistic(draw: u64) -> Self {
         let mut rng = seed::stream(draw, 0x6578_6869);
         let mut within = |low: f64, high: f64| rng.random_range(low..=high);

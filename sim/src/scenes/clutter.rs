@@ -1,6 +1,7 @@
-//! Distractors of a scene: the surfaces of the room with their patterns and joints, columns, rails, radiators,
-//! shelves, pipes, patches of light, people. Whole walls, floors and columns are not listed: their lines meet by
-//! chance. Objects that are quads (cupboards, plates, lamps) are listed as neither missed nor false.
+//! Distractors of a scene: the surfaces of the room with their patterns and joints, columns, rails,
+//! radiators, shelves, pipes, patches of light, people. Whole walls, floors and columns are not
+//! listed: their lines meet by chance. Objects that are quads (cupboards, plates, lamps) are listed
+//! as neither missed nor false.
 
 use nalgebra::Vector3;
 use rand::RngExt;

@@ -1,5 +1,5 @@
-//! Processing in a camera after exposure: sharpening and JPEG compression. Grey picture in, grey picture
-//! out.
+//! Processing in a camera after exposure: sharpening and JPEG compression. Grey picture in, grey
+//! picture out.
 
 use std::f32::consts::PI;
 use vision::frame::GrayImage;
@@ -18,8 +18,8 @@ const STEPS: [[u8; BLOCK]; BLOCK] = [
     [72, 92, 95, 98, 112, 100, 103, 99],
 ];
 
-/// The picture after JPEG compression with `quality`, 1 to 100 (clamped). Columns and rows beyond the last whole
-/// block are unchanged.
+/// The picture after JPEG compression with `quality`, 1 to 100 (clamped). Columns and rows beyond
+/// the last whole block are unchanged.
 pub(crate) fn jpeg(image: &GrayImage, quality: u8) -> GrayImage {
     let quality = f32::from(quality.clamp(1, 100));
     let scale = if quality < 50.0 { 50.0 / quality } else { 2.0 - 0.02 * quality };

@@ -1,9 +1,9 @@
-//! The rendered set for training: rooms from all viewpoints, with framed pictures, posters, doors, windows, signs
-//! and boards on their walls, and with clutter that makes lines. Seed in, pictures with exact truth out; the same
-//! parameters and pictures give the same bytes. Writes no files.
+//! The rendered set for training: rooms from all viewpoints, with framed pictures, posters, doors,
+//! windows, signs and boards on their walls, and with clutter that makes lines. Seed in, pictures
+//! with exact truth out; the same parameters and pictures give the same bytes. Writes no files.
 //!
-//! Unlike `views`, rooms vary widely and are not realistic. Planes are painted over each other without ray casting,
-//! so shadows are painted, too.
+//! Unlike `views`, rooms vary widely and are not realistic. Planes are painted over each other
+//! without ray casting, so shadows are painted, too.
 
 mod clutter;
 pub(crate) mod compression;

@@ -1,5 +1,6 @@
-//! Objects that a detector must find: framed pictures, posters, doors, windows, signs, boards. Each is painted onto
-//! a rectangle of a plane and listed; its inner borders and parts are listed as neither missed nor false.
+//! Objects that a detector must find: framed pictures, posters, doors, windows, signs, boards. Each
+//! is painted onto a rectangle of a plane and listed; its inner borders and parts are listed as
+//! neither missed nor false.
 
 use rand::RngExt;
 
@@ -257,7 +258,8 @@ fn window(stage: &mut Stage, plane: &Plane, rect: Rect, wall: f32) {
     stage.list(plane, rect, LandmarkKind::Window);
 }
 
-/// A sign: lit from within, a clear plate nearly of the wall's grey, or a painted one; sometimes under a lamp box.
+/// A sign: lit from within, a clear plate nearly of the wall's grey, or a painted one; sometimes
+/// under a lamp box.
 pub(super) fn sign(stage: &mut Stage, plane: &Plane, rect: Rect, wall: f32) {
     let aspect = (rect[3] - rect[1]) / (rect[2] - rect[0]);
     let style = stage.rng.random_range(0..4);

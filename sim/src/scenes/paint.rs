@@ -1,5 +1,5 @@
-//! Paints flat shapes in space onto a picture of light, one over the other. Pixels are filled by the share that the
-//! projected shape covers. There is no depth buffer: later shapes are in front.
+//! Paints flat shapes in space onto a picture of light, one over the other. Pixels are filled by
+//! the share that the projected shape covers. There is no depth buffer: later shapes are in front.
 
 use nalgebra::{Matrix3, Point2, Vector3};
 use vision::geometry::Corners;
@@ -33,7 +33,8 @@ impl Light {
     }
 }
 
-/// A plane in the camera's frame (x right, y down, z ahead), with coordinates in metres to the right and down.
+/// A plane in the camera's frame (x right, y down, z ahead), with coordinates in metres to the
+/// right and down.
 #[derive(Debug, Clone)]
 pub(crate) struct Plane {
     pub(crate) origin: Vector3<f64>,
@@ -113,7 +114,8 @@ impl Painter {
         (p.z > NEAR_M).then(|| Point2::new(centre[0] + scale * p.x, centre[1] + scale * p.y))
     }
 
-    /// Corners of a rectangle of a plane, if all are in front of the camera and it faces the camera.
+    /// Corners of a rectangle of a plane, if all are in front of the camera and it faces the
+    /// camera.
     pub(crate) fn corners(&self, plane: &Plane, rect: Rect) -> Option<Corners> {
         let [a, b, c, d] = corners(rect).map(|p| self.project(&plane.at(p)));
         Corners::new([a?, b?, c?, d?]).ok()
@@ -185,7 +187,8 @@ impl Painter {
         self.paint(plane, polygon, |_, _| grey);
     }
 
-    /// Multiplies the light in a convex polygon by `factor`, with edges that are `soft_m` wide on either side.
+    /// Multiplies the light in a convex polygon by `factor`, with edges that are `soft_m` wide on
+    /// either side.
     pub(crate) fn shade(&mut self, plane: &Plane, polygon: &[[f64; 2]], soft_m: f64, factor: f32) {
         let soft = soft_m.max(1e-4);
         let Some(lines) = inward(polygon) else { return };
@@ -205,7 +208,8 @@ impl Painter {
         [0.5 * (self.width as f64 - 1.0), 0.5 * (self.height as f64 - 1.0)]
     }
 
-    /// Calls `f(light, layer, share covered, place on the plane, footprint)` for every pixel of the polygon.
+    /// Calls `f(light, layer, share covered, place on the plane, footprint)` for every pixel of the
+    /// polygon.
     fn cover(
         &mut self,
         plane: &Plane,

@@ -1,5 +1,5 @@
-//! Content of frames and boards: generated paintings, prints, photographs, papers and signs. A generator in, a
-//! texture out. Posters with letters and a border are `posters`'.
+//! Content of frames and boards: generated paintings, prints, photographs, papers and signs. A
+//! generator in, a texture out. Posters with letters and a border are `posters`'.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;

@@ -1,5 +1,6 @@
-//! The room of a scene: its walls, floor and ceiling as planes, the objects on its walls, and a camera aimed at one
-//! of them. Draws nothing. World frame: the main wall's top-left corner, x right along it, y down, z into the wall.
+//! The room of a scene: its walls, floor and ceiling as planes, the objects on its walls, and a
+//! camera aimed at one of them. Draws nothing. World frame: the main wall's top-left corner, x
+//! right along it, y down, z into the wall.
 
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use rand::RngExt;

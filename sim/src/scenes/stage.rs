@@ -1,5 +1,5 @@
-//! A scene during painting: the painter, the random numbers, and the listed quads. Objects and clutter are painted
-//! onto it.
+//! A scene during painting: the painter, the random numbers, and the listed quads. Objects and
+//! clutter are painted onto it.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;

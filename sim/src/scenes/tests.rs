@@ -47,8 +47,8 @@ fn truth_is_where_the_edges_are() {
             }
         }
     }
-    // The others are frames with stronger inner edges, shadows, and touching sills and lamp boxes. The chance level
-    // is five of thirteen.
+    // The others are frames with stronger inner edges, shadows, and touching sills and lamp boxes.
+    // The chance level is five of thirteen.
     assert!(sides > 100 && right * 100 >= sides * 75, "{right} of {sides}");
 }
 

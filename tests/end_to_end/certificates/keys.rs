@@ -14,14 +14,16 @@ use std::{
 use tests::eventually;
 use zenoh::{Session, pubsub::Subscriber};
 
-/// Time after which what was sent has arrived, where it may: everything of one session goes one way.
+/// Time after which what was sent has arrived, where it may: everything of one session goes one
+/// way.
 const ARRIVED: Duration = Duration::from_millis(300);
 
 fn named(text: &str) -> Name {
     Name::new(text).expect("a name")
 }
 
-/// Every key of the protocol, of this robot and map. A key that is added to the protocol does not compile here until it is in.
+/// Every key of the protocol, of this robot and map. A key that is added to the protocol does not
+/// compile here until it is in.
 fn every_key(robot: &str, map: &str) -> Vec<Key> {
     let (robot, map, camera) = (named(robot), named(map), named("front"));
     let all = vec![

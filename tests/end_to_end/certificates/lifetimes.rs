@@ -1,4 +1,5 @@
-//! A connection ends with its certificate, and certificates of the operator's own authority are for the robot in their name.
+//! A connection ends with its certificate, and certificates of the operator's own authority are for
+//! the robot in their name.
 
 use super::{Fleet, read, session};
 use client::{ClientError, RobotClient, RobotOptions, RobotTls, api::NewMap, v1};

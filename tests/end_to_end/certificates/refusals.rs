@@ -88,7 +88,8 @@ async fn without_a_valid_certificate_there_is_no_session_and_the_sdk_says_why() 
     fleet.inside.server.stop().await;
 }
 
-/// Everything that is sent to an address that is not in the server's certificate goes to the server.
+/// Everything that is sent to an address that is not in the server's certificate goes to the
+/// server.
 async fn relay(server: &str) -> String {
     let listener = TcpListener::bind("127.0.0.2:0").await.expect("a port");
     let at = listener.local_addr().expect("its address");
@@ -117,7 +118,8 @@ async fn a_robot_believes_the_names_in_the_servers_certificate_alone() {
         "an address that it does not name: {error:?}"
     );
     assert!(session(&other.endpoint, good.tls.as_ref()).await.is_err());
-    // Nothing but the name is wrong with that way: a server whose certificate has it is believed there.
+    // Nothing but the name is wrong with that way: a server whose certificate has it is believed
+    // there.
     let names = RawTls { enabled: true, names: vec!["127.0.0.2".into()], ..RawTls::default() };
     let named = Inside::start_with(RawConfig { tls: names, ..RawConfig::default() }).await;
     let named = Fleet { inside: named, local: String::new(), folders: TempDir::new().expect("a folder") };

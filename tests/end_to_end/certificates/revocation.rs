@@ -54,7 +54,8 @@ const REOPENED: usize = 12;
 /// Programs that connect again and again meanwhile.
 const PROGRAMS: usize = 6;
 
-/// A session that meets the gate as that closes may keep a dead link for ever: the client opens it anew.
+/// A session that meets the gate as that closes may keep a dead link for ever: the client opens it
+/// anew.
 #[tokio::test(flavor = "multi_thread")]
 async fn a_robot_that_connects_while_the_gate_opens_again_is_admitted() {
     let fleet = Fleet::start().await;

@@ -1,4 +1,5 @@
-//! Bags of ROS 2 that rosbags writes: from simulated readings, and from open photographs and an open laser log.
+//! Bags of ROS 2 that rosbags writes: from simulated readings, and from open photographs and an
+//! open laser log.
 
 use super::{
     LONGEST, count, in_front_of_posters,
@@ -39,7 +40,8 @@ fn python(folder: &Path) -> Result<PathBuf, String> {
     Ok(python)
 }
 
-/// Writes the readings as `own.mcap`, our messages, and as `bag.mcap`. False without rosbags, which is printed.
+/// Writes the readings as `own.mcap`, our messages, and as `bag.mcap`. False without rosbags, which
+/// is printed.
 fn write_both(folder: &Path, readings: &[Reading]) -> bool {
     let python = match python(folder) {
         Ok(python) => python,
@@ -112,8 +114,9 @@ async fn a_bag_gives_the_same_answers_as_our_own_messages() {
     inside.server.stop().await;
 }
 
-/// Photographs of paintings, of which [`TAUGHT`] are known, with the number of the scan that was measured with each. The
-/// first three show painting 258 to a robot that stands where the log begins.
+/// Photographs of paintings, of which [`TAUGHT`] are known, with the number of the scan that was
+/// measured with each. The first three show painting 258 to a robot that stands where the log
+/// begins.
 const PHOTOGRAPHS: [(&str, usize); 9] = [
     ("w22a_021", 0),
     ("w22a_021", 0),
@@ -127,12 +130,13 @@ const PHOTOGRAPHS: [(&str, usize); 9] = [
 ];
 const TAUGHT: [&str; 3] = ["81", "90", "258"];
 
-/// The camera on the robot, as the first photograph has it: ahead, 1.2 m above the floor, 0.9 degrees down.
+/// The camera on the robot, as the first photograph has it: ahead, 1.2 m above the floor, 0.9
+/// degrees down.
 const MOUNTING: v1::Pose3 =
     v1::Pose3 { x_m: 0.0414, y_m: 0.0479, z_m: 1.1945, qx: -0.49559, qy: 0.51238, qz: -0.50140, qw: 0.49037 };
 
-/// A map with the walls of this log. Painting 258 hangs where the first photograph shows it to a robot at the log's first
-/// pose, the origin of the map.
+/// A map with the walls of this log. Painting 258 hangs where the first photograph shows it to a
+/// robot at the log's first pose, the origin of the map.
 async fn museum(log: &Path, paintings: &Path) -> Inside {
     let inside = Inside::start(Limits::default()).await;
     let maps = inside.maps();

@@ -1,5 +1,5 @@
-//! Claim: what a file of messages holds is played and built from, or a sentence says what it is and what to do; nothing ends with
-//! status 0 where nothing was used.
+//! Claim: what a file of messages holds is played and built from, or a sentence says what it is and
+//! what to do; nothing ends with status 0 where nothing was used.
 
 use super::{LONGEST, count, poses::drive, run};
 use client::api::NewMap;
@@ -73,8 +73,8 @@ fn walls_are_built_from_a_bag() {
     assert!(words.contains("--odometry") && words.contains("--odom-frame"), "{words}");
 }
 
-/// `TurtleBot3` in Gazebo (ROBOTIS-GIT/turtlebot3 #404): 360 rays, a step of 0.017501922 rad, so that the last one is the
-/// first one again.
+/// `TurtleBot3` in Gazebo (ROBOTIS-GIT/turtlebot3 #404): 360 rays, a step of 0.017501922 rad, so
+/// that the last one is the first one again.
 #[tokio::test(flavor = "multi_thread")]
 async fn the_scans_of_a_turtlebot_are_used_and_walls_are_built_of_them() {
     const RAYS: usize = 359;

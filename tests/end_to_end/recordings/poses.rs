@@ -1,5 +1,6 @@
-//! Claim: `waymark replay --poses` writes the fused poses with the stamps of the recording, and they are where the robot was; the
-//! walls of `waymark map build` from the same recording are those of the building.
+//! Claim: `waymark replay --poses` writes the fused poses with the stamps of the recording, and
+//! they are where the robot was; the walls of `waymark map build` from the same recording are those
+//! of the building.
 
 use super::{
     LONGEST, count,

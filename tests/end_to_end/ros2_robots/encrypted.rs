@@ -1,5 +1,5 @@
-//! Behind the encrypted endpoint: a robot of ROS is served below its prefix with its certificate, and that of another robot
-//! reaches nothing there, kind of message by kind of message.
+//! Behind the encrypted endpoint: a robot of ROS is served below its prefix with its certificate,
+//! and that of another robot reaches nothing there, kind of message by kind of message.
 
 use super::{
     drive, poses,
@@ -22,7 +22,8 @@ use zenoh::{Session, Wait};
 
 /// What a robot's nodes call their namespace, and the server `key_prefix`.
 const PREFIX: &str = "robots/r1";
-/// Time after which what was sent has arrived, where it may: everything of one session goes one way.
+/// Time after which what was sent has arrived, where it may: everything of one session goes one
+/// way.
 const ARRIVED: Duration = Duration::from_millis(500);
 
 #[tokio::test(flavor = "multi_thread")]
@@ -58,7 +59,8 @@ async fn a_robot_of_ros_with_a_certificate_is_served_below_its_prefix() {
     run.stop().await;
 }
 
-/// Keys of ROS below a prefix, one of each kind: data, what keeps data, and the tokens of the graph.
+/// Keys of ROS below a prefix, one of each kind: data, what keeps data, and the tokens of the
+/// graph.
 fn keys(prefix: &str) -> [String; 3] {
     let topic = "7/odom/nav_msgs::msg::dds_::Odometry_/RIHS01_3cc9";
     [
@@ -131,8 +133,8 @@ fn seen(seen: &Noted) -> BTreeSet<String> {
     seen.lock().expect("not poisoned").clone()
 }
 
-/// What of these keys reaches `to`, when `from` says it again and again: puts, deletions and tokens, by a subscriber of each.
-/// Each finding begins with its kind.
+/// What of these keys reaches `to`, when `from` says it again and again: puts, deletions and
+/// tokens, by a subscriber of each. Each finding begins with its kind.
 async fn passes(from: &Session, to: &Session, keys: &[String], enough: usize) -> BTreeSet<String> {
     let found = Noted::default();
     let mut held = Vec::new();

@@ -1,4 +1,5 @@
-//! A server with a taught corridor, a robot of ROS and a native one, and the messages that both send.
+//! A server with a taught corridor, a robot of ROS and a native one, and the messages that both
+//! send.
 
 use map::pose2::Pose2;
 use nalgebra::Isometry3;
@@ -228,8 +229,8 @@ impl Run {
         Self::start_on(speech, None, change).await
     }
 
-    /// The same with the encrypted endpoint. The robot of ROS has a certificate and this namespace; the native one comes from
-    /// the server's own machine.
+    /// The same with the encrypted endpoint. The robot of ROS has a certificate and this namespace;
+    /// the native one comes from the server's own machine.
     pub(super) async fn start_encrypted(
         domain: u32,
         namespace: &str,
@@ -280,7 +281,8 @@ impl Run {
         Self { inside, building, native, ros, odometry: Vec::new(), certificates }
     }
 
-    /// Announces what a robot with camera and laser publishes, and waits until the images are subscribed to.
+    /// Announces what a robot with camera and laser publishes, and waits until the images are
+    /// subscribed to.
     pub(super) async fn announce(&mut self) {
         let laser = RobotParams::default().laser.robot_from_laser.to_isometry3();
         let fixed = transform(1, "laser", &laser);
@@ -290,8 +292,8 @@ impl Run {
         }
     }
 
-    /// Waits until the robot's session knows the server's subscriptions: a message before that reaches nobody. Empty
-    /// messages are sent, which the server counts and refuses.
+    /// Waits until the robot's session knows the server's subscriptions: a message before that
+    /// reaches nobody. Empty messages are sent, which the server counts and refuses.
     pub(super) async fn is_heard(&self) {
         for (topic, kind) in TOPICS {
             let key = self.ros.key(topic, kind);
@@ -323,8 +325,8 @@ impl Run {
         ns
     }
 
-    /// Sends the picture of a step, whose transforms and odometry are there, without compression: in colour by ROS, in
-    /// grey by the native robot.
+    /// Sends the picture of a step, whose transforms and odometry are there, without compression:
+    /// in colour by ROS, in grey by the native robot.
     pub(super) async fn show_raw(&mut self, readings: &SensorReadings, ns: i64) {
         let gray = readings.frame.image.data();
         let colours: Vec<u8> = gray.iter().flat_map(|g| [*g; 3]).collect();

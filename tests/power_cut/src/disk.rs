@@ -45,7 +45,8 @@ pub(crate) struct Unsynced {
     pub(crate) is_synced: bool,
     /// Content at the last sync of the sectors that have changed since, filled up with zeros.
     pub(crate) before: BTreeMap<u64, Vec<u8>>,
-    /// The same of sectors whose sync has failed: they are as good as synced, unless they are written again.
+    /// The same of sectors whose sync has failed: they are as good as synced, unless they are
+    /// written again.
     pub(crate) lost: BTreeMap<u64, Vec<u8>>,
 }
 
@@ -134,7 +135,8 @@ impl Disk {
         Ok(Self { folder, state })
     }
 
-    /// Cuts the power at the call after so many writes, truncations, syncs and deletions from now on.
+    /// Cuts the power at the call after so many writes, truncations, syncs and deletions from now
+    /// on.
     pub fn cut_after(&self, calls: u64) {
         lock(&self.state).left = Some(calls);
     }
@@ -149,7 +151,8 @@ impl Disk {
         lock(&self.state).errors.as_ref().map_or(0, |errors| errors.failed)
     }
 
-    /// The files as a process that is killed now leaves them, at the directory `to`: what was not synced, or is lost, stays so.
+    /// The files as a process that is killed now leaves them, at the directory `to`: what was not
+    /// synced, or is lost, stays so.
     pub fn after_kill(&self, to: &Path) -> io::Result<Self> {
         let copy = Self::of(to)?;
         let state = lock(&self.state);

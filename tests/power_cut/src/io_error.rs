@@ -9,7 +9,8 @@ pub enum Call {
     Write,
     /// A change of the length, which stays as it was.
     Truncate,
-    /// A sync. What it was to keep is lost by a power cut, also if a later sync succeeds: Linux marks the pages clean.
+    /// A sync. What it was to keep is lost by a power cut, also if a later sync succeeds: Linux
+    /// marks the pages clean.
     Sync,
 }
 

@@ -1,5 +1,6 @@
-//! The layer as SQLite sees it: a table of functions for the file system (`sqlite3_vfs`), and one for each open file
-//! (`sqlite3_io_methods`). A file is our own structure, followed in memory by that of SQLite's own layer.
+//! The layer as SQLite sees it: a table of functions for the file system (`sqlite3_vfs`), and one
+//! for each open file (`sqlite3_io_methods`). A file is our own structure, followed in memory by
+//! that of SQLite's own layer.
 
 use crate::{
     disk::{self, SECTOR, State, Unsynced},
@@ -28,7 +29,8 @@ struct Tracked {
     path: PathBuf,
 }
 
-/// An open file. SQLite allocates it with the size of the layer, so that the file of the layer below follows.
+/// An open file. SQLite allocates it with the size of the layer, so that the file of the layer
+/// below follows.
 #[repr(C)]
 struct File {
     base: sqlite3_file,
@@ -40,7 +42,8 @@ struct File {
 pub fn install() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
-        // SAFETY: the default layer is never removed, and its table may be copied. Ours lives for ever.
+        // SAFETY: the default layer is never removed, and its table may be copied. Ours lives for
+        // ever.
         let registered = unsafe {
             let below = sqlite3_vfs_find(ptr::null());
             assert!(!below.is_null(), "SQLite has a default layer");
@@ -81,7 +84,8 @@ unsafe fn tracked<'f>(file: *mut sqlite3_file) -> Option<(&'f Tracked, MutexGuar
 /// Calls a function of the layer below.
 macro_rules! pass {
     ($file:ident . $function:ident ( $($argument:expr),* )) => {{
-        // SAFETY: the layer below opened this file, and all its functions are there from version 2 on.
+        // SAFETY: the layer below opened this file, and all its functions are there from version 2
+        // on.
         unsafe {
             let inner = inner($file);
             match (*(*inner).pMethods).$function {
@@ -100,7 +104,8 @@ unsafe extern "C" fn open(
     out: *mut c_int,
 ) -> c_int {
     let below = below();
-    // SAFETY: SQLite gives memory for both structures; the layer below gets its own part and its own table.
+    // SAFETY: SQLite gives memory for both structures; the layer below gets its own part and its
+    // own table.
     unsafe {
         (*file).pMethods = ptr::null();
         (*file.cast::<File>()).tracked = ptr::null_mut();

@@ -44,7 +44,8 @@ pub(crate) struct Taught {
     pub(crate) photograph: IconFeatures,
 }
 
-/// Every `teach` entry: its photograph and generated views; thresholds against all the others' photographs.
+/// Every `teach` entry: its photograph and generated views; thresholds against all the others'
+/// photographs.
 pub(crate) fn teach(root: &Path, truth: &Value, p: &Params) -> Result<Vec<Taught>, Box<dyn Error>> {
     let mut all = Vec::new();
     for entry in list(&truth["teach"]) {

@@ -1,10 +1,12 @@
-//! Scores recognition on real photographs: `score_recognition DIR [PARAMS [KIND [STRANGERS...]]]`, where DIR holds a
-//! `truth.json` in the evaluation format, PARAMS is JSON such as `{"icon":{"size":50}}` and KIND one of `hausdorff`,
-//! `correlation`, `both` (default); with `VERBOSE` set every quad is printed. Further arguments are folders of images that
-//! hold no landmark: what the detector finds there, and quads at random places, are all distractors. Every landmark is taught
-//! from its one photograph and views generated from it. Each quad is looked for among all landmarks; then, as a distractor,
-//! among the half that does not hold it. Odd photographs, by the number in their name, may be tuned on; even ones are for
-//! the report: every figure has both columns.
+//! Scores recognition on real photographs: `score_recognition DIR [PARAMS [KIND [STRANGERS...]]]`,
+//! where DIR holds a `truth.json` in the evaluation format, PARAMS is JSON such as
+//! `{"icon":{"size":50}}` and KIND one of `hausdorff`, `correlation`, `both` (default); with
+//! `VERBOSE` set every quad is printed. Further arguments are folders of images that hold no
+//! landmark: what the detector finds there, and quads at random places, are all distractors. Every
+//! landmark is taught from its one photograph and views generated from it. Each quad is looked for
+//! among all landmarks; then, as a distractor, among the half that does not hold it. Odd
+//! photographs, by the number in their name, may be tuned on; even ones are for the report: every
+//! figure has both columns.
 #![expect(clippy::disallowed_methods, clippy::disallowed_types, reason = "a program with files and a clock")]
 #![expect(clippy::print_stdout, reason = "a program that prints a table")]
 
@@ -125,7 +127,8 @@ fn labelled(
     score
 }
 
-/// The same quads as distractors, each against the half of the landmarks that does not hold it: asked and accepted.
+/// The same quads as distractors, each against the half of the landmarks that does not hold it:
+/// asked and accepted.
 fn distractors(
     queries: &[&Query],
     halves: &[ModelSet; 2],
@@ -183,8 +186,9 @@ struct Detected {
     confidences: Vec<(f64, bool)>,
 }
 
-/// The same photographs with the quads that the detector finds. A detected quad belongs to the labelled one it
-/// overlaps most, if by 0.3 at least: borders within it share less than the border itself.
+/// The same photographs with the quads that the detector finds. A detected quad belongs to the
+/// labelled one it overlaps most, if by 0.3 at least: borders within it share less than the border
+/// itself.
 fn detected(
     queries: &[Query],
     models: &ModelSet,
@@ -304,7 +308,8 @@ fn normalised_square(found: &Corners, truth: &Corners, covariance: &[Matrix2<f64
     each.sum::<f64>() / 8.0
 }
 
-/// What the detector finds in every image in `folder`, and quads at random places of it: how many are taken for a landmark.
+/// What the detector finds in every image in `folder`, and quads at random places of it: how many
+/// are taken for a landmark.
 fn distractors_in(
     folder: &Path,
     models: &ModelSet,

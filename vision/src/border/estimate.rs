@@ -18,12 +18,15 @@ use crate::{
 };
 use nalgebra::{Isometry3, Matrix6, Point2, SMatrix, SVector, Vector3, Vector6};
 
-/// Least and largest distance of edges from the texture's sides, pixels; between them a share of the landmark's size.
+/// Least and largest distance of edges from the texture's sides, pixels; between them a share of
+/// the landmark's size.
 const REACH_PX: [f64; 2] = [3.0, 10.0];
 const REACH_SHARE: f64 = 0.06;
-/// The stated variance of aligned corners is multiplied by this: parts of a picture are not independent.
+/// The stated variance of aligned corners is multiplied by this: parts of a picture are not
+/// independent.
 const TEXTURE_SCALE: f64 = 2.0;
-/// Standard deviation of each corner by texture beyond that: pixels, and share of the landmark's size...
+/// Standard deviation of each corner by texture beyond that: pixels, and share of the landmark's
+/// size...
 const TEXTURE_SIGMA_PX: f64 = 0.15;
 const TEXTURE_SIGMA_SHARE: f64 = 0.004;
 /// ... and of width and height as a whole: blur at the border shrinks an aligned picture.
@@ -32,9 +35,11 @@ const SIZE_SIGMA_SHARE: f64 = 0.007;
 const LEAST_SIGMA_PX: f64 = 0.05;
 /// 99.9 % quantiles of chi2 with 2, 4, ..., 10 degrees of freedom.
 const CHI2_999: [f64; 5] = [13.816, 18.467, 22.458, 26.124, 29.588];
-/// 99.7 % quantile of chi2 with 6 degrees of freedom: two readings further apart are different borders.
+/// 99.7 % quantile of chi2 with 6 degrees of freedom: two readings further apart are different
+/// borders.
 const DIFFERENT_CHI2: f64 = 19.804;
-/// Readings of other borders that are together at least this likely beside the likeliest border leave it unclear.
+/// Readings of other borders that are together at least this likely beside the likeliest border
+/// leave it unclear.
 const UNCLEAR_ODDS: f64 = 0.5;
 /// Readings less likely than this beside the likeliest are left out.
 const LEAST_ODDS: f64 = 1e-4;
@@ -74,8 +79,8 @@ pub struct BorderEstimate {
 }
 
 impl BorderEstimate {
-    /// The landmark's pose by these corners. Where the border fits two poses but the corners have only one, it is
-    /// unclear.
+    /// The landmark's pose by these corners. Where the border fits two poses but the corners have
+    /// only one, it is unclear.
     pub fn pose(&self, size: LandmarkSize, camera: &Intrinsics) -> Result<LandmarkPose, BorderError> {
         let mut pose = landmark_pose(&self.corners_px, self.covariance_px2, size, camera)?;
         if self.is_mirrored && pose.second.is_none() {
@@ -109,7 +114,8 @@ pub fn estimate_border(
         let readings = readings(&problem, &edges);
         Some(Fit { cost: readings.first()?.cost, predicted_px, by_pose, readings })
     };
-    // Each solution of the planar ambiguity is read by itself: corners on the one leave nothing of the other.
+    // Each solution of the planar ambiguity is read by itself: corners on the one leave nothing of
+    // the other.
     let mut fits: Vec<Fit> = std::iter::once(&rough.best).chain(&rough.second).filter_map(fit).collect();
     fits.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     let Fit { predicted_px, by_pose, readings, cost } = fits.first().ok_or(PoseError::Degenerate)?;
@@ -148,8 +154,9 @@ struct Fit {
     readings: Vec<Reading>,
 }
 
-/// Covariance of the corners in the two directions that no pose moves them in. The other solution of the planar ambiguity
-/// differs from the first in these alone: without them it would look impossible.
+/// Covariance of the corners in the two directions that no pose moves them in. The other solution
+/// of the planar ambiguity differs from the first in these alone: without them it would look
+/// impossible.
 fn beside_pose(by_pose: &SMatrix<f64, 8, 6>, information: &SMatrix<f64, 8, 8>) -> Option<SMatrix<f64, 8, 8>> {
     let whole = information.cholesky()?.inverse();
     let along = (by_pose.transpose() * information * by_pose).cholesky()?.inverse();
@@ -162,7 +169,8 @@ fn texture_covariance(texture: &SeenBorder) -> CornerCovariance {
     let size_px = texture.corners_px.area_px2().sqrt();
     let own = TEXTURE_SIGMA_PX.powi(2) + (TEXTURE_SIGMA_SHARE * size_px).powi(2);
     let own = SMatrix::<f64, 8, 8>::identity() * own;
-    // The detector's border noise is part of every stated covariance; here the edges are judged one by one.
+    // The detector's border noise is part of every stated covariance; here the edges are judged one
+    // by one.
     let border = SMatrix::<f64, 8, 8>::identity() * BORDER_SIGMA_PX.powi(2);
     let stated = CornerCovariance::from(&texture.covariance_px2);
     let mut sum = (stated.matrix() - border) * TEXTURE_SCALE + own;
@@ -189,7 +197,8 @@ fn corners_at(
     SVector::from_fn(|i, _| seen[i / 2][i % 2])
 }
 
-/// Derivatives of the corners by the left perturbation of the pose, and of the picture's corners by its depth.
+/// Derivatives of the corners by the left perturbation of the pose, and of the picture's corners by
+/// its depth.
 fn derivatives(
     pose: &Isometry3<f64>,
     size: &LandmarkSize,
@@ -208,7 +217,8 @@ fn derivatives(
     (by_pose, (behind(DERIVATIVE_STEP) - behind(-DERIVATIVE_STEP)) / (2.0 * DERIVATIVE_STEP))
 }
 
-/// Mean and covariance of the pose over all readings; unclear where others than the likeliest are as likely.
+/// Mean and covariance of the pose over all readings; unclear where others than the likeliest are
+/// as likely.
 fn mean(readings: &[Reading]) -> Result<(Vector6<f64>, Matrix6<f64>), BorderError> {
     let best = &readings[0];
     let pose = |r: &Reading| -> Vector6<f64> { r.state.fixed_rows::<6>(0).into_owned() };

@@ -1,6 +1,7 @@
-//! All ways to read the edges beside a landmark's sides: each side is at one of its edges or at none, and the picture
-//! lies in the plane of the border or behind it. In: the texture's corners with covariance, the edges of each side,
-//! the pose that they are linearised about. Out: every reading with its pose, covariance and likelihood.
+//! All ways to read the edges beside a landmark's sides: each side is at one of its edges or at
+//! none, and the picture lies in the plane of the border or behind it. In: the texture's corners
+//! with covariance, the edges of each side, the pose that they are linearised about. Out: every
+//! reading with its pose, covariance and likelihood.
 
 use crate::{
     border::side_edges::{SideEdge, outward},
@@ -8,7 +9,8 @@ use crate::{
 };
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 
-/// Left perturbation of the pose (rotation, translation) and the depth of the picture behind the border, metres.
+/// Left perturbation of the pose (rotation, translation) and the depth of the picture behind the
+/// border, metres.
 const STATE: usize = 7;
 /// Index of the depth.
 const RECESS: usize = 6;
@@ -18,7 +20,8 @@ const FLAT: f64 = 0.5;
 const FLAT_SIGMA_M: f64 = 1e-4;
 /// Mean and standard deviation of the depth of others: frames are 1 to 4 cm deep.
 const RECESS_M: [f64; 2] = [0.015, 0.015];
-/// Probability that none of a side's edges is the border: hidden, without contrast, or not straight.
+/// Probability that none of a side's edges is the border: hidden, without contrast, or not
+/// straight.
 const NO_EDGE: f64 = 0.3;
 /// Standard deviation of the border beside its own edge, pixels.
 const BORDER_SIGMA_PX: f64 = 0.25;
@@ -43,7 +46,8 @@ pub(super) struct Reading {
     pub(super) covariance: SMatrix<f64, STATE, STATE>,
     /// -2 ln of its likelihood and prior, up to a constant.
     pub(super) cost: f64,
-    /// Squared residuals of texture and edges in standard deviations; two degrees of freedom and two for each edge.
+    /// Squared residuals of texture and edges in standard deviations; two degrees of freedom and
+    /// two for each edge.
     pub(super) chi2: f64,
     /// Number of sides at an edge.
     pub(super) edges: usize,

@@ -1,5 +1,6 @@
-//! Grey levels in proportion to light. Cameras store the 2.4th root or so (IEC 61966-2-1, sRGB); between a dark and a
-//! bright surface, the middle of a blurred edge then lies towards the dark one, by 0.2 px at a blur of 0.8 px.
+//! Grey levels in proportion to light. Cameras store the 2.4th root or so (IEC 61966-2-1, sRGB);
+//! between a dark and a bright surface, the middle of a blurred edge then lies towards the dark
+//! one, by 0.2 px at a blur of 0.8 px.
 
 use std::sync::LazyLock;
 

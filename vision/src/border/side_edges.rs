@@ -1,6 +1,6 @@
-//! The straight edges beside one side of a landmark. In: a picture, the ends of the side. Out: up to
-//! [`MAX_EDGES`] edges as offsets at both ends, with covariance and support. Which one is the border is not decided
-//! here.
+//! The straight edges beside one side of a landmark. In: a picture, the ends of the side. Out: up
+//! to [`MAX_EDGES`] edges as offsets at both ends, with covariance and support. Which one is the
+//! border is not decided here.
 
 use crate::{
     border::linear_light::LIGHT,
@@ -12,7 +12,8 @@ use nalgebra::{Matrix2, Point2, Vector2};
 pub const MAX_EDGES: usize = 4;
 /// Fewest and most profiles across a side.
 const PROFILES: [usize; 2] = [12, 40];
-/// Ends of a side that are left out, as a share of it and in pixels: edges of the neighbouring sides are there.
+/// Ends of a side that are left out, as a share of it and in pixels: edges of the neighbouring
+/// sides are there.
 const END_SHARE: f64 = 0.04;
 const END_PX: f64 = 1.0;
 /// Step along a profile, pixels.
@@ -91,8 +92,8 @@ pub fn side_edges(
     found
 }
 
-/// The strongest slopes of light on each profile, and the number of profiles. Slopes of the planes of a colour picture
-/// are added as squares.
+/// The strongest slopes of light on each profile, and the number of profiles. Slopes of the planes
+/// of a colour picture are added as squares.
 fn edge_points(
     image: PictureRef<'_>,
     from: &Point2<f64>,
@@ -174,8 +175,8 @@ fn is_inside(image: PictureRef<'_>, at: &Point2<f64>) -> bool {
     at.x > 1.0 && at.y > 1.0 && at.x < image.width() as f64 - 2.0 && at.y < image.height() as f64 - 2.0
 }
 
-/// Lines through a point near the first end and one near the second: offset at the first end, slope, and the number of
-/// profiles with a point on it.
+/// Lines through a point near the first end and one near the second: offset at the first end,
+/// slope, and the number of profiles with a point on it.
 fn lines(points: &[EdgePoint], profiles: usize) -> Vec<(f64, f64, usize)> {
     let (first, last) = (0.4 * profiles as f64, 0.6 * profiles as f64);
     let mut all = Vec::new();

@@ -1,8 +1,8 @@
 //! A camera's intrinsics from several views of one flat object of known shape (method 16).
 //!
-//! In: views (points of the plane and their pixels, at least four), the image's size. Out: focal length, principal
-//! point, perhaps radial distortion, with covariance, and the residual of each view; or why the views do not
-//! determine them.
+//! In: views (points of the plane and their pixels, at least four), the image's size. Out: focal
+//! length, principal point, perhaps radial distortion, with covariance, and the residual of each
+//! view; or why the views do not determine them.
 
 use crate::{
     camera_calibration::{
@@ -42,7 +42,8 @@ pub enum CalibrateError {
         /// Fewest views.
         least: usize,
     },
-    /// A view's lists are of different lengths, too short or too long, or a number in them is impossible.
+    /// A view's lists are of different lengths, too short or too long, or a number in them is
+    /// impossible.
     #[error("view {view}: {reason}")]
     View {
         /// Its index.
@@ -106,7 +107,8 @@ pub enum CalibrateError {
         /// Lines found.
         found: usize,
     },
-    /// The focal length is none of a usual camera: the views are not of one rectangle, or the pictures are cropped.
+    /// The focal length is none of a usual camera: the views are not of one rectangle, or the
+    /// pictures are cropped.
     #[error(
         "focal_out_of_range: fx {fx_px:.0} px is not within {} to {} times the longer side of the picture, {side_px} \
          px; check that the pictures are not cropped and all show one rectangle", FOCAL_SIDES[0], FOCAL_SIDES[1]
@@ -127,12 +129,13 @@ pub enum CalibrateError {
 pub struct CameraCalibration {
     /// The camera.
     pub camera: Intrinsics,
-    /// Covariance over (fx, cx, cy, k1, k2, fy / fx), px and 1; rows of numbers that were not fitted are zero.
-    /// `None` without refinement.
+    /// Covariance over (fx, cx, cy, k1, k2, fy / fx), px and 1; rows of numbers that were not
+    /// fitted are zero. `None` without refinement.
     pub covariance: Option<SMatrix<f64, 6, 6>>,
     /// Focal length of the linear solution (method 16.2), where there was one, pixels.
     pub linear_fx_px: Option<f64>,
-    /// Height over width of the plane, divided by the ratio that the views state: 1 where the aspect is known.
+    /// Height over width of the plane, divided by the ratio that the views state: 1 where the
+    /// aspect is known.
     pub aspect_ratio: f64,
     /// Height of the camera over the plane's origin, metres, where it was constant or known.
     pub height_m: Option<f64>,
@@ -241,13 +244,14 @@ fn start(
     };
     match p.height {
         CameraHeight::Known { height_m, .. } => with(Some(height_m)),
-        // Departs from method 16.2 (a 1-D search): without C3 the start is good enough, and the refinement finds the
-        // height with all the rest.
+        // Departs from method 16.2 (a 1-D search): without C3 the start is good enough, and the
+        // refinement finds the height with all the rest.
         CameraHeight::Free | CameraHeight::Constant { .. } => with(None),
     }
 }
 
-/// The poses for a camera, then the least squares if requested, every view in the better of its two minima.
+/// The poses for a camera, then the least squares if requested, every view in the better of its two
+/// minima.
 fn settled(
     problem: &Problem,
     camera: &LinearCamera,

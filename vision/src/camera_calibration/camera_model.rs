@@ -3,9 +3,9 @@
 use crate::pose::reprojection::{MIN_DEPTH_M, perturbed};
 use nalgebra::{Isometry3, Matrix2, Matrix2x3, Point2, SMatrix, Vector2, Vector3, Vector6};
 
-/// Number of parameters that all views share, in order: focal length, `fy / fx`, principal point, radial
-/// coefficients, log of the plane's height over width divided by the stated ratio, height of the camera over the
-/// plane's origin.
+/// Number of parameters that all views share, in order: focal length, `fy / fx`, principal point,
+/// radial coefficients, log of the plane's height over width divided by the stated ratio, height of
+/// the camera over the plane's origin.
 pub(crate) const CAMERA: usize = 8;
 
 pub(crate) const ALPHA: usize = 0;

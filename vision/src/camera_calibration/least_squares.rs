@@ -1,5 +1,5 @@
-//! Least squares of the reprojection over the camera and all poses at once (Zhang; method 16.3.3), with priors as
-//! further residuals. Every view has six pose parameters, eliminated view by view.
+//! Least squares of the reprojection over the camera and all poses at once (Zhang; method 16.3.3),
+//! with priors as further residuals. Every view has six pose parameters, eliminated view by view.
 
 use crate::{
     camera_calibration::{
@@ -77,7 +77,7 @@ impl Problem {
         }
         let height_weight = match p.height {
             CameraHeight::Free => 0.0,
-            // One height for all views, known to sigma: as a free parameter it would be constrained twice.
+            // One height for all views, known to sigma: a free parameter would have two priors.
             CameraHeight::Known { height_m, sigma_m } => {
                 at[HEIGHT] = height_m;
                 1.0 / sigma_m
@@ -91,7 +91,8 @@ impl Problem {
         Some(Self { views: made, free, prior, at, roll_weight, height_weight })
     }
 
-    /// Weighted squared residual, priors included; infinite where a point is not in front of the camera.
+    /// Weighted squared residual, priors included; infinite where a point is not in front of the
+    /// camera.
     pub(crate) fn chi2(&self, state: &State) -> f64 {
         let mut sum = self.prior_chi2(state);
         for (view, pose) in self.views.iter().zip(&state.poses) {
@@ -148,7 +149,8 @@ impl Problem {
             if self.free[HEIGHT] { state.poses.iter().map(height).sum::<f64>() / n } else { self.at[HEIGHT] };
     }
 
-    /// Each pose at its own least squares for the camera as it is, in the better of the two minima (method 13.4).
+    /// Each pose at its own least squares for the camera as it is, in the better of the two minima
+    /// (method 13.4).
     pub(crate) fn posed(&self, mut state: State) -> Option<State> {
         for i in 0..state.poses.len() {
             let linear = state.poses[i];
@@ -194,7 +196,8 @@ impl Problem {
         Some((pose, cost))
     }
 
-    /// Optimises all parameters, then tries each view in its other minimum, until chi2 no longer falls.
+    /// Optimises all parameters, then tries each view in its other minimum, until chi2 no longer
+    /// falls.
     pub(crate) fn descend(&self, state: State) -> Option<State> {
         let mut state = self.descend_all(state)?;
         for _ in 0..FLIPS {

@@ -1,17 +1,20 @@
-//! The image of the absolute conic from homographies: the constraints C1, C2, C3 as rows of a linear system (method
-//! 16.1 to 16.3). In: homographies of metric planes, in pixels. Out: alpha, u0, v0 and the singular value ratios.
+//! The image of the absolute conic from homographies: the constraints C1, C2, C3 as rows of a
+//! linear system (method 16.1 to 16.3). In: homographies of metric planes, in pixels. Out: alpha,
+//! u0, v0 and the singular value ratios.
 
 use nalgebra::{DMatrix, Matrix3, RowVector4, Vector3};
 
 /// The conic has four coefficients up to scale.
 const UNKNOWNS: usize = 4;
-/// A conic whose second smallest singular value is below this share of the greatest is not determined.
+/// A conic whose second smallest singular value is below this share of the greatest is not
+/// determined.
 pub(crate) const MIN_SIGMA_SHARE: f64 = 1e-6;
 
 /// Which constraints are used.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Constraints {
-    /// Sizes along both axes of the plane are known in the same unit: both rows of C1, else the second alone.
+    /// Sizes along both axes of the plane are known in the same unit: both rows of C1, else the
+    /// second alone.
     pub known_aspect: bool,
     /// C2: zero roll.
     pub zero_roll: bool,
@@ -34,8 +37,8 @@ pub(crate) fn rho(a: &Vector3<f64>, b: &Vector3<f64>) -> RowVector4<f64> {
 
 /// The rows of one view. `h` is normalised in the image and has `|h1| = 1`.
 ///
-/// The C3 row is divided by `|h3|`. The C2 row is not normalised: at zero tilt h2 is nearly (0, c, 0) and the row
-/// nearly zero; scaled to length 1 it would be noise.
+/// The C3 row is divided by `|h3|`. The C2 row is not normalised: at zero tilt h2 is nearly (0,
+/// c, 0) and the row nearly zero; scaled to length 1 it would be noise.
 fn rows(h: &Matrix3<f64>, c: &Constraints, made: &mut Vec<RowVector4<f64>>) {
     let (h1, h2, h3): (Vector3<f64>, Vector3<f64>, Vector3<f64>) =
         (h.column(0).into(), h.column(1).into(), h.column(2).into());
@@ -51,9 +54,9 @@ fn rows(h: &Matrix3<f64>, c: &Constraints, made: &mut Vec<RowVector4<f64>>) {
     }
 }
 
-/// The camera of unit pixel aspect behind `homographies` (pixels from metres), `None` when the conic is not one of
-/// a camera; and the second smallest singular value over the smallest (how distinct the solution is) and over the
-/// greatest (0 when all views have one orientation).
+/// The camera of unit pixel aspect behind `homographies` (pixels from metres), `None` when the
+/// conic is not one of a camera; and the second smallest singular value over the smallest (how
+/// distinct the solution is) and over the greatest (0 when all views have one orientation).
 pub(crate) fn solve(
     homographies: &[Matrix3<f64>],
     image_size_px: [f64; 2],

@@ -1,4 +1,5 @@
-//! Normal equations of the camera and all poses; each view's six pose parameters are eliminated (Schur complement).
+//! Normal equations of the camera and all poses; each view's six pose parameters are eliminated
+//! (Schur complement).
 
 use crate::camera_calibration::camera_model::CAMERA;
 use nalgebra::{Matrix6, SMatrix, SVector, Vector6};
@@ -16,7 +17,8 @@ pub(crate) struct Normal {
 }
 
 impl Normal {
-    /// The shared block with the poses eliminated, and its gradient; parameters that are not free are fixed.
+    /// The shared block with the poses eliminated, and its gradient; parameters that are not free
+    /// are fixed.
     fn reduced(&self, free: [bool; CAMERA], damping: f64) -> Option<(Shared, SharedVector)> {
         let (mut a, mut g) = (self.shared, self.shared_g);
         for k in 0..CAMERA {

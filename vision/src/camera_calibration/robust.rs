@@ -1,5 +1,5 @@
-//! Calibration that drops outlier views (some may show another object) and selects the number of radial
-//! coefficients by an F test on the residuals.
+//! Calibration that drops outlier views (some may show another object) and selects the number of
+//! radial coefficients by an F test on the residuals.
 
 use crate::camera_calibration::{
     calibrate::{CalibrateError, CameraCalibration, calibrate},
@@ -7,8 +7,8 @@ use crate::camera_calibration::{
     views::PlanarView,
 };
 
-/// A coefficient is fitted if it lowers chi2 by this many times the reduced chi2 (F test with a false-positive rate
-/// of 0.001).
+/// A coefficient is fitted if it lowers chi2 by this many times the reduced chi2 (F test with a
+/// false-positive rate of 0.001).
 pub const LENS_GAIN: f64 = 12.0;
 /// A view is dropped if the reduced chi2 without it is below this share of the one with it,
 pub const OUTLIER_SHARE: f64 = 0.6;
@@ -28,8 +28,8 @@ pub struct RobustCalibration {
     pub used: Vec<usize>,
 }
 
-/// As [`calibrate`], but drops outlier views while more than half are left, and fits only those of the `p.radial`
-/// radial coefficients that pass the F test.
+/// As [`calibrate`], but drops outlier views while more than half are left, and fits only those of
+/// the `p.radial` radial coefficients that pass the F test.
 pub fn calibrate_choosing(
     views: &[PlanarView],
     image_size_px: [usize; 2],

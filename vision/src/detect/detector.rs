@@ -37,8 +37,8 @@ use crate::{
 /// Most quads of one image, the best first.
 pub const MAX_QUADS: usize = 64;
 
-/// Finds the quads of a picture that people are shown, best first; ties by corners. At most [`MAX_QUADS`]. Same picture,
-/// same quads.
+/// Finds the quads of a picture that people are shown, best first; ties by corners. At most
+/// [`MAX_QUADS`]. Same picture, same quads.
 pub fn detect<'a>(image: impl Into<PictureRef<'a>>, p: &DetectParams, trace: &mut impl Trace) -> Vec<Quad> {
     detect_with(&mut DetectBuffers::default(), image, p, trace)
 }
@@ -55,7 +55,8 @@ pub fn detect_with<'a>(
     finished(quads, trace)
 }
 
-/// The quads that recognition compares: those of [`detect`], and others that are probably no objects.
+/// The quads that recognition compares: those of [`detect`], and others that are probably no
+/// objects.
 pub fn detect_for_recognition<'a>(
     memory: &mut DetectBuffers,
     image: impl Into<PictureRef<'a>>,
@@ -98,7 +99,8 @@ fn by_relaxation(
     quads
 }
 
-/// The default detector, on one scale or several. Coordinates of the trace are those of the working scale.
+/// The default detector, on one scale or several. Coordinates of the trace are those of the working
+/// scale.
 fn by_proposals(
     memory: &mut DetectBuffers,
     image: PictureRef,
@@ -138,8 +140,8 @@ fn by_proposals(
     at_full_size(quads, image, factor, p, memory)
 }
 
-/// All proposals of the default detector on all scales of a picture, rated, before suppression; and the finest edge
-/// map.
+/// All proposals of the default detector on all scales of a picture, rated, before suppression; and
+/// the finest edge map.
 pub fn scored_quads<'a>(
     work: impl Into<PictureRef<'a>>,
     p: &DetectParams,

@@ -5,8 +5,8 @@ use crate::{
     frame::PictureRef,
 };
 
-/// Memory of earlier images, for callers with many images: fresh planes cost more than a tenth of the time to
-/// segments. Results do not depend on it.
+/// Memory of earlier images, for callers with many images: fresh planes cost more than a tenth of
+/// the time to segments. Results do not depend on it.
 #[derive(Debug, Default)]
 pub struct DetectBuffers {
     pub(crate) maps: Vec<EdgeMap>,

@@ -48,7 +48,8 @@ pub enum Grouping {
     Proposals,
 }
 
-/// What becomes of a quad inside another that is not a border of the same object, with the default detector.
+/// What becomes of a quad inside another that is not a border of the same object, with the default
+/// detector.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Nested {
@@ -65,15 +66,16 @@ pub enum Nested {
 pub struct QuadParams {
     /// The paper's grouping or the default detector.
     pub grouping: Grouping,
-    /// The default detector works on an image reduced by a whole factor to about this longer side, pixels; 0 for
-    /// full size.
+    /// The default detector works on an image reduced by a whole factor to about this longer side,
+    /// pixels; 0 for full size.
     pub working_side_px: usize,
-    /// Scales of the default detector, each half the one before: ragged, ornate borders are straight at a coarse
-    /// scale.
+    /// Scales of the default detector, each half the one before: ragged, ornate borders are
+    /// straight at a coarse scale.
     pub scales: usize,
     /// Quad proposals of the default detector.
     pub proposals: ProposalParams,
-    /// Share of each side that edges must support for the outermost border of a group to be its quad.
+    /// Share of each side that edges must support for the outermost border of a group to be its
+    /// quad.
     pub min_side_support: f64,
     /// Nested quads above this `IoU` are borders of one object.
     pub nested_iou: f64,
@@ -84,13 +86,15 @@ pub struct QuadParams {
     /// Smallest step height of an edge point, grey levels.
     pub min_step: f64,
     /// Most seeds of a scale that are refitted, at most
-    /// [`MAX_REFITTED`](crate::detect::refine::rating::MAX_REFITTED); half as many small ones come on top.
+    /// [`MAX_REFITTED`](crate::detect::refine::rating::MAX_REFITTED); half as many small ones come
+    /// on top.
     pub max_refitted: usize,
     /// Most borders of one object that are rated on a scale.
     pub max_alike: usize,
     /// Smallest score of a quad of the default detector.
     pub min_score: f64,
-    /// Whether the default detector moves each side to the line beside it that looks most like a border.
+    /// Whether the default detector moves each side to the line beside it that looks most like a
+    /// border.
     pub choose_sides: bool,
     /// Network that scores the lines of a side; the built-in weights if absent.
     #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "checked::<SIDE_FEATURES, _>")]
@@ -98,12 +102,15 @@ pub struct QuadParams {
     /// Network of the quad classifier; the built-in weights if absent.
     #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "checked::<QUAD_FEATURES, _>")]
     pub quad_classifier: Option<Network>,
-    /// Smallest probability that a quad of the default detector is an object, for people: in pictures of what was
-    /// detected, for teaching and gathering, and in answers for quads that no landmark was recognised in.
+    /// Smallest probability that a quad of the default detector is an object, for people: in
+    /// pictures of what was detected, for teaching and gathering, and in answers for quads that no
+    /// landmark was recognised in.
     pub min_probability: f64,
-    /// The same for quads that recognition compares with the landmarks: an identity confirms what the classifier doubts.
+    /// The same for quads that recognition compares with the landmarks: an identity confirms what
+    /// the classifier doubts.
     pub min_asked_probability: f64,
-    /// A quad with at least this probability suppresses conflicting quads before they are classified.
+    /// A quad with at least this probability suppresses conflicting quads before they are
+    /// classified.
     pub sure_probability: f64,
     /// Whether to report sets of three sides.
     pub three_sided: bool,

@@ -1,8 +1,8 @@
-//! Smaller copies of an image, by averaging whole blocks, and quads mapped between scales. Quads of a large image
-//! are detected at a working scale: their sides are long enough there.
+//! Smaller copies of an image, by averaging whole blocks, and quads mapped between scales. Quads of
+//! a large image are detected at a working scale: their sides are long enough there.
 //!
-//! Departs from method 1, which works at full size: time is bounded, and ornate frames are straight at a coarse
-//! scale only.
+//! Departs from method 1, which works at full size: time is bounded, and ornate frames are straight
+//! at a coarse scale only.
 
 use crate::{
     detect::quad::Quad,
@@ -11,15 +11,16 @@ use crate::{
 };
 use nalgebra::Point2;
 
-/// The whole factor that brings the longer side nearest to `side_px`; 1 if it is smaller, or `side_px` is 0.
+/// The whole factor that brings the longer side nearest to `side_px`; 1 if it is smaller, or
+/// `side_px` is 0.
 pub fn working_factor<'a>(image: impl Into<PictureRef<'a>>, side_px: usize) -> usize {
     let image = image.into();
     let longest = image.width().max(image.height());
     (longest + side_px / 2).checked_div(side_px).unwrap_or(1).max(1)
 }
 
-/// Averages blocks of `factor` x `factor` pixels; incomplete blocks at the right and lower border are dropped. An
-/// image smaller than a block stays as it is.
+/// Averages blocks of `factor` x `factor` pixels; incomplete blocks at the right and lower border
+/// are dropped. An image smaller than a block stays as it is.
 pub fn reduce(image: &GrayImage, factor: usize) -> GrayImage {
     let factor = factor.max(1);
     let (width, height) = (image.width() / factor, image.height() / factor);
@@ -72,7 +73,8 @@ pub fn enlarge(p: &Point2<f64>, factor: f64) -> Point2<f64> {
 }
 
 impl Corners {
-    /// The corners in an image larger by `factor`; none if they no longer make a quad, which only rounding can cause.
+    /// The corners in an image larger by `factor`; none if they no longer make a quad, which only
+    /// rounding can cause.
     pub fn scaled(&self, factor: f64) -> Option<Self> {
         Self::new(self.points().map(|p| enlarge(&p, factor))).ok()
     }

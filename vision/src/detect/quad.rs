@@ -12,13 +12,15 @@ pub enum QuadKind {
     Full,
     /// Three sides, the fourth is the chord of the free ends: topology only, never a metric pose.
     ThreeSided,
-    /// Not detected: the border of a landmark that its texture alone shows. Corners may lie outside of the image.
+    /// Not detected: the border of a landmark that its texture alone shows. Corners may lie outside
+    /// of the image.
     Texture,
 }
 
-/// Standard deviation per coordinate of a border beyond the noise of its edges: another edge of the frame, a
-/// shadow, a bent side. The corner covariance does not include it: at a stated 0.04 px, corners of rendered posters
-/// are 0.2 to 0.4 px off, whatever their size (docs/EVALUATION.md, "Navigation").
+/// Standard deviation per coordinate of a border beyond the noise of its edges: another edge of the
+/// frame, a shadow, a bent side. The corner covariance does not include it: at a stated 0.04 px,
+/// corners of rendered posters are 0.2 to 0.4 px off, whatever their size (docs/EVALUATION.md,
+/// "Navigation").
 pub const BORDER_SIGMA_PX: f64 = 0.3;
 
 /// A detected quad.
@@ -36,10 +38,11 @@ pub struct Quad {
     pub score: f64,
     /// Four sides or three.
     pub kind: QuadKind,
-    /// A second choice of the top-left corner is nearly as upright: recognition tries all four rotations.
+    /// A second choice of the top-left corner is nearly as upright: recognition tries all four
+    /// rotations.
     pub upright_ambiguous: bool,
-    /// Other borders of the same object (mat, canvas, inner frame) and objects inside (a poster on a door), nested in
-    /// `corners_px`, outermost first.
+    /// Other borders of the same object (mat, canvas, inner frame) and objects inside (a poster on
+    /// a door), nested in `corners_px`, outermost first.
     pub alternates: Vec<Corners>,
 }
 

@@ -48,8 +48,8 @@ pub enum FrameError {
     },
 }
 
-/// An 8-bit grey image, row-major without padding. Pixel (u, v) is `data[v * width + u]`; its centre has the integer
-/// coordinates (u, v).
+/// An 8-bit grey image, row-major without padding. Pixel (u, v) is `data[v * width + u]`; its
+/// centre has the integer coordinates (u, v).
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct GrayImage {
     width: usize,
@@ -74,7 +74,8 @@ impl GrayImage {
         Ok(Self { width, height, data })
     }
 
-    /// Builds an image from a function of (u, v). Panics on a size outside the limits: for generated images only.
+    /// Builds an image from a function of (u, v). Panics on a size outside the limits: for
+    /// generated images only.
     pub fn from_fn(width: usize, height: usize, mut f: impl FnMut(usize, usize) -> u8) -> Self {
         let data = (0..width * height).map(|i| f(i % width, i / width)).collect();
         Self::new(width, height, data).expect("generated image within the limits")

@@ -1,11 +1,12 @@
-//! Intrinsics of a camera: focal length, principal point, lens distortion, and their standard deviations.
+//! Intrinsics of a camera: focal length, principal point, lens distortion, and their standard
+//! deviations.
 
 use crate::frame::{image::FrameError, lens::Distortion};
 use nalgebra::{Matrix2, Matrix3, Point2, Vector3};
 use serde::{Deserialize, Serialize};
 
-/// Standard deviations of intrinsics, as a calibration states them. fx and fy err together: of a calibration their
-/// errors are almost fully correlated.
+/// Standard deviations of intrinsics, as a calibration states them. fx and fy err together: of a
+/// calibration their errors are almost fully correlated.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct IntrinsicsSigmas {
@@ -19,10 +20,12 @@ impl IntrinsicsSigmas {
     /// Default for the focal length, as a share of it. Calibrations state 0.1 to 0.5 %, and
     /// two of them of the same pictures differ by as much as 0.6 %: docs/EVALUATION.md, "Cameras".
     pub const USUAL_FOCAL_SHARE: f64 = 0.005;
-    /// Default for the principal point, as a share of the focal length: 2 px at 640 x 480. Its error acts mostly
-    /// like a rotation of the camera, and so is part of the calibrated extrinsics.
+    /// Default for the principal point, as a share of the focal length: 2 px at 640 x 480. Its
+    /// error acts mostly like a rotation of the camera, and so is part of the calibrated
+    /// extrinsics.
     pub const USUAL_CENTER_SHARE: f64 = 0.003;
-    /// Largest accepted, as a share of the focal length: beyond it the first-order model does not hold.
+    /// Largest accepted, as a share of the focal length: beyond it the first-order model does not
+    /// hold.
     pub const MAX_SHARE: f64 = 0.25;
 
     /// Defaults for a camera of this focal length.
@@ -35,8 +38,8 @@ impl IntrinsicsSigmas {
 /// Steps from the middle to a corner in which a model is looked at for poles.
 const POLE_STEPS: usize = 256;
 
-/// How much farther out than without a lens a corner may lie, where a model has large coefficients: before a pole it goes to
-/// infinity.
+/// How much farther out than without a lens a corner may lie, where a model has large coefficients:
+/// before a pole it goes to infinity.
 const SANE_GROWTH: std::ops::RangeInclusive<f64> = 0.5..=2.0;
 
 /// A calibrated camera: zero skew, pixel (0, 0) at the centre of the top-left pixel.
@@ -59,16 +62,17 @@ pub struct Intrinsics {
 }
 
 impl Intrinsics {
-    /// Largest distortion coefficient whose model is taken without a look at it. Larger ones are of rational models whose
-    /// numerator and denominator nearly cancel: calibrations of long lenses give thousands.
+    /// Largest distortion coefficient whose model is taken without a look at it. Larger ones are of
+    /// rational models whose numerator and denominator nearly cancel: calibrations of long lenses
+    /// give thousands.
     pub const LARGE_COEFFICIENT: f64 = 100.0;
     /// Largest accepted distortion coefficient.
     pub const MAX_COEFFICIENT: f64 = 1e6;
 
-    /// Checks that every number is finite, focal lengths lie in 10 to 100 000 px, the principal point within
-    /// +-20 000 px and distortion coefficients within +-[`Self::LARGE_COEFFICIENT`]; or within
-    /// +-[`Self::MAX_COEFFICIENT`] if the model is invertible at the corners of a picture with the principal point in
-    /// its middle.
+    /// Checks that every number is finite, focal lengths lie in 10 to 100 000 px, the principal
+    /// point within +-20 000 px and distortion coefficients within +-[`Self::LARGE_COEFFICIENT`];
+    /// or within +-[`Self::MAX_COEFFICIENT`] if the model is invertible at the corners of a picture
+    /// with the principal point in its middle.
     pub fn new(
         fx_px: f64,
         fy_px: f64,
@@ -100,7 +104,8 @@ impl Intrinsics {
         }
     }
 
-    /// Whether the distortion is invertible at the corners of a picture with the principal point in its middle.
+    /// Whether the distortion is invertible at the corners of a picture with the principal point in
+    /// its middle.
     fn is_invertible(&self) -> bool {
         let (right, below) = (2.0 * self.cx_px, 2.0 * self.cy_px);
         let corners = [[0.0, 0.0], [right, 0.0], [right, below], [0.0, below]];
@@ -129,8 +134,8 @@ impl Intrinsics {
         self.pixel(&self.distortion.distort(&straight).point)
     }
 
-    /// The pixel where an undistorted pinhole with the same K would see what this camera sees at `px`. `None` where
-    /// the distortion is not invertible: see [`Distortion::undistort`].
+    /// The pixel where an undistorted pinhole with the same K would see what this camera sees at
+    /// `px`. `None` where the distortion is not invertible: see [`Distortion::undistort`].
     pub fn undistort(&self, px: &Point2<f64>) -> Option<Point2<f64>> {
         if self.distortion == Distortion::None {
             return Some(*px);

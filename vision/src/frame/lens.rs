@@ -1,11 +1,11 @@
-//! Lens models of OpenCV and ROS on normalised coordinates (x / z, y / z): distortion, its inverse and both
-//! derivatives. A distortion that is not invertible at a point gives `None`.
+//! Lens models of OpenCV and ROS on normalised coordinates (x / z, y / z): distortion, its inverse
+//! and both derivatives. A distortion that is not invertible at a point gives `None`.
 
 use nalgebra::{Matrix2, Point2, Vector2};
 use serde::{Deserialize, Serialize};
 
-/// Widest ray, from the axis, that a pinhole picture is made of: 85 degrees. A fisheye sees more; there is no pinhole
-/// pixel for that.
+/// Widest ray, from the axis, that a pinhole picture is made of: 85 degrees. A fisheye sees more;
+/// there is no pinhole pixel for that.
 pub const MAX_RAY_RAD: f64 = 85.0 * std::f64::consts::PI / 180.0;
 /// Most Newton steps of the inverse.
 const MAX_STEPS: usize = 30;
@@ -63,8 +63,8 @@ impl Distortion {
         }
     }
 
-    /// The undistorted point of `bent`. `None` where there is none, beyond [`MAX_RAY_RAD`], and where the model
-    /// folds between the axis and the point: there the inverse is not unique.
+    /// The undistorted point of `bent`. `None` where there is none, beyond [`MAX_RAY_RAD`], and
+    /// where the model folds between the axis and the point: there the inverse is not unique.
     pub fn undistort(&self, bent: &Point2<f64>) -> Option<Point2<f64>> {
         let start = match *self {
             Self::None => return Some(*bent),
@@ -216,7 +216,8 @@ mod tests {
         [0.0, 0.0],
     ];
 
-    /// `cv2.projectPoints(points, 0, 0, I, k)` of OpenCV 5.0.0, and `cv2.fisheye.projectPoints` for the fisheye.
+    /// `cv2.projectPoints(points, 0, 0, I, k)` of OpenCV 5.0.0, and `cv2.fisheye.projectPoints` for
+    /// the fisheye.
     #[test]
     fn distortion_agrees_with_opencv() {
         let points = [[0.3, -0.2], [-0.5, 0.35], [0.02, 0.7], [0.0, 0.0]];
@@ -245,8 +246,8 @@ mod tests {
 
     #[test]
     fn a_folding_distortion_is_not_inverted() {
-        // r (1 - 0.5 r2) has its greatest value 0.544 at r = 0.816: beyond, no straight point; a steep fifth power
-        // brings the picture back further out, which is another branch.
+        // r (1 - 0.5 r2) has its greatest value 0.544 at r = 0.816: beyond, no straight point; a
+        // steep fifth power brings the picture back further out, which is another branch.
         let folding = Distortion::PlumbBob([-0.5, 0.0, 0.0, 0.0, 0.0]);
         let straight = folding.undistort(&Point2::new(0.54, 0.0)).unwrap();
         assert!(

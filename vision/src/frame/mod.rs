@@ -1,5 +1,5 @@
-//! What enters the pipeline: a picture, grey or in colour, and, when known, the camera's intrinsics. Both are checked
-//! here, once; every later stage may rely on it.
+//! What enters the pipeline: a picture, grey or in colour, and, when known, the camera's
+//! intrinsics. Both are checked here, once; every later stage may rely on it.
 
 mod image;
 mod picture;
@@ -84,7 +84,8 @@ mod tests {
 
     #[test]
     fn a_short_side_stays_nearly_straight() {
-        // How far a vertical side at the right edge of the image leaves its chord; detection must tolerate it.
+        // How far a vertical side at the right edge of the image leaves its chord; detection must
+        // tolerate it.
         let lens = Distortion::PlumbBob([-0.28, 0.09, 0.0, 0.0, 0.0]);
         let camera = Intrinsics::new(520.0, 520.0, 319.5, 239.5, lens).unwrap();
         let middle = camera.undistort(&Point2::new(619.5, 239.5)).unwrap();

@@ -1,5 +1,6 @@
-//! A picture: grey levels always, and the planes of its colour where the camera gave them. Edges are searched in all
-//! planes; texture (points, icons, grey levels beside a side) is read from the grey one alone.
+//! A picture: grey levels always, and the planes of its colour where the camera gave them. Edges
+//! are searched in all planes; texture (points, icons, grey levels beside a side) is read from the
+//! grey one alone.
 
 use crate::frame::image::{FrameError, GrayImage};
 
@@ -9,8 +10,8 @@ const GREY_WEIGHTS: [u32; 3] = [19_595, 38_470, 7_471];
 /// Red, green and blue.
 pub const COLOUR_PLANES: usize = 3;
 
-/// Grey level of a colour: ITU-R BT.601 luma, the Y of JPEG, rounded. Of equal `red`, `green` and `blue` it is their
-/// level.
+/// Grey level of a colour: ITU-R BT.601 luma, the Y of JPEG, rounded. Of equal `red`, `green` and
+/// `blue` it is their level.
 pub fn luma(red: u8, green: u8, blue: u8) -> u8 {
     let [r, g, b] = GREY_WEIGHTS;
     ((r * u32::from(red) + g * u32::from(green) + b * u32::from(blue) + 32_768) >> 16) as u8
@@ -25,8 +26,8 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// A grey image with its red, green and blue planes. Planes that are all equal say no more than the grey image
-    /// and are dropped. Error: a plane is not as large as the grey image.
+    /// A grey image with its red, green and blue planes. Planes that are all equal say no more than
+    /// the grey image and are dropped. Error: a plane is not as large as the grey image.
     pub fn with_colour(grey: GrayImage, planes: [GrayImage; COLOUR_PLANES]) -> Result<Self, FrameError> {
         let size = |image: &GrayImage| (image.width(), image.height());
         if let Some(other) = planes.iter().find(|plane| size(plane) != size(&grey)) {
@@ -37,7 +38,8 @@ impl Picture {
         Ok(Self { grey, colour: (!is_grey).then(|| Box::new(planes)) })
     }
 
-    /// A picture of red, green and blue planes; grey is their [`luma`]. Error: the planes differ in size.
+    /// A picture of red, green and blue planes; grey is their [`luma`]. Error: the planes differ in
+    /// size.
     pub fn from_colour(planes: [GrayImage; COLOUR_PLANES]) -> Result<Self, FrameError> {
         let [red, green, blue] = planes.each_ref().map(GrayImage::data);
         let data = red.iter().zip(green).zip(blue).map(|((r, g), b)| luma(*r, *g, *b)).collect();
@@ -46,8 +48,8 @@ impl Picture {
         Self::with_colour(grey.unwrap_or_else(|_| planes[0].clone()), planes)
     }
 
-    /// Builds a colour picture from a function of (u, v) to red, green and blue. Panics on a size outside the limits:
-    /// for generated pictures only.
+    /// Builds a colour picture from a function of (u, v) to red, green and blue. Panics on a size
+    /// outside the limits: for generated pictures only.
     pub fn from_fn(width: usize, height: usize, mut f: impl FnMut(usize, usize) -> [u8; 3]) -> Self {
         let pixels: Vec<[u8; 3]> = (0..width * height).map(|i| f(i % width, i / width)).collect();
         let plane = |i: usize| GrayImage::from_fn(width, height, |u, v| pixels[v * width + u][i]);

@@ -1,5 +1,6 @@
-//! Standard deviations of intrinsics, and the derivative of a pixel by their errors. First order: one share of the
-//! focal length for fx and fy, and the principal point. Errors of the lens coefficients are not modelled.
+//! Standard deviations of intrinsics, and the derivative of a pixel by their errors. First order:
+//! one share of the focal length for fx and fy, and the principal point. Errors of the lens
+//! coefficients are not modelled.
 
 use crate::frame::{
     image::FrameError,
@@ -8,7 +9,8 @@ use crate::frame::{
 use nalgebra::{Matrix2, Matrix2x3, Point2, Vector3};
 
 impl Intrinsics {
-    /// The same camera with these standard deviations. Both finite, 0 to [`IntrinsicsSigmas::MAX_SHARE`] of fx.
+    /// The same camera with these standard deviations. Both finite, 0 to
+    /// [`IntrinsicsSigmas::MAX_SHARE`] of fx.
     pub fn with_sigmas(self, sigmas: IntrinsicsSigmas) -> Result<Self, FrameError> {
         for (field, value) in [("focal_sigma_px", sigmas.focal_px), ("center_sigma_px", sigmas.center_px)] {
             if !(0.0..=IntrinsicsSigmas::MAX_SHARE * self.fx_px).contains(&value) {
@@ -18,16 +20,16 @@ impl Intrinsics {
         Ok(Self { sigmas: Some(sigmas), ..self })
     }
 
-    /// Standard deviations of its errors: a share of the focal length, the principal point in px. Zero where none are
-    /// stated.
+    /// Standard deviations of its errors: a share of the focal length, the principal point in px.
+    /// Zero where none are stated.
     pub fn error_sigmas(&self) -> Vector3<f64> {
         self.sigmas
             .map_or_else(Vector3::zeros, |s| Vector3::new(s.focal_px / self.fx_px, s.center_px, s.center_px))
     }
 
-    /// Derivative of the undistorted pixel `straight_px` (see [`Intrinsics::undistort`]) of a given raw pixel by
-    /// errors of (share of the focal length, cx, cy), in pixels of this pinhole. `None` where the distortion is not
-    /// invertible.
+    /// Derivative of the undistorted pixel `straight_px` (see [`Intrinsics::undistort`]) of a given
+    /// raw pixel by errors of (share of the focal length, cx, cy), in pixels of this pinhole.
+    /// `None` where the distortion is not invertible.
     pub fn straight_by_errors(&self, straight_px: &Point2<f64>) -> Option<Matrix2x3<f64>> {
         let bent = self.distortion.distort(&self.normalised(straight_px));
         let focal = Matrix2::new(self.fx_px, 0.0, 0.0, self.fy_px);

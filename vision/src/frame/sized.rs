@@ -2,11 +2,12 @@
 
 use crate::frame::intrinsics::{Intrinsics, IntrinsicsSigmas};
 
-/// Largest difference of the ratios of sides of a picture that was only made smaller: a row or column is lost in rounding,
-/// and sensors crop a few.
+/// Largest difference of the ratios of sides of a picture that was only made smaller: a row or
+/// column is lost in rounding, and sensors crop a few.
 const MAX_ASPECT_OFF: f64 = 0.01;
-/// Farthest principal point from the middle, as a share of the side, of a calibration that does not say of which size of
-/// picture it is. Real ones are within a twentieth; that of a picture of twice the size is a half off.
+/// Farthest principal point from the middle, as a share of the side, of a calibration that does not
+/// say of which size of picture it is. Real ones are within a twentieth; that of a picture of twice
+/// the size is a half off.
 const MAX_CENTRE_OFF: f64 = 0.2;
 
 /// Why intrinsics are not those of a picture. Sizes are width and height, px.
@@ -33,8 +34,9 @@ pub enum PictureSizeError {
 }
 
 impl Intrinsics {
-    /// The intrinsics for a picture of this size (width, height), if they are stated to be of another one, or none.
-    /// Errors: the other size has other proportions; without one, the principal point is far off the middle.
+    /// The intrinsics for a picture of this size (width, height), if they are stated to be of
+    /// another one, or none. Errors: the other size has other proportions; without one, the
+    /// principal point is far off the middle.
     pub fn for_picture(
         &self,
         stated: Option<[usize; 2]>,

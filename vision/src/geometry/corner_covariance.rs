@@ -1,4 +1,5 @@
-//! The joint covariance of four corners: errors of corners that share a side or a picture go together.
+//! The joint covariance of four corners: errors of corners that share a side or a picture go
+//! together.
 
 use nalgebra::{Matrix2, SMatrix, SVector};
 
@@ -37,8 +38,8 @@ impl CornerCovariance {
         Self::new(map * self.0 * map.transpose())
     }
 
-    /// The inverse of the lower Cholesky factor: it makes residuals independent with variance 1. `None` unless
-    /// positive definite.
+    /// The inverse of the lower Cholesky factor: it makes residuals independent with variance 1.
+    /// `None` unless positive definite.
     pub fn whitening(&self) -> Option<SMatrix<f64, 8, 8>> {
         let mut inverse = SMatrix::<f64, 8, 8>::identity();
         let factor = self.0.cholesky()?.l();

@@ -14,14 +14,16 @@ pub enum CornersError {
     NotConvex,
 }
 
-/// Four corners in pixels: top-left, top-right, bottom-right, bottom-left seen from the front, hence clockwise on
-/// screen (u right, v down). Strictly convex. All corners in Waymark have this order.
+/// Four corners in pixels: top-left, top-right, bottom-right, bottom-left seen from the front,
+/// hence clockwise on screen (u right, v down). Strictly convex. All corners in Waymark have this
+/// order.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "[[f64; 2]; 4]", into = "[[f64; 2]; 4]")]
 pub struct Corners([Point2<f64>; 4]);
 
 impl Corners {
-    /// Smallest area of a triangle of three successive corners, in px^2: below it they count as collinear.
+    /// Smallest area of a triangle of three successive corners, in px^2: below it they count as
+    /// collinear.
     const MIN_TRIANGLE_PX2: f64 = 1e-6;
 
     /// Checks order, convexity and finiteness.
@@ -36,8 +38,8 @@ impl Corners {
         if convex { Ok(Self(corners_px)) } else { Err(CornersError::NotConvex) }
     }
 
-    /// Sorts four points clockwise on screen, starting at the corner that makes the quad most upright (image gravity
-    /// is +v). Method 4, rule A10.
+    /// Sorts four points clockwise on screen, starting at the corner that makes the quad most
+    /// upright (image gravity is +v). Method 4, rule A10.
     pub fn from_unordered(mut points_px: [Point2<f64>; 4]) -> Result<Self, CornersError> {
         if points_px.iter().any(|c| !c.x.is_finite() || !c.y.is_finite()) {
             return Err(CornersError::NotFinite);
@@ -49,8 +51,8 @@ impl Corners {
         Ok(sorted.rotated(sorted.top_left(&Vector2::y())))
     }
 
-    /// Which corner, 0 to 3, makes the quad most upright when it is named top-left, where gravity points to `down` in
-    /// the image (any length). The first of equal ones.
+    /// Which corner, 0 to 3, makes the quad most upright when it is named top-left, where gravity
+    /// points to `down` in the image (any length). The first of equal ones.
     pub fn top_left(&self, down: &Vector2<f64>) -> usize {
         let lean = |shift: &usize| self.rotated(*shift).lean_rad(down);
         (0..4).min_by(|a, b| lean(a).total_cmp(&lean(b))).unwrap_or(0)
@@ -67,8 +69,8 @@ impl Corners {
         Self(std::array::from_fn(|i| self.0[(i + shift) % 4]))
     }
 
-    /// Mean angle between the sides TL-BL and TR-BR and the direction `down` of gravity in the image (any length): 0
-    /// when upright, pi upside down.
+    /// Mean angle between the sides TL-BL and TR-BR and the direction `down` of gravity in the
+    /// image (any length): 0 when upright, pi upside down.
     pub fn lean_rad(&self, down: &Vector2<f64>) -> f64 {
         let [tl, tr, br, bl] = self.0;
         let angle = |side: Vector2<f64>| side.perp(down).abs().atan2(side.dot(down));

@@ -1,5 +1,6 @@
-//! Four point pairs in, plane homography out (method 4): `a_from_b` as a 3x3 matrix of Frobenius norm 1 whose
-//! denominator is positive over the points it was made from. It does not fit more than four points.
+//! Four point pairs in, plane homography out (method 4): `a_from_b` as a 3x3 matrix of Frobenius
+//! norm 1 whose denominator is positive over the points it was made from. It does not fit more than
+//! four points.
 
 use crate::geometry::corners::Corners;
 use nalgebra::{Matrix3, Point2, SMatrix, SVector, Vector3};
@@ -20,18 +21,20 @@ pub enum HomographyError {
 pub struct Homography(Matrix3<f64>);
 
 impl Homography {
-    /// Wraps a matrix that is positive (see [`Homography::denominator`]) where it will be used; scales it to
-    /// Frobenius norm 1. `None` when it is not finite or zero.
+    /// Wraps a matrix that is positive (see [`Homography::denominator`]) where it will be used;
+    /// scales it to Frobenius norm 1. `None` when it is not finite or zero.
     pub fn from_matrix(matrix: Matrix3<f64>) -> Option<Self> {
         let norm = matrix.norm();
         (norm.is_finite() && norm > 0.0).then(|| Self(matrix / norm))
     }
 
-    /// The map that takes `from[i]` to `to[i]`: direct linear transform on Hartley-normalised points.
+    /// The map that takes `from[i]` to `to[i]`: direct linear transform on Hartley-normalised
+    /// points.
     ///
-    /// Departs from method 4: the null vector of the 8x9 system is scaled to a last entry of 1 and found by an LU
-    /// with full pivoting instead of an SVD. Normalised points have their centroid at 0, and a homography between
-    /// two convex quads cannot send the centroid of one to infinity, so that entry is never 0; it is 20 times faster.
+    /// Departs from method 4: the null vector of the 8x9 system is scaled to a last entry of 1 and
+    /// found by an LU with full pivoting instead of an SVD. Normalised points have their centroid
+    /// at 0, and a homography between two convex quads cannot send the centroid of one to infinity,
+    /// so that entry is never 0; it is 20 times faster.
     pub fn from_points(from: &[Point2<f64>; 4], to: &[Point2<f64>; 4]) -> Result<Self, HomographyError> {
         let (from_normal, from_points) = normalise(from).ok_or(HomographyError::Degenerate)?;
         let (to_normal, to_points) = normalise(to).ok_or(HomographyError::Degenerate)?;
@@ -55,8 +58,8 @@ impl Homography {
         }
     }
 
-    /// The map that takes `from[i]` nearly to `to[i]` for four points or more: least squares of the algebraic error
-    /// on normalised points. A start value for refinement; exact for four points.
+    /// The map that takes `from[i]` nearly to `to[i]` for four points or more: least squares of the
+    /// algebraic error on normalised points. A start value for refinement; exact for four points.
     pub fn fit(from: &[Point2<f64>], to: &[Point2<f64>]) -> Result<Self, HomographyError> {
         if let (&[a, b, c, d], &[p, q, r, s]) = (from, to) {
             return Self::from_points(&[a, b, c, d], &[p, q, r, s]);
@@ -85,8 +88,8 @@ impl Homography {
         if behind { Ok(Self(-map.0)) } else { Err(HomographyError::Horizon) }
     }
 
-    /// `image_from_icon` for an icon of `size` x `size` pixels: icon corners (-1/2, -1/2), (size - 1/2, -1/2) ... go
-    /// to TL, TR, BR, BL.
+    /// `image_from_icon` for an icon of `size` x `size` pixels: icon corners (-1/2, -1/2), (size -
+    /// 1/2, -1/2) ... go to TL, TR, BR, BL.
     pub fn square_to_quad(size: usize, corners_px: &Corners) -> Result<Self, HomographyError> {
         let (low, high) = (-0.5, size as f64 - 0.5);
         let square =
@@ -206,7 +209,8 @@ mod tests {
         assert_eq!(Homography::from_points(&unit_square(), &concave), Err(HomographyError::Horizon));
     }
 
-    /// Any strictly convex quad: a square with each corner moved by less than 45 % of its half side.
+    /// Any strictly convex quad: a square with each corner moved by less than 45 % of its half
+    /// side.
     fn convex() -> impl Strategy<Value = Corners> {
         (proptest::array::uniform8(-0.22..0.22_f64), 1.0..5e3_f64, -1e4..1e4_f64).prop_filter_map(
             "convex",
@@ -239,7 +243,8 @@ mod tests {
                 prop_assert!((icon_from_image.apply(px) - icon).norm() < 1e-6);
             }
             let identity = image_from_icon.compose(&icon_from_image).unwrap();
-            // Scaled to norm 1 from a product that is small for slanted quads: rounding grows by as much.
+            // Scaled to norm 1 from a product that is small for slanted quads: rounding grows by as
+            // much.
             let product = (image_from_icon.matrix() * icon_from_image.matrix()).norm();
             let error = (identity.matrix() * 3.0_f64.sqrt() - Matrix3::identity()).norm();
             prop_assert!(error < 1e-14 / product, "{error} {product}");

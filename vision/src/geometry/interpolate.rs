@@ -3,10 +3,12 @@
 /// At and above this value an f32 has no fractional bits.
 const WHOLE: f32 = 8_388_608.0;
 
-/// The pixel before `u`, as an index and as a number: `u - number` is in [0, 1]. A whole `u` may give the pixel
-/// before it, too; interpolation gives the same value. For `u` from 0 to 2^22; pixel 0 for NaN.
+/// The pixel before `u`, as an index and as a number: `u - number` is in [0, 1]. A whole `u` may
+/// give the pixel before it, too; interpolation gives the same value. For `u` from 0 to 2^22; pixel
+/// 0 for NaN.
 ///
-/// A cast would first have to look for numbers that fit nowhere, which takes longer than all the rest.
+/// A cast would first have to look for numbers that fit nowhere, which takes longer than all the
+/// rest.
 #[expect(
     clippy::inline_always,
     reason = "an instruction set holds only in what is inlined where it was chosen"

@@ -1,7 +1,7 @@
 //! Image lines in normal form, and the total-least-squares line of a set of points.
 //!
-//! Points go in one by one into [`LineSums`]; sums of two sets add up, so pieces of an edge are joined and refitted
-//! without their points.
+//! Points go in one by one into [`LineSums`]; sums of two sets add up, so pieces of an edge are
+//! joined and refitted without their points.
 
 use nalgebra::{Point2, Vector2};
 
@@ -15,8 +15,8 @@ pub struct Line {
 }
 
 impl Line {
-    /// The line through two points; its normal points to the right on screen (u right, v down) when walking from `a`
-    /// to `b`. None when the points coincide or are not finite.
+    /// The line through two points; its normal points to the right on screen (u right, v down) when
+    /// walking from `a` to `b`. None when the points coincide or are not finite.
     pub fn from_points(a: &Point2<f64>, b: &Point2<f64>) -> Option<Self> {
         let along = b - a;
         let normal = Vector2::new(-along.y, along.x).try_normalize(f64::MIN_POSITIVE)?;
@@ -96,7 +96,8 @@ impl LineSums {
         self.n
     }
 
-    /// The line with the least squared perpendicular distances. None for fewer than two distinct points.
+    /// The line with the least squared perpendicular distances. None for fewer than two distinct
+    /// points.
     pub fn fit(&self) -> Option<LineFit> {
         if self.n < 2.0 {
             return None;
@@ -165,7 +166,8 @@ impl FromIterator<Point2<f64>> for LineSums {
 }
 
 impl LineFit {
-    /// Least standard deviation of an edge point across its line, px: residuals of short pieces underestimate it.
+    /// Least standard deviation of an edge point across its line, px: residuals of short pieces
+    /// underestimate it.
     pub const MIN_SIGMA_PX: f64 = 0.2;
 
     /// Variance of one point across the line, px^2, never below [`Self::MIN_SIGMA_PX`] squared.

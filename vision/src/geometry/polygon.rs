@@ -1,6 +1,7 @@
-//! Convex polygons as slices of vertices: area, intersection, overlap and the relations used by the constraint
-//! tables. Vertices run clockwise on screen (u right, v down), as in [`crate::geometry::corners::Corners`]; for the
-//! measures the other direction works as well. Does not handle concave or self-crossing polygons.
+//! Convex polygons as slices of vertices: area, intersection, overlap and the relations used by the
+//! constraint tables. Vertices run clockwise on screen (u right, v down), as in
+//! [`crate::geometry::corners::Corners`]; for the measures the other direction works as well. Does
+//! not handle concave or self-crossing polygons.
 
 use nalgebra::{Point2, Vector2};
 
@@ -29,7 +30,8 @@ pub fn intersection_area(a: &[Point2<f64>], b: &[Point2<f64>]) -> f64 {
         for side in edges(b) {
             let mut vertices = 0;
             cut(&part[..n], side, turn, |p| {
-                // Rounding can make a polygon concave; a surplus corner is dropped, its area is negligible.
+                // Rounding can make a polygon concave; a surplus corner is dropped, its area is
+                // negligible.
                 if let Some(place) = next.get_mut(vertices) {
                     (*place, vertices) = (p, vertices + 1);
                 }
@@ -92,8 +94,8 @@ pub fn contains(polygon: &[Point2<f64>], point: &Point2<f64>, tolerance_px: f64)
         })
 }
 
-/// Whether the vertices, in either direction, make a strictly convex polygon: every corner turns the same way, and
-/// once round in all.
+/// Whether the vertices, in either direction, make a strictly convex polygon: every corner turns
+/// the same way, and once round in all.
 pub fn is_convex(polygon: &[Point2<f64>]) -> bool {
     let n = polygon.len();
     if n < 3 {
@@ -121,8 +123,9 @@ pub enum Relation {
     Crossing,
 }
 
-/// Relation of two convex polygons. Disjoint: shrunk by `tolerance_px` each they do not meet (an edge's normal
-/// separates them). Nested: every vertex of the inner one lies at most `tolerance_px` outside the outer one.
+/// Relation of two convex polygons. Disjoint: shrunk by `tolerance_px` each they do not meet (an
+/// edge's normal separates them). Nested: every vertex of the inner one lies at most `tolerance_px`
+/// outside the outer one.
 pub fn relation(a: &[Point2<f64>], b: &[Point2<f64>], tolerance_px: f64) -> Relation {
     if separated(a, b, tolerance_px) || separated(b, a, tolerance_px) {
         Relation::Disjoint
@@ -135,7 +138,8 @@ pub fn relation(a: &[Point2<f64>], b: &[Point2<f64>], tolerance_px: f64) -> Rela
     }
 }
 
-/// Whether the normal of an edge of `a` separates the polygons, up to an overlap of twice the tolerance.
+/// Whether the normal of an edge of `a` separates the polygons, up to an overlap of twice the
+/// tolerance.
 fn separated(a: &[Point2<f64>], b: &[Point2<f64>], tolerance_px: f64) -> bool {
     let turn = signed_area(a).signum();
     edges(a).any(|(p, q)| {
@@ -175,8 +179,8 @@ mod tests {
         [[u, v], [u + width, v], [u + width, v + height], [u, v + height]].map(Point2::from)
     }
 
-    /// Share of cell centres of a fine grid that a predicate accepts, times the grid's area: an oracle independent
-    /// of clipping.
+    /// Share of cell centres of a fine grid that a predicate accepts, times the grid's area: an
+    /// oracle independent of clipping.
     fn grid_area(low: f64, high: f64, inside: impl Fn(&Point2<f64>) -> bool) -> f64 {
         let n = 500;
         let cell = (high - low) / f64::from(n);

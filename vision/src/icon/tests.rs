@@ -113,7 +113,8 @@ fn sizes_and_shares_outside_the_limits_are_refused() {
     let square = |a: f64, side: f64| corners([[a, a], [a + side, a], [a + side, a + side], [a, a + side]]);
     assert!(icon(&image, &square(10.0, 37.5), &p).is_ok());
     assert!(matches!(icon(&image, &square(10.0, 37.4), &p), Err(IconError::TooSmall { .. })));
-    // One of 75 rows and columns outside is 2.6 % of the cells; none while the corner cells are inside.
+    // One of 75 rows and columns outside is 2.6 % of the cells; none while the corner cells are
+    // inside.
     assert!(icon(&image, &square(-0.5, 75.0), &p).is_ok());
     assert!(matches!(icon(&image, &square(-1.6, 75.0), &p), Err(IconError::Outside { .. })));
     for (size, good) in [(19, false), (20, true), (200, true), (201, false)] {

@@ -1,8 +1,10 @@
-//! Width over height of a flat rectangle from the corners of its views (method 16.7). In: corners, sizes of the pictures,
-//! and cameras where they are known. Out: the ratio with its standard deviation, and how a stated size agrees with it.
+//! Width over height of a flat rectangle from the corners of its views (method 16.7). In: corners,
+//! sizes of the pictures, and cameras where they are known. Out: the ratio with its standard
+//! deviation, and how a stated size agrees with it.
 //!
-//! One view gives two numbers: that the sides are at right angles, and the ratio; both depend on the focal length. Where
-//! that is unknown, all of its values are weighed by how well they make the sides of all views rectangular.
+//! One view gives two numbers: that the sides are at right angles, and the ratio; both depend on
+//! the focal length. Where that is unknown, all of its values are weighed by how well they make the
+//! sides of all views rectangular.
 
 use crate::{
     camera_calibration::FOCAL_SIDES,
@@ -13,14 +15,15 @@ use crate::{
 use nalgebra::{Matrix2, Point2, SMatrix, Vector2, Vector3};
 use std::collections::BTreeMap;
 
-/// Standard deviation of a taught corner, as a share of the rectangle's side in the picture; at least [`CORNER_PX`]. Frames,
-/// shadows and margins move the corners of a quad by so much.
+/// Standard deviation of a taught corner, as a share of the rectangle's side in the picture; at
+/// least [`CORNER_PX`]. Frames, shadows and margins move the corners of a quad by so much.
 const CORNER_SHARE: f64 = 0.006;
 /// The same in pixels.
 const CORNER_PX: f64 = 1.0;
 /// What all views have in common, as a share of the ratio: they may outline an inner border.
 const COMMON: f64 = 0.02;
-/// Focal lengths that cameras usually have, in longer sides of the picture: logarithm of the middle, and its deviation.
+/// Focal lengths that cameras usually have, in longer sides of the picture: logarithm of the
+/// middle, and its deviation.
 const USUAL_FOCAL: [f64; 2] = [-0.223, 0.5];
 /// Focal lengths that are tried.
 const STEPS: usize = 81;
@@ -81,16 +84,16 @@ impl Aspect {
     }
 }
 
-/// What one view says at one focal length: the cosine between the sides and the logarithm of their ratio, with the inverse
-/// of their covariance.
+/// What one view says at one focal length: the cosine between the sides and the logarithm of their
+/// ratio, with the inverse of their covariance.
 struct ViewSides {
     cosine: f64,
     log_ratio: f64,
     information: Matrix2<f64>,
 }
 
-/// The ratio that views show; `None` where there is no view with corners of its own. Views whose corners are those of the
-/// picture (a scan, a cut-out) say nothing of a camera and are left out.
+/// The ratio that views show; `None` where there is no view with corners of its own. Views whose
+/// corners are those of the picture (a scan, a cut-out) say nothing of a camera and are left out.
 pub fn aspect(views: &[AspectView]) -> Option<Aspect> {
     // By camera: a known one, or the pictures of one size. The pixels are exact keys.
     let mut unknown: BTreeMap<[usize; 2], Vec<[Point2<f64>; 4]>> = BTreeMap::new();
@@ -153,7 +156,8 @@ fn by_views([width, height]: [usize; 2], views: &[[Point2<f64>; 4]]) -> Option<[
         })
         .collect();
     let least = tried.iter().map(|(.., chi2)| *chi2).fold(f64::INFINITY, f64::min);
-    // Two numbers a view, less the ratio and the focal length: what is left beyond it says that corners are worse.
+    // Two numbers a view, less the ratio and the focal length: what is left beyond it says that
+    // corners are worse.
     let free = (2.0 * views.len() as f64 - 2.0).max(1.0);
     let scale = (least / free).max(1.0);
     let weigh = |(log_focal, [_, variance], chi2): &(f64, [f64; 2], f64)| {

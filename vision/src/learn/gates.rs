@@ -1,8 +1,9 @@
-//! Gates at the end of modelling (method 9): is the landmark salient, stable, and observed from sufficiently
-//! different viewpoints?
+//! Gates at the end of modelling (method 9): is the landmark salient, stable, and observed from
+//! sufficiently different viewpoints?
 //!
-//! In: the training icons, their points and the corners they were cut from. Out: numbers with their limits. The
-//! consequence of a failed gate is defined by [`crate::model::landmark_model::ModelStatus`].
+//! In: the training icons, their points and the corners they were cut from. Out: numbers with their
+//! limits. The consequence of a failed gate is defined by
+//! [`crate::model::landmark_model::ModelStatus`].
 
 use crate::recognise::features::descriptor::PointSet;
 use nalgebra::{Matrix3, Point2, Vector2};
@@ -21,9 +22,10 @@ pub struct GateParams {
     pub min_views: usize,
     /// Least saliency F.
     pub min_saliency_f: f64,
-    /// The same where at most one view was photographed; otherwise interpolated by the share of photographed views.
-    /// Generated views are flat and registered by construction, so F only has to distinguish texture from a blank
-    /// panel (1.1), while their corner noise and light vary more than in a robot's own views.
+    /// The same where at most one view was photographed; otherwise interpolated by the share of
+    /// photographed views. Generated views are flat and registered by construction, so F only has
+    /// to distinguish texture from a blank panel (1.1), while their corner noise and light vary
+    /// more than in a robot's own views.
     pub min_saliency_f_generated: f64,
     /// Fewest stable points, where neither of the paper's distances has a threshold.
     pub min_stable_points: usize,
@@ -52,9 +54,9 @@ impl Default for GateParams {
     }
 }
 
-/// `F = V_s / (V_t + 1)`: spatial variance of the mean icon over the variance of each pixel between icons, every
-/// icon normalised to mean 0 and standard deviation 50 first. Large for a textured plane with consistent views,
-/// near 0 for a blank or inconsistent one.
+/// `F = V_s / (V_t + 1)`: spatial variance of the mean icon over the variance of each pixel between
+/// icons, every icon normalised to mean 0 and standard deviation 50 first. Large for a textured
+/// plane with consistent views, near 0 for a blank or inconsistent one.
 pub fn saliency_f(icons: &[&[f32]]) -> f64 {
     let Some(pixels) = icons.first().map(|i| i.len()).filter(|p| *p > 0) else { return 0.0 };
     let n = icons.len() as f64;
@@ -72,13 +74,14 @@ pub fn saliency_f(icons: &[&[f32]]) -> f64 {
     spatial / (temporal + 1.0)
 }
 
-/// `sal = min(1, n_stable / 20) F / (F + 6)` in [0, 1): one number for the choice of gaze (method 14).
+/// `sal = min(1, n_stable / 20) F / (F + 6)` in [0, 1): one number for the choice of gaze (method
+/// 14).
 pub fn saliency(f: f64, stable_points: usize) -> f64 {
     (stable_points as f64 / 20.0).min(1.0) * f / (f + 6.0)
 }
 
-/// Points of icon `reference` that are found in at least the given share of the icons, itself included: within
-/// `stable_within_px` and with a descriptor distance below `stable_within_nu`.
+/// Points of icon `reference` that are found in at least the given share of the icons, itself
+/// included: within `stable_within_px` and with a descriptor distance below `stable_within_nu`.
 pub fn stable_points(reference: usize, icons: &[&PointSet], p: &GateParams) -> usize {
     let Some(points) = icons.get(reference) else { return 0 };
     let needed = p.stable_share * icons.len() as f64;
@@ -96,9 +99,10 @@ pub fn stable_points(reference: usize, icons: &[&PointSet], p: &GateParams) -> u
         .count()
 }
 
-/// Visibility confidence `v_c`: the largest Frobenius distance from the identity of the homographies between any two
-/// views, in image coordinates centred and divided by half the diagonal, `H(3,3) = 1`. 0 with fewer than two views or
-/// with identical ones, at most [`V_C_CAP`]. `views` are (corners, width and height of the image), all in pixels.
+/// Visibility confidence `v_c`: the largest Frobenius distance from the identity of the
+/// homographies between any two views, in image coordinates centred and divided by half the
+/// diagonal, `H(3,3) = 1`. 0 with fewer than two views or with identical ones, at most [`V_C_CAP`].
+/// `views` are (corners, width and height of the image), all in pixels.
 pub fn v_c(views: &[([Point2<f64>; 4], [f64; 2])]) -> f64 {
     let planes: Vec<(Matrix3<f64>, Matrix3<f64>)> = views
         .iter()
@@ -161,8 +165,8 @@ mod tests {
     use crate::random::Random;
     use nalgebra::{Isometry3, Point3, Rotation3, Translation3, Vector3};
 
-    /// Corners of the golden poster (0.60 x 0.84 m) for a level camera (f = 700, 640 x 480) 0.3 m below its centre,
-    /// at `bearing_deg` and `distance_m` in plan view, turned towards it.
+    /// Corners of the golden poster (0.60 x 0.84 m) for a level camera (f = 700, 640 x 480) 0.3 m
+    /// below its centre, at `bearing_deg` and `distance_m` in plan view, turned towards it.
     fn view_from(bearing_deg: f64, distance_m: f64) -> ([Point2<f64>; 4], [f64; 2]) {
         let bearing = bearing_deg.to_radians();
         let centre = Vector3::new(distance_m * bearing.cos(), distance_m * bearing.sin(), -0.3);
@@ -227,8 +231,8 @@ mod tests {
         saliency_f(&icons.iter().map(Vec::as_slice).collect::<Vec<_>>())
     }
 
-    /// Oracle: with noise of deviation s on a texture of deviation 40, after normalisation `V_s` = 2500 w (up to the
-    /// noise left in the mean) and `V_t` = 2500 (1 - w), w = 40^2 / (40^2 + s^2).
+    /// Oracle: with noise of deviation s on a texture of deviation 40, after normalisation `V_s` =
+    /// 2500 w (up to the noise left in the mean) and `V_t` = 2500 (1 - w), w = 40^2 / (40^2 + s^2).
     #[test]
     fn saliency_is_signal_over_noise() {
         for noise in [4.0, 10.0, 20.0] {
@@ -266,8 +270,9 @@ mod tests {
 
     #[test]
     fn points_found_in_enough_icons_are_stable() {
-        // Of five icons: the first point comes back in all, the second in 3 of 5 (the limit), the third in 2, the
-        // fourth at the right place with another texture, the fifth just too far away.
+        // Of five icons: the first point comes back in all, the second in 3 of 5 (the limit), the
+        // third in 2, the fourth at the right place with another texture, the fifth just too far
+        // away.
         let reference = points(&[
             ([10.0, 10.0], 0.0),
             ([30.0, 10.0], 0.0),

@@ -1,5 +1,6 @@
-//! Trains a landmark model: views of one landmark in, its model out (method 7 to 9). `threshold_fit` sets the
-//! thresholds. The caller collects views, stores models and reports look-alikes.
+//! Trains a landmark model: views of one landmark in, its model out (method 7 to 9).
+//! `threshold_fit` sets the thresholds. The caller collects views, stores models and reports
+//! look-alikes.
 
 use crate::{
     icon::Icon,
@@ -49,8 +50,8 @@ pub enum LearnError {
     NoComponents,
 }
 
-/// Trains the model of a landmark. `negatives` are icons of other landmarks and of quads that are not landmarks.
-/// Without any, the absolute caps of [`crate::learn::params::LearnParams`] apply.
+/// Trains the model of a landmark. `negatives` are icons of other landmarks and of quads that are
+/// not landmarks. Without any, the absolute caps of [`crate::learn::params::LearnParams`] apply.
 pub fn learn(
     id: LandmarkId,
     views: &[TrainingView],
@@ -62,7 +63,8 @@ pub fn learn(
     let pixels: Vec<&[f32]> = icons.iter().map(|i| i.icon.pixels.as_slice()).collect();
     let components = modes(&pixels).ok_or(LearnError::NoComponents)?;
     let chosen: Vec<usize> = exemplars(&components).iter().map(|e| e.index).collect();
-    // An exemplar cut along detected corners would pass their error on to every picture aligned with it.
+    // An exemplar cut along detected corners would pass their error on to every picture aligned
+    // with it.
     let exemplar = |i: usize| {
         views[i].exact.as_ref().map_or_else(|| icons[i].clone(), |e| features(whole(e), &p.recognise))
     };
@@ -112,7 +114,8 @@ pub fn learn(
 /// Own icons that are aligned with the exemplars, evenly chosen: only their median is used.
 const MAX_OWN_ALIGNED: usize = 9;
 
-/// 1 minus the likeness of the landmark's own icons that are not exemplars, aligned with the exemplars.
+/// 1 minus the likeness of the landmark's own icons that are not exemplars, aligned with the
+/// exemplars.
 fn own_unlikeness(
     icons: &[IconFeatures],
     (chosen, exemplars): (&[usize], &[Exemplar]),
@@ -125,8 +128,9 @@ fn own_unlikeness(
     others.into_iter().step_by(every).map(|(_, icon)| templates.unlikeness(icon, -1.0)).collect()
 }
 
-/// Held-out distances (C^r, H^r) of the landmark's own icons, none to a model with the icon itself (A19): by folds
-/// with many views, otherwise of the icons that are not exemplars. `None` if a fold has no components.
+/// Held-out distances (C^r, H^r) of the landmark's own icons, none to a model with the icon itself
+/// (A19): by folds with many views, otherwise of the icons that are not exemplars. `None` if a fold
+/// has no components.
 fn own_distances(
     icons: &[IconFeatures],
     (chosen, kept): (&[usize], &[IconFeatures]),
@@ -153,7 +157,8 @@ fn own_distances(
     Some(own)
 }
 
-/// The icon rounded to whole grey levels, so that a model in memory and the stored model are equal bit for bit.
+/// The icon rounded to whole grey levels, so that a model in memory and the stored model are equal
+/// bit for bit.
 fn whole(icon: &Icon) -> Icon {
     let pixels = icon.pixels.iter().map(|g| g.round().clamp(0.0, 255.0)).collect();
     Icon { pixels, ..*icon }

@@ -1,8 +1,8 @@
-//! Rejects near-duplicate views of an object (method 7.1): a new view must differ from the kept ones in viewing
-//! direction, size, light or appearance.
+//! Rejects near-duplicate views of an object (method 7.1): a new view must differ from the kept
+//! ones in viewing direction, size, light or appearance.
 //!
-//! In: corners and icons. Out: the novelty of a view; 1 where it reaches a limit. The views are assumed to show the
-//! same object.
+//! In: corners and icons. Out: the novelty of a view; 1 where it reaches a limit. The views are
+//! assumed to show the same object.
 
 use crate::{
     geometry::corners::Corners,
@@ -14,13 +14,13 @@ use serde::{Deserialize, Serialize};
 
 /// Smallest differences between two views.
 ///
-/// Departs from method 7.1 (0.2 m and 5 degrees apart): the poses of photographs are unknown, so the limits are on
-/// the effect of such a step in the image.
+/// Departs from method 7.1 (0.2 m and 5 degrees apart): the poses of photographs are unknown, so
+/// the limits are on the effect of such a step in the image.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct NoveltyParams {
-    /// Viewing direction: displacement of a corner with both quads normalised to area 1. 5 degrees move it by 0.02
-    /// at 45 degrees off the normal.
+    /// Viewing direction: displacement of a corner with both quads normalised to area 1. 5 degrees
+    /// move it by 0.02 at 45 degrees off the normal.
     pub shape: f64,
     /// Size: ratio of the quads' sides. 0.2 m change them by 1.1 at 2 m.
     pub scale: f64,
@@ -70,7 +70,8 @@ impl ViewSummary {
         self.side_px
     }
 
-    /// Difference of two views, symmetric: 0 for equal views, 1 where one of the limits is just reached.
+    /// Difference of two views, symmetric: 0 for equal views, 1 where one of the limits is just
+    /// reached.
     pub fn novelty(&self, other: &Self, p: &NoveltyParams) -> f64 {
         let moved = self.shape.iter().zip(&other.shape).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
         let unlike = 1.0 - f64::from(likeness(self.signature.values(), other.signature.values()));
@@ -87,7 +88,8 @@ impl ViewSummary {
     }
 }
 
-/// Index of the kept view most similar to `new`, and its novelty; the first of equals. `None` when `kept` is empty.
+/// Index of the kept view most similar to `new`, and its novelty; the first of equals. `None` when
+/// `kept` is empty.
 pub fn most_alike<'a>(
     new: &ViewSummary,
     kept: impl IntoIterator<Item = &'a ViewSummary>,
@@ -103,7 +105,8 @@ mod tests {
     use crate::{frame::GrayImage, geometry::homography::Homography, icon::icon, params::Params};
     use nalgebra::{Rotation3, Vector3};
 
-    /// A poster of 0.6 m x 0.84 m in the view of a camera of 500 px from `distance_m`, `angle_rad` off its normal.
+    /// A poster of 0.6 m x 0.84 m in the view of a camera of 500 px from `distance_m`, `angle_rad`
+    /// off its normal.
     fn summary(distance_m: f64, angle_rad: f64, gain: f64) -> ViewSummary {
         let turn = Rotation3::from_axis_angle(&Vector3::y_axis(), angle_rad);
         let corners = [[-0.3, -0.42], [0.3, -0.42], [0.3, 0.42], [-0.3, 0.42]].map(|[x, y]| {
@@ -125,7 +128,8 @@ mod tests {
         let p = NoveltyParams::default();
         let from = |d, degrees: f64| summary(d, degrees.to_radians(), 1.0);
         let at = from(2.0, 45.0);
-        // Half the method's step is a near-duplicate, twice the step is a view of its own, in each way.
+        // Half the method's step is a near-duplicate, twice the step is a view of its own, in each
+        // way.
         for (other, is_new) in [
             (from(2.08, 45.0), false),
             (from(2.4, 45.0), true),

@@ -9,19 +9,19 @@ use serde::{Deserialize, Serialize};
 pub struct LearnParams {
     /// Choice of tau.
     pub threshold: ThresholdParams,
-    /// tau of C^r is never larger. Measured with the cap of H^r on 287 paintings, each trained alone from one
-    /// photograph, without negatives, and 2281 quads of other photographs (2102 of them cut at random): of 654 000
-    /// comparisons with the wrong painting both distances accepted 3, all of one look-alike; of 162 trained
-    /// paintings 150 were accepted.
+    /// tau of C^r is never larger. Measured with the cap of H^r on 287 paintings, each trained
+    /// alone from one photograph, without negatives, and 2281 quads of other photographs (2102 of
+    /// them cut at random): of 654 000 comparisons with the wrong painting both distances accepted
+    /// 3, all of one look-alike; of 162 trained paintings 150 were accepted.
     pub correlation_cap: f64,
     /// tau of H^r is never larger. Measured as above.
     pub hausdorff_cap: f64,
-    /// The distance of slopes after alignment (1 minus their likeness) is accepted below this at most, whatever the
-    /// negatives are. Chosen on 107 photographs of trained paintings; with thresholds fitted to the negatives, none
-    /// of 732 quads of other buildings was accepted.
+    /// The distance of slopes after alignment (1 minus their likeness) is accepted below this at
+    /// most, whatever the negatives are. Chosen on 107 photographs of trained paintings; with
+    /// thresholds fitted to the negatives, none of 732 quads of other buildings was accepted.
     pub likeness_cap: f64,
-    /// From this many views on, own distances are measured by cross-validation; below, on the icons that are not
-    /// exemplars.
+    /// From this many views on, own distances are measured by cross-validation; below, on the icons
+    /// that are not exemplars.
     pub min_views_for_folds: usize,
     /// Number of folds.
     pub folds: usize,

@@ -1,7 +1,8 @@
 //! Principal components of icons, and the exemplars nearest to them (method 7.2, 7.3).
 //!
-//! In: the raw icons of one landmark. Out: mean, the two leading modes, and which icons lie nearest to these three.
-//! Everything goes through the N x N Gram matrix of the centred icons, never the S^2 x S^2 covariance.
+//! In: the raw icons of one landmark. Out: mean, the two leading modes, and which icons lie nearest
+//! to these three. Everything goes through the N x N Gram matrix of the centred icons, never the
+//! S^2 x S^2 covariance.
 
 use nalgebra::{DMatrix, SymmetricEigen};
 
@@ -19,7 +20,8 @@ const MAX_SWEEPS: usize = 20_000;
 pub struct Modes {
     /// Mean icon, S^2 grey levels.
     pub mean: Vec<f64>,
-    /// Leading modes, orthonormal, S^2 numbers each; at most [`MODES`], fewer where the icons do not vary.
+    /// Leading modes, orthonormal, S^2 numbers each; at most [`MODES`], fewer where the icons do
+    /// not vary.
     pub modes: Vec<Vec<f64>>,
     /// Variance along each kept mode (eigenvalues of the covariance with 1/N), falling.
     pub eigenvalues: Vec<f64>,
@@ -54,8 +56,8 @@ pub struct Exemplar {
     pub role: Role,
 }
 
-/// Principal components of `icons`, each S^2 finite grey levels. `None` without icons, with icons of different sizes,
-/// with a number that is not finite.
+/// Principal components of `icons`, each S^2 finite grey levels. `None` without icons, with icons
+/// of different sizes, with a number that is not finite.
 pub fn modes(icons: &[&[f32]]) -> Option<Modes> {
     let pixels = icons.first()?.len();
     if pixels == 0 || icons.iter().any(|i| i.len() != pixels || i.iter().any(|g| !g.is_finite())) {
@@ -108,8 +110,8 @@ impl Modes {
     }
 }
 
-/// The exemplars of mean and modes: nearest to the mean; then, for each mode, the largest cosine with it, of
-/// those not chosen before. Ties go to the lowest index. Between one and three.
+/// The exemplars of mean and modes: nearest to the mean; then, for each mode, the largest cosine
+/// with it, of those not chosen before. Ties go to the lowest index. Between one and three.
 pub fn exemplars(modes: &Modes) -> Vec<Exemplar> {
     let nearest =
         (0..modes.norms.len()).min_by(|a, b| modes.norms[*a].total_cmp(&modes.norms[*b]).then(a.cmp(b)));
@@ -130,7 +132,8 @@ pub fn exemplars(modes: &Modes) -> Vec<Exemplar> {
     chosen
 }
 
-/// Y Y^T of the centred icons. Products in f32 lanes, sums in f64 by blocks: exact to 1e-6 of the norm.
+/// Y Y^T of the centred icons. Products in f32 lanes, sums in f64 by blocks: exact to 1e-6 of the
+/// norm.
 fn gram(centred: &[Vec<f32>]) -> DMatrix<f64> {
     let n = centred.len();
     let mut gram = DMatrix::zeros(n, n);
@@ -254,7 +257,8 @@ mod tests {
         let found = modes(&slices(&icons)).unwrap();
         let chosen = exemplars(&found);
         assert_eq!(chosen[0], Exemplar { index: 1, role: Role::Mean });
-        // Every icon lies exactly on the mode, so the cosine ties at 1 up to rounding; the sign must be the icon's.
+        // Every icon lies exactly on the mode, so the cosine ties at 1 up to rounding; the sign
+        // must be the icon's.
         let Role::Mode { mode: 0, positive } = chosen[1].role else { panic!("{chosen:?}") };
         assert_eq!(positive, found.coordinates[0][chosen[1].index] > 0.0);
         assert_eq!(chosen.len(), 2, "the second mode has no variance");

@@ -1,8 +1,8 @@
 //! The border of a new view of an object that has a first view.
 //!
-//! In: the picture, the detected border, the icon of the first view. Out: the corners of what that icon shows. The
-//! detector takes now the sheet, now its frame, now the shadow beside it for the border: views cut along different
-//! borders make a blurred model and a wrong size.
+//! In: the picture, the detected border, the icon of the first view. Out: the corners of what that
+//! icon shows. The detector takes now the sheet, now its frame, now the shadow beside it for the
+//! border: views cut along different borders make a blurred model and a wrong size.
 
 use crate::{
     frame::GrayImage,
@@ -15,9 +15,9 @@ use crate::{
     seen_border::{FoundBy, SeenBorder, is_same_border},
 };
 
-/// The corners in `image` of what `reference` shows, near the border `detected`: these corners themselves where they
-/// are the same border, for its edges are the more accurate, or else by alignment. `None` where the picture shows
-/// something else.
+/// The corners in `image` of what `reference` shows, near the border `detected`: these corners
+/// themselves where they are the same border, for its edges are the more accurate, or else by
+/// alignment. `None` where the picture shows something else.
 pub fn reference_border(
     image: &GrayImage,
     detected: &SeenBorder,

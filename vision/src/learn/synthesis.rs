@@ -1,12 +1,12 @@
 //! Generated views of one landmark from a single photograph.
 //!
-//! In: a photograph, the landmark's corners in it, a seed. Out: simulated camera views: other viewpoints, sizes and
-//! light, blurred, noisy, cut out along corners as inexact as the detector's. The same seed gives the same views,
-//! bit for bit.
+//! In: a photograph, the landmark's corners in it, a seed. Out: simulated camera views: other
+//! viewpoints, sizes and light, blurred, noisy, cut out along corners as inexact as the detector's.
+//! The same seed gives the same views, bit for bit.
 //!
-//! Not simulated: relief, reflections, the real surroundings, other illumination. Distances measured on generated
-//! views are therefore smaller than real ones; a model records how many of its views were generated
-//! ([`crate::model::landmark_model::LandmarkModel::generated_views`]).
+//! Not simulated: relief, reflections, the real surroundings, other illumination. Distances
+//! measured on generated views are therefore smaller than real ones; a model records how many of
+//! its views were generated ([`crate::model::landmark_model::LandmarkModel::generated_views`]).
 
 use crate::{
     frame::GrayImage,
@@ -27,8 +27,8 @@ const MAX_DRAWS: usize = 30;
 /// Pixels rendered around the landmark.
 const BORDER_PX: f64 = 12.0;
 
-/// `count` generated views of the landmark at `corners` of `photograph`; fewer where the icon stage refuses a drawn
-/// view, none where the corners are unusable.
+/// `count` generated views of the landmark at `corners` of `photograph`; fewer where the icon stage
+/// refuses a drawn view, none where the corners are unusable.
 pub fn views(
     photograph: &GrayImage,
     corners: &Corners,
@@ -63,7 +63,8 @@ fn view(texture: &Texture, aspect: f64, p: &Params, random: &mut Random) -> Opti
     })
 }
 
-/// The camera's pose: angles of the line of sight to the normal, roll, apparent size, image position.
+/// The camera's pose: angles of the line of sight to the normal, roll, apparent size, image
+/// position.
 struct Pose {
     yaw_rad: f64,
     pitch_rad: f64,
@@ -88,7 +89,8 @@ impl Pose {
     }
 }
 
-/// Corners of a landmark of area 1 and `aspect` = width / height; `None` where they leave the image.
+/// Corners of a landmark of area 1 and `aspect` = width / height; `None` where they leave the
+/// image.
 fn corners_from(pose: &Pose, aspect: f64) -> Option<Corners> {
     let (half_width, half_height) = (0.5 * aspect.sqrt(), 0.5 / aspect.sqrt());
     let distance = FOCAL_PX / pose.size_px;
@@ -97,7 +99,8 @@ fn corners_from(pose: &Pose, aspect: f64) -> Option<Corners> {
     let (sin_roll, cos_roll) = pose.roll_rad.sin_cos();
     let [width, height] = CAMERA_SIZE_PX.map(|s| s as f64);
     let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(a, b)| {
-        // Camera axes (x right, y down, z forward): turn about y, then about x, then push away, then roll.
+        // Camera axes (x right, y down, z forward): turn about y, then about x, then push away,
+        // then roll.
         let (x, y) = (a * half_width, b * half_height);
         let (x, z) = (x * cos_yaw, x * sin_yaw);
         let (y, z) = (y * cos_pitch - z * sin_pitch, y * sin_pitch + z * cos_pitch + distance);
@@ -317,7 +320,8 @@ mod tests {
     #[test]
     fn an_unusable_quad_gives_no_views() {
         let sliver = Corners::try_from([[0.0, 0.0], [300.0, 0.0], [300.0, 1e-3], [0.0, 1e-3]]).unwrap();
-        // Stretched to 1:5 at most, it still is a plane of one colour: views exist, but nothing to learn from.
+        // Stretched to 1:5 at most, it still is a plane of one colour: views exist, but nothing to
+        // learn from.
         for v in views(&poster(5), &sliver, 2, &Params::default(), 1) {
             assert!(v.icon.pixels.iter().all(|g| (0.0..=255.0).contains(g)));
         }

@@ -1,8 +1,8 @@
 //! The texture of a landmark from one photograph, for rendering other views.
 //!
-//! In: a photograph and the landmark's corners in it. Out: a square texture with some surroundings and two coarser
-//! levels, and small pictures of it under a homography, filtered to their scale. [`crate::learn::synthesis`] adds
-//! light and noise.
+//! In: a photograph and the landmark's corners in it. Out: a square texture with some surroundings
+//! and two coarser levels, and small pictures of it under a homography, filtered to their scale.
+//! [`crate::learn::synthesis`] adds light and noise.
 
 use crate::{
     frame::GrayImage,
@@ -11,9 +11,11 @@ use crate::{
 };
 use nalgebra::{Matrix3, Point2, Vector3};
 
-/// Texels along the landmark's side at the finest level: more than the largest generated view shows.
+/// Texels along the landmark's side at the finest level: more than the largest generated view
+/// shows.
 const SIDE: usize = 256;
-/// Surroundings kept on each side, as a share of the landmark's side: corner noise and blur reach beyond the border.
+/// Surroundings kept on each side, as a share of the landmark's side: corner noise and blur reach
+/// beyond the border.
 const MARGIN: f64 = 0.125;
 /// Levels, each half as fine as the last.
 const LEVELS: usize = 3;
@@ -40,7 +42,8 @@ struct Level {
 }
 
 impl Texture {
-    /// Rectifies the landmark from `photograph`. `None` if the corners make no invertible homography.
+    /// Rectifies the landmark from `photograph`. `None` if the corners make no invertible
+    /// homography.
     pub(crate) fn lift(photograph: &GrayImage, corners: &Corners) -> Option<Self> {
         let photograph_from_unit = quad_from_unit(corners.points());
         photograph_from_unit.try_inverse()?;
@@ -72,8 +75,8 @@ impl Texture {
         Some(Self { levels })
     }
 
-    /// The landmark rendered under `view_from_unit` (unit square to pixels of the small picture), before a wall of
-    /// grey `wall`. Row-major, `width * height`.
+    /// The landmark rendered under `view_from_unit` (unit square to pixels of the small picture),
+    /// before a wall of grey `wall`. Row-major, `width * height`.
     pub(crate) fn rendered(
         &self,
         view_from_unit: &Matrix3<f64>,
@@ -128,8 +131,8 @@ impl Level {
         Matrix3::new(scale, 0.0, shift, 0.0, scale, shift, 0.0, 0.0, 1.0)
     }
 
-    /// Adds a row of pixels beginning at `start`, one to the right each: grey levels bilinearly, and the wall
-    /// where nothing covers it; only wall beyond the margin.
+    /// Adds a row of pixels beginning at `start`, one to the right each: grey levels bilinearly,
+    /// and the wall where nothing covers it; only wall beyond the margin.
     #[expect(
         clippy::inline_always,
         reason = "an instruction set holds only in what is inlined where it was chosen"

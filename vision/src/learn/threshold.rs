@@ -1,7 +1,7 @@
 //! The threshold tau of one landmark (method 8).
 //!
-//! In: distances of the landmark's own icons and of the negatives. Out: the tau of least weighted cost of false
-//! positives and false negatives, with its error rates.
+//! In: distances of the landmark's own icons and of the negatives. Out: the tau of least weighted
+//! cost of false positives and false negatives, with its error rates.
 
 use crate::model::threshold::{LimitedBy, Threshold, ThresholdError};
 use serde::{Deserialize, Serialize};
@@ -18,7 +18,8 @@ const COST_TIE: f64 = 1e-9;
 pub struct ThresholdParams {
     /// Cost of a false positive in false negatives (lambda / mu); the paper's 6.
     pub false_positive_weight: f64,
-    /// tau stays below this share of the smallest negative distance while there are no false positives.
+    /// tau stays below this share of the smallest negative distance while there are no false
+    /// positives.
     pub nearest_share: f64,
 }
 
@@ -33,7 +34,8 @@ pub fn cost(tau: f64, positives: &[f64], negatives: &[f64], weight: f64) -> f64 
     weight * share(negatives, |d| d < tau) + share(positives, |d| d >= tau)
 }
 
-/// Midpoint of the leftmost interval of least cost (A18). Distances are 0 or more; infinite ones are never accepted.
+/// Midpoint of the leftmost interval of least cost (A18). Distances are 0 or more; infinite ones
+/// are never accepted.
 pub fn minimise(positives: &[f64], negatives: &[f64], weight: f64) -> Result<f64, ThresholdError> {
     check(positives)?;
     if positives.is_empty() {
@@ -73,12 +75,14 @@ pub fn minimise(positives: &[f64], negatives: &[f64], weight: f64) -> Result<f64
     if best_tau > 0.0 { Ok(best_tau) } else { Err(ThresholdError::Overlap) }
 }
 
-/// The tau in use: [`minimise`], then limited to `nearest_share` of the nearest negative where the optimum has no
-/// false positive, and below `cap` always. With fewer than [`FEW_NEGATIVES`] the cap counts as one more of them:
-/// the sample of negatives is small, and a distractor as near as the cap may exist.
-// Departs from method 8 twice. There n- = 0 gives no threshold; here the cap, measured on real distractors,
-// replaces it. There small sets use the crossing of two normal curves; H^r has infinite values and both classes
-// have long tails towards each other, where the fitted curves underestimate the errors.
+/// The tau in use: [`minimise`], then limited to `nearest_share` of the nearest negative where the
+/// optimum has no false positive, and below `cap` always. With fewer than [`FEW_NEGATIVES`] the cap
+/// counts as one more of them: the sample of negatives is small, and a distractor as near as the
+/// cap may exist.
+// Departs from method 8 twice. There n- = 0 gives no threshold; here the cap, measured on real
+// distractors, replaces it. There small sets use the crossing of two normal curves; H^r has
+// infinite values and both classes have long tails towards each other, where the fitted curves
+// underestimate the errors.
 pub fn threshold(
     positives: &[f64],
     negatives: &[f64],

@@ -25,8 +25,8 @@ use crate::{
     },
 };
 
-/// The same model with tau fitted to its own distances and to `negatives` only. Cheap: the own distances are stored
-/// in the model.
+/// The same model with tau fitted to its own distances and to `negatives` only. Cheap: the own
+/// distances are stored in the model.
 #[must_use]
 pub fn refit_thresholds(model: &LandmarkModel, negatives: &[IconFeatures], p: &Params) -> LandmarkModel {
     let mut model = model.clone();
@@ -37,8 +37,8 @@ pub fn refit_thresholds(model: &LandmarkModel, negatives: &[IconFeatures], p: &P
     add_negatives(&model, negatives, p)
 }
 
-/// The same model with `negatives` added to those it was fitted to: a new landmark costs one comparison with its
-/// icons only.
+/// The same model with `negatives` added to those it was fitted to: a new landmark costs one
+/// comparison with its icons only.
 #[must_use]
 pub fn add_negatives(model: &LandmarkModel, negatives: &[IconFeatures], p: &Params) -> LandmarkModel {
     let mut model = model.clone();
@@ -79,8 +79,8 @@ impl DistanceSamples {
     }
 }
 
-/// tau from the samples. Distances that were only counted are larger than the farthest one stored, so tau stays
-/// below it.
+/// tau from the samples. Distances that were only counted are larger than the farthest one stored,
+/// so tau stays below it.
 pub(crate) fn fitted(evidence: &DistanceSamples, cap: f64, p: &Params) -> Result<Threshold, ThresholdError> {
     let own: Vec<f64> = evidence.own.iter().map(|d| f64::from(*d)).collect();
     let mut others: Vec<f64> = evidence.nearest_others.iter().map(|d| f64::from(*d)).collect();
@@ -90,15 +90,17 @@ pub(crate) fn fitted(evidence: &DistanceSamples, cap: f64, p: &Params) -> Result
     threshold(&own, &others, cap, &p.learn.threshold)
 }
 
-/// The smallest 1 minus likeness of `icons` to the model's exemplars after alignment, the quantity that limits tau
-/// of the likeness. Infinite where no signature is similar. For reports of look-alikes.
+/// The smallest 1 minus likeness of `icons` to the model's exemplars after alignment, the quantity
+/// that limits tau of the likeness. Infinite where no signature is similar. For reports of
+/// look-alikes.
 pub fn unlikeness_of(model: &LandmarkModel, icons: &[IconFeatures], p: &Params) -> f64 {
     let prepared = prepared(&model.exemplars, p);
     let templates = Templates::new(&prepared, p);
     icons.iter().map(|icon| templates.unlikeness(icon, MIN_SIGNATURE)).fold(f64::INFINITY, f64::min)
 }
 
-/// Negatives whose signatures are less similar are not aligned with the exemplars: their distance counts as infinite.
+/// Negatives whose signatures are less similar are not aligned with the exemplars: their distance
+/// counts as infinite.
 const MIN_SIGNATURE: f32 = 0.45;
 
 /// An exemplar prepared for alignment.
@@ -130,8 +132,8 @@ impl<'a> Templates<'a> {
         Self { each, lattices: SamplingGrids::new(p.icon.size, &p.recognise.correlation), p }
     }
 
-    /// The smallest 1 minus likeness of `icon` to the exemplars after alignment, of those whose signatures are
-    /// similar enough.
+    /// The smallest 1 minus likeness of `icon` to the exemplars after alignment, of those whose
+    /// signatures are similar enough.
     pub(crate) fn unlikeness(&self, icon: &IconFeatures, min_signature: f32) -> f64 {
         let (c, a) = (&self.p.recognise.correlation, &self.p.recognise.verdict.align);
         let aligner = Aligner::new(&self.lattices, a);
@@ -150,11 +152,11 @@ impl<'a> Templates<'a> {
     }
 }
 
-/// tau of the likeness: the cap, or a share of the nearest negative. An error where most of the landmark's own
-/// views would be refused.
-// Departs from method 8: own distances influence tau in no other way. Those of generated views, or of one robot's
-// drive, are far smaller than those of another day (reflections, dust, another camera); the safe limit follows from
-// the negatives alone.
+/// tau of the likeness: the cap, or a share of the nearest negative. An error where most of the
+/// landmark's own views would be refused.
+// Departs from method 8: own distances influence tau in no other way. Those of generated views, or
+// of one robot's drive, are far smaller than those of another day (reflections, dust, another
+// camera); the safe limit follows from the negatives alone.
 fn fitted_likeness(evidence: &DistanceSamples, p: &Params) -> Result<Threshold, ThresholdError> {
     let mut own: Vec<f64> = evidence.own.iter().map(|d| f64::from(*d)).collect();
     own.sort_by(f64::total_cmp);
@@ -182,10 +184,11 @@ fn fitted_likeness(evidence: &DistanceSamples, p: &Params) -> Result<Threshold, 
 }
 
 /// The quality gates of method 9.
-// Departs from method 9: stable points, and a threshold for each of the paper's distances, are required only where
-// neither distance has one; content beyond the frame is required in addition. The likeness decides, and one of the
-// two must agree; for a picture of few points the other distance suffices. Where a map's kind is one of the
-// paper's, landmarks with too few stable points are excluded (recognise/retrieval/nearest.rs).
+// Departs from method 9: stable points, and a threshold for each of the paper's distances, are
+// required only where neither distance has one; content beyond the frame is required in addition.
+// The likeness decides, and one of the two must agree; for a picture of few points the other
+// distance suffices. Where a map's kind is one of the paper's, landmarks with too few stable points
+// are excluded (recognise/retrieval/nearest.rs).
 fn status(model: &LandmarkModel, missing: [Option<Gate>; 3], p: &Params) -> ModelStatus {
     let g = &p.learn.gates;
     let photographed = model.views - model.generated_views;

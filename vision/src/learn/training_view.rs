@@ -12,7 +12,8 @@ use crate::{
 pub struct TrainingView {
     /// The rectified picture, cut out along corners as inexact as the detector's.
     pub icon: Icon,
-    /// The same along its true corners, known for generated views: alignment with it is free of corner noise.
+    /// The same along its true corners, known for generated views: alignment with it is free of
+    /// corner noise.
     pub exact: Option<Icon>,
     /// Its corners in the image.
     pub corners_px: Corners,

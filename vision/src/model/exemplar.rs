@@ -1,5 +1,5 @@
-//! An icon of a model: whole grey levels as bytes, shared by the copies of the model. Features are computed on
-//! demand; those for the paper's distances are cached.
+//! An icon of a model: whole grey levels as bytes, shared by the copies of the model. Features are
+//! computed on demand; those for the paper's distances are cached.
 
 use crate::{
     icon::Icon,

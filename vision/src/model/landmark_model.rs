@@ -1,5 +1,5 @@
-//! The learnt appearance of one landmark, and whether it may be used (method 7 to 9). `learn/lesson.rs` makes it,
-//! `model_bytes.rs` stores it.
+//! The learnt appearance of one landmark, and whether it may be used (method 7 to 9).
+//! `learn/lesson.rs` makes it, `model_bytes.rs` stores it.
 
 use crate::{
     model::{
@@ -30,8 +30,8 @@ pub struct Distances {
     pub hausdorff: f64,
 }
 
-/// Distances that a threshold was fitted to, as 32-bit floats: stored, so that tau can be fitted again when other
-/// landmarks are added or removed.
+/// Distances that a threshold was fitted to, as 32-bit floats: stored, so that tau can be fitted
+/// again when other landmarks are added or removed.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct DistanceSamples {
     /// Held-out distances of the landmark's own views, rising.
@@ -52,12 +52,13 @@ impl DistanceSamples {
 pub struct LandmarkModel {
     /// The landmark.
     pub id: LandmarkId,
-    /// [`Params::distance_hash`] of the parameters it was learnt under. Its thresholds are invalid under others.
+    /// [`Params::distance_hash`] of the parameters it was learnt under. Its thresholds are invalid
+    /// under others.
     pub params_hash: u64,
     /// Views it was learnt from (`N_l`).
     pub views: usize,
-    /// How many of them were generated. Where that is all but one, `v_c` and saliency describe the generated
-    /// variation, not observed variation.
+    /// How many of them were generated. Where that is all but one, `v_c` and saliency describe the
+    /// generated variation, not observed variation.
     pub generated_views: usize,
     /// One to three exemplars of the mean and the leading modes, grey levels whole numbers.
     pub exemplars: Vec<Exemplar>,
@@ -75,7 +76,8 @@ pub struct LandmarkModel {
     pub correlation_evidence: DistanceSamples,
     /// Distances that tau of H^r was fitted to.
     pub hausdorff_evidence: DistanceSamples,
-    /// Values of 1 minus likeness that tau was fitted to; infinite for negatives with dissimilar signatures.
+    /// Values of 1 minus likeness that tau was fitted to; infinite for negatives with dissimilar
+    /// signatures.
     pub likeness_evidence: DistanceSamples,
     /// Saliency F (method 9).
     pub saliency_f: f64,
@@ -83,7 +85,8 @@ pub struct LandmarkModel {
     pub stable_points: usize,
     /// F and stable points in one number, 0 to 1.
     pub saliency: f64,
-    /// Visibility confidence `v_c`: the spread of the viewpoints. Over all views, generated ones included.
+    /// Visibility confidence `v_c`: the spread of the viewpoints. Over all views, generated ones
+    /// included.
     pub v_c: f64,
     /// The same over photographed views only; 0 with fewer than two.
     pub photographed_v_c: f64,
@@ -97,8 +100,8 @@ pub struct LandmarkModel {
 }
 
 impl LandmarkModel {
-    /// The same model with the points of its photographed views, each as [`crate::points::taught::view_points`] gives
-    /// them.
+    /// The same model with the points of its photographed views, each as
+    /// [`crate::points::taught::view_points`] gives them.
     #[must_use]
     pub fn with_points(mut self, views: &[Vec<TaughtPoint>]) -> Self {
         self.points = landmark_points(views);
@@ -106,7 +109,8 @@ impl LandmarkModel {
         self
     }
 
-    /// The same model with points, if the settings use points for decisions; `views` is called only then.
+    /// The same model with points, if the settings use points for decisions; `views` is called only
+    /// then.
     #[must_use]
     pub fn with_points_if_used(self, p: &Params, views: impl FnOnce() -> Vec<Vec<TaughtPoint>>) -> Self {
         if p.recognise.verdict.points { self.with_points(&views()) } else { self }
@@ -145,7 +149,8 @@ impl LandmarkModel {
         self.status == ModelStatus::Active
     }
 
-    /// Not in use because a distance does not separate it from others, whatever other gates it fails.
+    /// Not in use because a distance does not separate it from others, whatever other gates it
+    /// fails.
     pub fn overlaps_others(&self) -> bool {
         let ModelStatus::Candidate(failures) = &self.status else { return false };
         let overlap = ThresholdError::Overlap;

@@ -1,6 +1,6 @@
-//! A model as bytes, and back. Little-endian, versioned, with a digest at the end. Bytes stored under other
-//! parameters, by a later version or damaged are refused with a typed error. Features derived from the icons
-//! (Harris points, buckets) are not stored.
+//! A model as bytes, and back. Little-endian, versioned, with a digest at the end. Bytes stored
+//! under other parameters, by a later version or damaged are refused with a typed error. Features
+//! derived from the icons (Harris points, buckets) are not stored.
 
 use crate::{
     icon::{Icon, MAX_ICON_SIZE},
@@ -21,7 +21,8 @@ const MAX_BYTES: usize = 3 * MAX_ICON_SIZE * MAX_ICON_SIZE + MAX_LANDMARK_POINTS
 const MAGIC: [u8; 4] = *b"WMLM";
 const VERSION: u16 = 3;
 const DIGEST_BYTES: usize = 8;
-/// Where the landmark's number is, in every format: after the magic, the version and the hash of the parameters.
+/// Where the landmark's number is, in every format: after the magic, the version and the hash of
+/// the parameters.
 const ID_AT: Range<usize> = 14..22;
 
 /// Why bytes are not a usable model.
@@ -91,8 +92,8 @@ impl LandmarkModel {
         out
     }
 
-    /// Reads a model stored by [`LandmarkModel::to_bytes`] under the same parameters. Thresholds and status follow
-    /// from the stored evidence, under the rules (weights, caps, gates) of `p`.
+    /// Reads a model stored by [`LandmarkModel::to_bytes`] under the same parameters. Thresholds
+    /// and status follow from the stored evidence, under the rules (weights, caps, gates) of `p`.
     pub fn from_bytes(bytes: &[u8], p: &Params) -> Result<Self, StoredModelError> {
         if bytes.len() > MAX_BYTES || bytes.len() < MAGIC.len() + DIGEST_BYTES || !bytes.starts_with(&MAGIC) {
             return Err(StoredModelError::NotAModel);
@@ -119,8 +120,8 @@ impl LandmarkModel {
     }
 }
 
-/// Bytes of the model of a landmark as those of the same model of another one, of whatever parameters. Done twice,
-/// with the first number the second time, it gives the first bytes.
+/// Bytes of the model of a landmark as those of the same model of another one, of whatever
+/// parameters. Done twice, with the first number the second time, it gives the first bytes.
 pub fn renumbered(bytes: &[u8], id: LandmarkId) -> Result<Vec<u8>, StoredModelError> {
     if bytes.len() > MAX_BYTES || bytes.len() < ID_AT.end + DIGEST_BYTES || !bytes.starts_with(&MAGIC) {
         return Err(StoredModelError::NotAModel);

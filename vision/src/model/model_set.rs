@@ -1,5 +1,5 @@
-//! The landmarks that one version of a map recognises: immutable, in the order of their ids, all learnt under the
-//! parameters in use. The caller chooses which models are good enough.
+//! The landmarks that one version of a map recognises: immutable, in the order of their ids, all
+//! learnt under the parameters in use. The caller chooses which models are good enough.
 
 use crate::{
     model::{landmark_id::LandmarkId, landmark_model::LandmarkModel},
@@ -80,16 +80,17 @@ impl ModelSet {
         Self::with_rivals(models, Vec::new(), p)
     }
 
-    /// Of `all` landmarks those in use; as rivals those that are not, because a distance does not separate them
-    /// from others.
+    /// Of `all` landmarks those in use; as rivals those that are not, because a distance does not
+    /// separate them from others.
     pub fn in_use(all: impl Iterator<Item = Arc<LandmarkModel>>, p: &Params) -> Result<Self, ModelSetError> {
         let (active, others): (Vec<_>, Vec<_>) = all.partition(|m| m.is_active());
         let rivals = others.into_iter().filter(|m| m.overlaps_others()).collect();
         Self::with_rivals(active, rivals, p)
     }
 
-    /// `models` beside `rivals`: landmarks of the map that are not recognised, because others look like them, but
-    /// that may be visible. Where the points of a rival agree, too, no landmark is identified.
+    /// `models` beside `rivals`: landmarks of the map that are not recognised, because others look
+    /// like them, but that may be visible. Where the points of a rival agree, too, no landmark is
+    /// identified.
     pub fn with_rivals(
         mut models: Vec<Arc<LandmarkModel>>,
         mut rivals: Vec<Arc<LandmarkModel>>,
@@ -161,8 +162,8 @@ impl ModelSet {
         self.models.iter()
     }
 
-    /// The `count` models whose exemplars are most like `signature`, best first; of equal ones the lower id. At most
-    /// [`MAX_SHORT_LIST`].
+    /// The `count` models whose exemplars are most like `signature`, best first; of equal ones the
+    /// lower id. At most [`MAX_SHORT_LIST`].
     pub fn short_list(&self, signature: &Signature, count: usize) -> Vec<Listed> {
         dispatch!(Level::new(), _s => self.scan(signature, count))
     }
@@ -242,7 +243,8 @@ impl ModelSet {
         parts
     }
 
-    /// [`Params::distance_hash`] of the parameters that the set is for; 0 for a set made by `default()`.
+    /// [`Params::distance_hash`] of the parameters that the set is for; 0 for a set made by
+    /// `default()`.
     pub fn params_hash(&self) -> u64 {
         self.params_hash
     }

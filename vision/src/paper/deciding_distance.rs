@@ -1,5 +1,5 @@
-//! A quad and the landmarks of a map in, the landmarks nearest by C^r or H^r out, where that distance decides
-//! (method 6.1, 6.2, 7.5). `recognise::decision` applies thresholds and margin.
+//! A quad and the landmarks of a map in, the landmarks nearest by C^r or H^r out, where that
+//! distance decides (method 6.1, 6.2, 7.5). `recognise::decision` applies thresholds and margin.
 
 use crate::{
     frame::GrayImage,
@@ -34,9 +34,9 @@ pub(crate) fn verified_nearest(
     found
 }
 
-/// The `count` landmarks of least ratio by one of the paper's distances, and every one with a ratio below 1,
-/// rising; of equal ones the lower id. Where C^r decides and nothing comes within `verify_reach`, H^r is left
-/// infinite.
+/// The `count` landmarks of least ratio by one of the paper's distances, and every one with a ratio
+/// below 1, rising; of equal ones the lower id. Where C^r decides and nothing comes within
+/// `verify_reach`, H^r is left infinite.
 fn nearest(
     readings: &[QuadReading],
     models: &ModelSet,
@@ -142,7 +142,8 @@ fn nearest_by_points(
     })
 }
 
-/// Aligns the quad's picture with each candidate within reach, nearest first, and keeps the better of both results.
+/// Aligns the quad's picture with each candidate within reach, nearest first, and keeps the better
+/// of both results.
 fn verify(
     image: &GrayImage,
     readings: &[QuadReading],

@@ -1,7 +1,8 @@
-//! Accepted landmarks in, the paper's probabilities and entropies out (method 10). `verdict` decides which landmarks
-//! are accepted.
+//! Accepted landmarks in, the paper's probabilities and entropies out (method 10). `verdict`
+//! decides which landmarks are accepted.
 
-/// The paper's m with the printed 1/(N+1), natural logarithm: `1 - ln K / (N+1)` for K of N accepted.
+/// The paper's m with the printed 1/(N+1), natural logarithm: `1 - ln K / (N+1)` for K of N
+/// accepted.
 pub fn entropy_m(accepted: usize, landmarks: usize) -> f64 {
     1.0 - (accepted.max(1) as f64).ln() / (landmarks as f64 + 1.0)
 }

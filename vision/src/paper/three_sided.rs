@@ -1,9 +1,11 @@
-//! Sets of three sides of the default detector (method 3.5): segments that no chosen quad explains in, three-sided
-//! quads out. Doors whose lower end is not visible, posters behind a person, posters cut by the image border. Three
-//! sides must meet in two corners, have the same polarity, and edges along most of their length.
+//! Sets of three sides of the default detector (method 3.5): segments that no chosen quad explains
+//! in, three-sided quads out. Doors whose lower end is not visible, posters behind a person,
+//! posters cut by the image border. Three sides must meet in two corners, have the same polarity,
+//! and edges along most of their length.
 //!
-//! Departs from method 3.5: pairs and closing segments come from corners, as in the default detector, not from the
-//! relaxations, and the free ends are where the edges along the outer sides end, not where their segments do.
+//! Departs from method 3.5: pairs and closing segments come from corners, as in the default
+//! detector, not from the relaxations, and the free ends are where the edges along the outer sides
+//! end, not where their segments do.
 
 use crate::{
     detect::{
@@ -50,8 +52,8 @@ struct OpenSet {
     corners_px: [Point2<f64>; 4],
 }
 
-/// Three-sided quads made of what `quads` leave over, best first, ties by corners. Each segment is used once; none
-/// crosses one of `quads` or lies in one.
+/// Three-sided quads made of what `quads` leave over, best first, ties by corners. Each segment is
+/// used once; none crosses one of `quads` or lies in one.
 pub fn find_three_sided(
     segments: &[EdgeSegment],
     quads: &[Quad],
@@ -85,7 +87,8 @@ pub fn find_three_sided(
     found
 }
 
-/// Indices of the longest segments that neither lie along a border of a chosen quad nor inside one, ascending.
+/// Indices of the longest segments that neither lie along a border of a chosen quad nor inside one,
+/// ascending.
 pub fn unexplained(segments: &[EdgeSegment], quads: &[Quad]) -> Vec<usize> {
     let borders: Vec<&[Point2<f64>; 4]> = quads
         .iter()
@@ -161,7 +164,8 @@ fn meet(
         if distance(&s.p_px) <= distance(&s.q_px) { (s.p_px, s.q_px) } else { (s.q_px, s.p_px) };
     let ends = [middle.p_px, middle.q_px];
     let gap_px = distance(&ends[end]) + distance(&near);
-    // Both gaps count towards c5, whose reach grows with the chord; beyond this neither end can pass.
+    // Both gaps count towards c5, whose reach grows with the chord; beyond this neither end can
+    // pass.
     let reach = p.similarity.closing_gap * middle.length_px + p.similarity.closing_gap_px;
     (gap_px <= 3.0 * reach && distance(&far) > distance(&near))
         .then_some((end, CornerJunction { outer, corner, near, far, gap_px }))
@@ -187,8 +191,8 @@ fn open_set(
         sides.reverse();
     }
     let centre = corners_px.iter().fold(Vector2::zeros(), |sum, c| sum + c.coords * 0.25);
-    // The side of each line on which the middle of the set lies, relative to the brighter side: the same for all
-    // three.
+    // The side of each line on which the middle of the set lies, relative to the brighter side: the
+    // same for all three.
     let bright = |i: usize| segments[sides[i]].normal.dot(&centre) > segments[sides[i]].rho_px;
     let fits =
         bright(0) == bright(1) && bright(1) == bright(2) && plausible(&corners_px, (g.width(), g.height()));
@@ -262,8 +266,8 @@ fn three_sided(set: &OpenSet, g: &Gradients, p: &DetectParams) -> Option<Quad> {
     })
 }
 
-/// A visible end moved onto its refitted line, with its covariance: across from the line, along from the search for
-/// the end. It is the end of the visible edge, not of the object.
+/// A visible end moved onto its refitted line, with its covariance: across from the line, along
+/// from the search for the end. It is the end of the visible edge, not of the object.
 fn foot(line: &FittedLine, end: &Point2<f64>) -> (Point2<f64>, Matrix2<f64>) {
     let at = end + line.normal * (line.rho_px - line.normal.dot(&end.coords));
     let along = Vector2::new(-line.normal.y, line.normal.x);

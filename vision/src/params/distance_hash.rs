@@ -1,16 +1,16 @@
-//! The hash of the settings that define the distances, stored with every threshold. An explicit list of numbers is
-//! hashed: renaming a field changes nothing, changing a number does.
+//! The hash of the settings that define the distances, stored with every threshold. An explicit
+//! list of numbers is hashed: renaming a field changes nothing, changing a number does.
 
 use crate::params::Params;
 
-/// Raised when the same numbers give other distances: an algorithm of icon, points, descriptors, ranks or alignment
-/// changed.
+/// Raised when the same numbers give other distances: an algorithm of icon, points, descriptors,
+/// ranks or alignment changed.
 const VERSION: u64 = 1;
 
 impl Params {
-    /// Names the settings that define the distances: icon, points, descriptor, ranks, alignment. A threshold is
-    /// valid only under the hash of its training. FNV-1a, 64 bits, of a version and of the numbers, each group
-    /// preceded by its length.
+    /// Names the settings that define the distances: icon, points, descriptor, ranks, alignment. A
+    /// threshold is valid only under the hash of its training. FNV-1a, 64 bits, of a version and of
+    /// the numbers, each group preceded by its length.
     pub fn distance_hash(&self) -> u64 {
         let groups = self.distance_numbers();
         let words = groups.iter().flat_map(|group| {
@@ -20,8 +20,8 @@ impl Params {
         fnv1a(std::iter::once(VERSION).chain(words).flat_map(u64::to_le_bytes))
     }
 
-    /// Every number that defines the distances, by stage. Only ever appended to; a change of order or meaning raises
-    /// [`VERSION`].
+    /// Every number that defines the distances, by stage. Only ever appended to; a change of order
+    /// or meaning raises [`VERSION`].
     fn distance_numbers(&self) -> [Vec<f64>; 6] {
         let (icon, r) = (&self.icon, &self.recognise);
         let (harris, descriptor) = (&r.harris, &r.descriptor);
@@ -58,7 +58,8 @@ fn fnv1a(bytes: impl Iterator<Item = u8>) -> u64 {
 mod tests {
     use super::*;
 
-    /// Hash of the default settings. A change here invalidates every stored model of every installation.
+    /// Hash of the default settings. A change here invalidates every stored model of every
+    /// installation.
     const DEFAULT: u64 = 0xc207_d0a0_41ff_bfb9;
 
     #[test]

@@ -106,8 +106,8 @@ fn a_known_landmark_gives_its_pose() {
     assert_pose(&facts);
 }
 
-/// From pixels alone: the poster is detected, identified and located to a few centimetres, and every stage is
-/// reported.
+/// From pixels alone: the poster is detected, identified and located to a few centimetres, and
+/// every stage is reported.
 #[test]
 fn the_pipeline_identifies_and_locates_a_landmark_from_pixels() {
     #[derive(Default)]

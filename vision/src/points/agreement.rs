@@ -1,5 +1,5 @@
-//! A landmark's points and the homography in, the agreement of the patch with each of them out. No keypoint is
-//! required in the patch: the descriptor is computed at the projected position.
+//! A landmark's points and the homography in, the agreement of the patch with each of them out. No
+//! keypoint is required in the patch: the descriptor is computed at the projected position.
 
 use crate::{
     geometry::homography::Homography,
@@ -22,8 +22,8 @@ pub struct Check {
     pub distance: u32,
     /// Mean gradient of the patch there, in grey levels a pixel of the octave.
     pub gradient: f32,
-    /// Share of other positions, in the patch and on the landmark, with a descriptor at least as similar, 0 to 1:
-    /// the empirical probability of agreement by chance at this point.
+    /// Share of other positions, in the patch and on the landmark, with a descriptor at least as
+    /// similar, 0 to 1: the empirical probability of agreement by chance at this point.
     pub by_chance: f32,
     /// Distance of the landmark's point to the most similar plain structure.
     pub plain: u32,
@@ -31,7 +31,8 @@ pub struct Check {
 
 /// Largest descriptor distance of an agreeing point...
 const AGREEING: f32 = 90.0;
-/// ... also as a share of the point's distance to plain structures: a frame must not count as a picture...
+/// ... also as a share of the point's distance to plain structures: a frame must not count as a
+/// picture...
 const AGREEING_PLAIN: f32 = 0.7;
 /// ... and nearer than all but this share of other places.
 pub const AGREEING_BY_CHANCE: f32 = 0.05;
@@ -105,7 +106,8 @@ impl Agreement {
         self.0.iter().flatten().filter(|p| **p == part).count()
     }
 
-    /// Parts of the largest connected region that disagrees; parts are neighbours along rows and columns.
+    /// Parts of the largest connected region that disagrees; parts are neighbours along rows and
+    /// columns.
     pub fn largest_disagreement(&self) -> usize {
         let mut left = self.0.map(|row| row.map(|p| p == Part::Disagrees));
         let mut largest = 0;
@@ -129,8 +131,8 @@ impl Agreement {
     }
 }
 
-/// Compares every point of `taught` that the patch contains at its scale. `turned` quarters were applied to the
-/// patch's points before `seen_from_taught` was found.
+/// Compares every point of `taught` that the patch contains at its scale. `turned` quarters were
+/// applied to the patch's points before `seen_from_taught` was found.
 pub fn checks(
     seen: &SeenPatch,
     turned: usize,

@@ -1,8 +1,9 @@
-//! Tentative matches in, the homography that most of them agree on out. Deterministic: hypotheses come from pairs of
-//! the best matches, in their order.
+//! Tentative matches in, the homography that most of them agree on out. Deterministic: hypotheses
+//! come from pairs of the best matches, in their order.
 //!
-//! A patch is rectified already, so that a pair of matches (a scale along each axis and a translation) starts close
-//! enough for the refits, which free the affine and then the perspective part.
+//! A patch is rectified already, so that a pair of matches (a scale along each axis and a
+//! translation) starts close enough for the refits, which free the affine and then the perspective
+//! part.
 
 use crate::{
     geometry::homography::Homography,
@@ -181,7 +182,8 @@ fn affine(from: &[Point2<f64>], to: &[Point2<f64>]) -> Option<Homography> {
     Homography::from_matrix(Matrix3::new(x[0], x[1], x[2], y[0], y[1], y[2], 0.0, 0.0, 1.0))
 }
 
-/// Whether the mapped corners of the landmark are a convex quad of the same orientation and about the same size.
+/// Whether the mapped corners of the landmark are a convex quad of the same orientation and about
+/// the same size.
 fn is_sane(map: &Homography) -> bool {
     let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(Point2::from);
     if corners.iter().any(|c| map.denominator(c) <= 0.0) {

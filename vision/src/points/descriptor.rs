@@ -1,8 +1,8 @@
-//! A keypoint and the smoothed pictures in, its descriptor out: upright histograms of gradients, 4 x 4 cells of 8
-//! directions, kept as 2 bits a value.
+//! A keypoint and the smoothed pictures in, its descriptor out: upright histograms of gradients, 4
+//! x 4 cells of 8 directions, kept as 2 bits a value.
 //!
-//! Each value of the histogram is compared with two thresholds and stored as the two answers, so that the Hamming
-//! distance of two descriptors is the L1 distance of their values on three levels.
+//! Each value of the histogram is compared with two thresholds and stored as the two answers, so
+//! that the Hamming distance of two descriptors is the L1 distance of their values on three levels.
 
 use crate::points::keypoints::Octave;
 use fearless_simd::{Level, Simd, dispatch, f32x8, prelude::*};
@@ -32,7 +32,8 @@ const THRESHOLDS: [f32; 2] = [0.055, 0.12];
 /// A value of the histogram before square roots is at most this share of its norm.
 const CLIP: f32 = 0.2;
 
-/// The picture round a keypoint: two bits for each of the 128 values, all first bits before all second ones.
+/// The picture round a keypoint: two bits for each of the 128 values, all first bits before all
+/// second ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Descriptor(pub [u64; WORDS]);
 
@@ -93,13 +94,14 @@ pub struct Window {
     pub level: usize,
 }
 
-/// The descriptor of `window` on its octave, and the mean gradient there, in grey levels a pixel of the octave.
+/// The descriptor of `window` on its octave, and the mean gradient there, in grey levels a pixel of
+/// the octave.
 pub fn describe(octave: &Octave, window: &Window) -> (Descriptor, f32) {
     describe_stretched(octave, window, [1.0, 1.0])
 }
 
-/// The same of a window whose sides are longer than its scale says by the factors `stretch`: what [`describe`] would
-/// give after the picture was shrunk by them.
+/// The same of a window whose sides are longer than its scale says by the factors `stretch`: what
+/// [`describe`] would give after the picture was shrunk by them.
 pub fn describe_stretched(octave: &Octave, window: &Window, stretch: [f32; 2]) -> (Descriptor, f32) {
     let line = &*LINE;
     dispatch!(Level::new(), s => {
@@ -108,8 +110,9 @@ pub fn describe_stretched(octave: &Octave, window: &Window, stretch: [f32; 2]) -
     })
 }
 
-/// A line of samples, the same for rows and columns and for every window: where each lies from the centre, in cells,
-/// and its weight. Samples lie between the centres of one cell and the next, padding included, [`PER_CELL`] in a row.
+/// A line of samples, the same for rows and columns and for every window: where each lies from the
+/// centre, in cells, and its weight. Samples lie between the centres of one cell and the next,
+/// padding included, [`PER_CELL`] in a row.
 struct Line {
     from_centre: [f32; PADDED],
     weight: [f32; PADDED],

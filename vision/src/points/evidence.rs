@@ -1,6 +1,7 @@
 //! The probability of so many consistent matches by chance (a contrario: Moisan and Stival 2004).
 
-/// log10 of the upper tail of the binomial distribution: at least `k` of `n`, each with probability `p`.
+/// log10 of the upper tail of the binomial distribution: at least `k` of `n`, each with probability
+/// `p`.
 pub fn log10_tail(n: usize, k: usize, p: f64) -> f64 {
     if k == 0 {
         return 0.0;

@@ -1,8 +1,9 @@
-//! The described keypoints of a frame and the points of a map in, places of landmarks in the frame out.
+//! The described keypoints of a frame and the points of a map in, places of landmarks in the frame
+//! out.
 //!
-//! Each point of the frame votes for the landmarks of its nearest taught points (page 25). With the place and scale
-//! of the taught point a vote says where that landmark lies and how large it is. Votes that agree are a place, and an
-//! affine map that fits them gives its four corners.
+//! Each point of the frame votes for the landmarks of its nearest taught points (page 25). With the
+//! place and scale of the taught point a vote says where that landmark lies and how large it is.
+//! Votes that agree are a place, and an affine map that fits them gives its four corners.
 
 use crate::points::{frame_points::FramePoint, index::PointIndex};
 use nalgebra::{Matrix3, Vector3};
@@ -19,11 +20,13 @@ const NEAR: f32 = 0.25;
 const SCALE: f32 = 1.6;
 /// Votes of taught points closer than this, in landmark units, count once.
 const APART: f32 = 0.03;
-/// Largest residuals of a vote with the affine map, as shares of the landmark's size, one for each refit.
+/// Largest residuals of a vote with the affine map, as shares of the landmark's size, one for each
+/// refit.
 const TOLERANCES: [f64; 3] = [0.2, 0.12, 0.08];
 /// Fewest votes of a refit.
 const MIN_FITTED: usize = 6;
-/// Weight of the mean size beside the votes in a refit, squared landmark units: it decides where they lie in a line.
+/// Weight of the mean size beside the votes in a refit, squared landmark units: it decides where
+/// they lie in a line.
 const PRIOR: f64 = 0.3;
 
 /// Where a landmark may be.
@@ -51,7 +54,8 @@ struct Vote {
     at_px: [f32; 2],
 }
 
-/// The best place of each of the first `models` landmarks of `index` that has one, the best supported first.
+/// The best place of each of the first `models` landmarks of `index` that has one, the best
+/// supported first.
 pub fn frame_places(points: &[FramePoint], index: &PointIndex, models: usize) -> Vec<Place> {
     let mut votes: Vec<Vec<Vote>> = vec![Vec::new(); models];
     for point in points {
@@ -101,7 +105,8 @@ fn agree(a: &Vote, b: &Vote) -> bool {
     })
 }
 
-/// How many votes agree with `seed` from different places of the landmark, and the sum of their weights.
+/// How many votes agree with `seed` from different places of the landmark, and the sum of their
+/// weights.
 fn support(votes: &[Vote], seed: &Vote) -> (usize, u32) {
     let mut places: Vec<[f32; 2]> = Vec::new();
     let mut weight = 0;
@@ -115,7 +120,8 @@ fn support(votes: &[Vote], seed: &Vote) -> (usize, u32) {
     (places.len(), weight)
 }
 
-/// The landmark's corners by the affine map that fits `votes`, beginning with their mean place and size.
+/// The landmark's corners by the affine map that fits `votes`, beginning with their mean place and
+/// size.
 fn corners(votes: &[&Vote]) -> Option<[[f64; 2]; 4]> {
     let count = votes.len() as f64;
     let mean = |of: &dyn Fn(&Vote) -> f32| votes.iter().map(|v| f64::from(of(v))).sum::<f64>() / count;

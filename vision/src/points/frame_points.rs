@@ -1,7 +1,8 @@
-//! A whole frame in, its described keypoints out, as the patches of landmarks of several shapes would show them.
+//! A whole frame in, its described keypoints out, as the patches of landmarks of several shapes
+//! would show them.
 //!
-//! A patch is a square, whatever the shape of its landmark. A frame is not rectified: each keypoint is described once
-//! for every one of a few shapes.
+//! A patch is a square, whatever the shape of its landmark. A frame is not rectified: each keypoint
+//! is described once for every one of a few shapes.
 
 use crate::{
     detect::pyramid::{reduce, working_factor},
@@ -20,8 +21,8 @@ use std::collections::BTreeMap;
 
 /// Most keypoints of a frame: the bound of the time that a frame's texture takes.
 pub const MAX_FRAME_POINTS: usize = 400;
-/// Width over height, in the image, of the landmarks that keypoints are described for. One and a third to either side
-/// is near enough.
+/// Width over height, in the image, of the landmarks that keypoints are described for. One and a
+/// third to either side is near enough.
 const SHAPES: [f32; 3] = [0.5, 0.85, 1.45];
 /// Most points: every keypoint in every shape.
 pub const MAX_DESCRIBED: usize = MAX_FRAME_POINTS * SHAPES.len();
@@ -29,9 +30,11 @@ pub const MAX_DESCRIBED: usize = MAX_FRAME_POINTS * SHAPES.len();
 const WORKING_SIDE_PX: usize = 640;
 /// Octaves of a frame.
 const OCTAVES: usize = 3;
-/// Smallest response of a keypoint, grey levels: ten times that of patches, whose keypoints have fewer rivals.
+/// Smallest response of a keypoint, grey levels: ten times that of patches, whose keypoints have
+/// fewer rivals.
 const MIN_RESPONSE: f32 = 2.5;
-/// Keypoints are chosen from cells of this side in turn, work pixels: one rich picture must not take all.
+/// Keypoints are chosen from cells of this side in turn, work pixels: one rich picture must not
+/// take all.
 const CELL_PX: f32 = 40.0;
 /// Frames that are rolled less are described as they are, radians.
 const MAX_ROLL_RAD: f64 = 0.14;
@@ -58,8 +61,8 @@ pub struct FramePoints {
     pub image_from_work: Homography,
 }
 
-/// The points of `image` outside of the borders `explained`. The work picture is the image turned back by `roll_rad`:
-/// clockwise on screen is positive. `None` for an image without pixels.
+/// The points of `image` outside of the borders `explained`. The work picture is the image turned
+/// back by `roll_rad`: clockwise on screen is positive. `None` for an image without pixels.
 pub fn frame_points(image: &GrayImage, roll_rad: f64, explained: &[Corners]) -> Option<FramePoints> {
     let factor = working_factor(image, WORKING_SIDE_PX);
     let reduced = (factor > 1).then(|| reduce(image, factor));

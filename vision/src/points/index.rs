@@ -1,5 +1,5 @@
-//! The points of all landmarks of a map, by word: a patch's points vote for landmarks without being compared with all
-//! of them. Half of each descriptor is kept here, enough for votes.
+//! The points of all landmarks of a map, by word: a patch's points vote for landmarks without being
+//! compared with all of them. Half of each descriptor is kept here, enough for votes.
 
 use crate::points::{
     descriptor::Descriptor,
@@ -95,10 +95,11 @@ impl PointIndex {
         self.entries.len() * size_of::<Entry>() + self.starts.len() * size_of::<u32>()
     }
 
-    /// The `count` models with most votes of `points`, most first, of equal ones the lower index; those with less
-    /// than `least` are left out. Each with its votes: a point votes for the landmarks of its nearest neighbours,
-    /// weighted by how much nearer they are than the next landmark's: texture of many landmarks has little weight,
-    /// but not zero, since more landmarks may have the same picture.
+    /// The `count` models with most votes of `points`, most first, of equal ones the lower index;
+    /// those with less than `least` are left out. Each with its votes: a point votes for the
+    /// landmarks of its nearest neighbours, weighted by how much nearer they are than the next
+    /// landmark's: texture of many landmarks has little weight, but not zero, since more landmarks
+    /// may have the same picture.
     pub fn vote(&self, points: &[Point], count: usize, least: u32) -> Vec<(usize, u32)> {
         if self.is_empty() {
             return Vec::new();
@@ -111,8 +112,8 @@ impl PointIndex {
         best
     }
 
-    /// The nearest taught points of at most eight landmarks, one of each, wherever they are on it: for points
-    /// of which nobody knows where on a landmark they would be.
+    /// The nearest taught points of at most eight landmarks, one of each, wherever they are on it:
+    /// for points of which nobody knows where on a landmark they would be.
     pub fn nearest(&self, descriptor: &Descriptor) -> Vec<Neighbour> {
         if self.is_empty() {
             return Vec::new();

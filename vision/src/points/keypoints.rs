@@ -1,5 +1,5 @@
-//! A patch in, its keypoints out: extrema of the difference of Gaussians over place and scale (Lowe 2004). No
-//! orientation: the patch is rectified already.
+//! A patch in, its keypoints out: extrema of the difference of Gaussians over place and scale (Lowe
+//! 2004). No orientation: the patch is rectified already.
 
 use crate::{
     points::patch::Patch,
@@ -22,7 +22,8 @@ const MAX_OCTAVES: usize = 4;
 const MIN_RESPONSE: f32 = 0.25;
 /// Largest ratio of the principal curvatures: beyond it the point is an edge.
 const MAX_EDGE_RATIO: f32 = 10.0;
-/// Where the Gaussians of a frame end, in their sigmas: patches take four, which costs a third more.
+/// Where the Gaussians of a frame end, in their sigmas: patches take four, which costs a third
+/// more.
 const FRAME_REACH: f64 = 2.5;
 /// Pixels along the border of an octave without extrema.
 const BORDER_PX: usize = 3;
@@ -70,7 +71,8 @@ impl ScaleSpace {
         Self::of(&patch.pixels, patch.side, MAX_OCTAVES, blurred)
     }
 
-    /// The same of a whole frame: `pixels`, row-major in rows of `width`, over at most `most` octaves.
+    /// The same of a whole frame: `pixels`, row-major in rows of `width`, over at most `most`
+    /// octaves.
     pub fn of_frame(pixels: &[f32], width: usize, most: usize) -> Self {
         let smooth = |pixels: &[f32], width: usize, sigma: f64| {
             blurred_to(pixels, width, sigma, (FRAME_REACH * sigma).ceil() as usize)
@@ -128,7 +130,8 @@ pub fn all_keypoints(space: &ScaleSpace, least: f32) -> Vec<Keypoint> {
 /// How far around a keypoint the image must show the patch, in its scales.
 const SUPPORT: f32 = 1.0;
 
-/// Pictures whose differences are the responses at one scale and at the two next to it, from the finest on.
+/// Pictures whose differences are the responses at one scale and at the two next to it, from the
+/// finest on.
 type Levels<'a> = [&'a [f32]; 4];
 
 fn extrema(octave: &Octave, index: usize, least: f32, found: &mut Vec<Keypoint>) {
@@ -182,8 +185,8 @@ fn marked(peaks: &[u8]) -> impl Iterator<Item = usize> {
     parts.flat_map(|(start, part)| (start..).zip(part).filter(|(_, mark)| **mark != 0).map(|(x, _)| x))
 }
 
-/// Marks what may be an extremum in a row that begins at `start`: strong enough, and beyond its neighbours to the
-/// left, the right, and at the two next scales.
+/// Marks what may be an extremum in a row that begins at `start`: strong enough, and beyond its
+/// neighbours to the left, the right, and at the two next scales.
 #[expect(
     clippy::inline_always,
     reason = "an instruction set holds only in what is inlined where it was chosen"

@@ -1,5 +1,5 @@
-//! Points of a patch and of a landmark in, tentative matches out: mutual nearest neighbours within a gate of place
-//! and scale, clearly nearer than the next neighbour elsewhere.
+//! Points of a patch and of a landmark in, tentative matches out: mutual nearest neighbours within
+//! a gate of place and scale, clearly nearer than the next neighbour elsewhere.
 
 use crate::points::point::Point;
 use fearless_simd::{Level, dispatch};

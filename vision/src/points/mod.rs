@@ -1,5 +1,5 @@
-//! Point evidence for the identity of a landmark: keypoints on a rectified patch, matches with the learnt points, a
-//! homography, and how improbable so many consistent matches are by chance.
+//! Point evidence for the identity of a landmark: keypoints on a rectified patch, matches with the
+//! learnt points, a homography, and how improbable so many consistent matches are by chance.
 
 pub mod patch;
 pub mod keypoints;

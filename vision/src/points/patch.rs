@@ -1,4 +1,5 @@
-//! A quad in, its rectified patch with a margin out. The margin lets the taught border lie outside the detected one.
+//! A quad in, its rectified patch with a margin out. The margin lets the taught border lie outside
+//! the detected one.
 //!
 //! Landmark coordinates: the quad's corners TL, TR, BR, BL are (0, 0), (1, 0), (1, 1), (0, 1).
 
@@ -9,7 +10,8 @@ use crate::{
 };
 use nalgebra::{Matrix3, Point2};
 
-/// Sides of the quad inside its patch, in patch pixels, falling. With the margin patches have 198, 120 and 72 px.
+/// Sides of the quad inside its patch, in patch pixels, falling. With the margin patches have 198,
+/// 120 and 72 px.
 pub const INNER_PX: [usize; 3] = [128, 84, 56];
 /// Margin on every side, as a share of the quad's side.
 pub const MARGIN: f64 = 0.25;
@@ -39,8 +41,9 @@ pub fn inner_px(corners_px: &Corners) -> usize {
 }
 
 impl Patch {
-    /// Rectifies the quad `corners_px` to `inner` x `inner` pixels, with [`MARGIN`] around. Outside the image its
-    /// border is repeated. `None` where the corners are degenerate or the margin reaches the horizon.
+    /// Rectifies the quad `corners_px` to `inner` x `inner` pixels, with [`MARGIN`] around. Outside
+    /// the image its border is repeated. `None` where the corners are degenerate or the margin
+    /// reaches the horizon.
     pub fn new(image: &GrayImage, corners_px: &Corners, inner: usize) -> Option<Self> {
         let margin = (inner as f64 * MARGIN).round() as usize;
         let side = inner + 2 * margin;

@@ -1,5 +1,6 @@
-//! Descriptors that do not identify a landmark: straight edges, bars and right angles along the sides of its rectangle.
-//! Frames, mats, panels, window bars and door leaves have them, and so do distractors.
+//! Descriptors that do not identify a landmark: straight edges, bars and right angles along the
+//! sides of its rectangle. Frames, mats, panels, window bars and door leaves have them, and so do
+//! distractors.
 
 use crate::points::{
     descriptor::{Descriptor, VALUES, Window, describe},
@@ -8,7 +9,8 @@ use crate::points::{
 use fearless_simd::{Level, dispatch};
 use std::sync::LazyLock;
 
-/// Side of a drawn structure, in pixels, and the scale at which it is described: a window of 12 scales and its rim.
+/// Side of a drawn structure, in pixels, and the scale at which it is described: a window of 12
+/// scales and its rim.
 const SIDE: usize = 48;
 const SIGMA: f32 = 2.0;
 /// Offsets of a structure from the centre of the window, in pixels.

@@ -1,5 +1,5 @@
-//! A quad and the landmarks of a map in, the landmarks with point evidence out: votes by the index, homographies for
-//! the landmarks with most votes, verification of the best of these.
+//! A quad and the landmarks of a map in, the landmarks with point evidence out: votes by the index,
+//! homographies for the landmarks with most votes, verification of the best of these.
 
 use crate::{
     detect::quad::Quad,
@@ -20,14 +20,16 @@ const MAX_HYPOTHESES: usize = 8;
 const MAX_VERIFIED: usize = 3;
 /// Least weight of votes of a landmark: see [`PointIndex::vote`].
 const MIN_VOTES: u32 = 4;
-/// Landmarks with less than this share of the most votes are dropped: a look-alike gets about as many.
+/// Landmarks with less than this share of the most votes are dropped: a look-alike gets about as
+/// many.
 const MIN_VOTES_SHARE: f64 = 0.2;
-/// After a certain landmark, others are verified only if at least this share of their matches agrees on the
-/// homography: most matches of a look-alike agree, few of a chance match.
+/// After a certain landmark, others are verified only if at least this share of their matches
+/// agrees on the homography: most matches of a look-alike agree, few of a chance match.
 const MIN_RIVAL_SHARE: f64 = 0.25;
 /// log10 of the false alarms in one comparison below which a landmark is certain.
 const LOG10_SURE: f64 = -12.0;
-/// Borders of a quad that get a patch of their own: those that overlap all earlier ones by less than this.
+/// Borders of a quad that get a patch of their own: those that overlap all earlier ones by less
+/// than this.
 const SAME_BORDER_IOU: f64 = 0.6;
 /// Most borders of a quad.
 const MAX_BORDERS: usize = 2;
@@ -41,8 +43,8 @@ pub struct LandmarkPoints {
     pub border: usize,
     /// Its point evidence.
     pub evidence: PointEvidence,
-    /// The best evidence for the same landmark under another rotation, where there is any: a landmark that looks the
-    /// same upside down has it.
+    /// The best evidence for the same landmark under another rotation, where there is any: a
+    /// landmark that looks the same upside down has it.
     pub turned: Option<PointEvidence>,
 }
 

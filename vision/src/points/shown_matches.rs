@@ -1,6 +1,7 @@
-//! Matches of a quad with one landmark, to be shown to a person. In: the image, the corners of the quad, the landmark's points.
-//! Out: pairs of places in landmark coordinates, those that agree first. It decides nothing: the same matches as in a search,
-//! also where they are too few for evidence.
+//! Matches of a quad with one landmark, to be shown to a person. In: the image, the corners of the
+//! quad, the landmark's points. Out: pairs of places in landmark coordinates, those that agree
+//! first. It decides nothing: the same matches as in a search, also where they are too few for
+//! evidence.
 
 use crate::{
     frame::GrayImage,
@@ -28,8 +29,8 @@ pub struct ShownMatch {
 /// log10 of the false alarms below which matches are shown as agreeing.
 const LOG10_BELIEVED: f64 = -1.0;
 
-/// At most `most` matches of the quad `corners_px` with the points `taught`; none where the quad gives no patch. A quad may be
-/// turned by quarters: the turn with most matches that agree counts.
+/// At most `most` matches of the quad `corners_px` with the points `taught`; none where the quad
+/// gives no patch. A quad may be turned by quarters: the turn with most matches that agree counts.
 pub fn shown_matches(
     image: &GrayImage,
     corners_px: &Corners,

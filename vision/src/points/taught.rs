@@ -110,9 +110,9 @@ impl TaughtPoint {
     }
 }
 
-/// The points of one photographed view: those on the landmark that are not plain structures, in the patch of its size
-/// and in the smaller ones, as robots see it from further away. The strongest first, a share of each size in turn.
-/// Empty where the corners are degenerate.
+/// The points of one photographed view: those on the landmark that are not plain structures, in the
+/// patch of its size and in the smaller ones, as robots see it from further away. The strongest
+/// first, a share of each size in turn. Empty where the corners are degenerate.
 pub fn view_points(image: &GrayImage, corners_px: &Corners) -> Vec<TaughtPoint> {
     let largest = inner_px(corners_px);
     let mut sizes: Vec<Vec<TaughtPoint>> = Vec::new();
@@ -142,8 +142,9 @@ fn points_of(patch: Patch) -> Vec<TaughtPoint> {
     seen.points.iter().filter(inside).map(of).filter(|p| p.plain() >= MIN_PLAIN_DISTANCE).collect()
 }
 
-/// The points of a landmark from those of its photographed views: of up to [`MAX_POINT_VIEWS`] views, evenly chosen,
-/// each without duplicates of the earlier ones. At most [`MAX_LANDMARK_POINTS`].
+/// The points of a landmark from those of its photographed views: of up to [`MAX_POINT_VIEWS`]
+/// views, evenly chosen, each without duplicates of the earlier ones. At most
+/// [`MAX_LANDMARK_POINTS`].
 pub fn landmark_points(views: &[Vec<TaughtPoint>]) -> Vec<TaughtPoint> {
     let chosen = views.len().min(MAX_POINT_VIEWS);
     let mut points: Vec<TaughtPoint> = Vec::new();

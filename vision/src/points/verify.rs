@@ -1,6 +1,6 @@
-//! Verification of a landmark in a patch: matches, homography, then the agreement of the landmark's other points at
-//! their projected positions. The points that determined the homography are not independent evidence; the others
-//! are held out, so their agreement counts in full.
+//! Verification of a landmark in a patch: matches, homography, then the agreement of the landmark's
+//! other points at their projected positions. The points that determined the homography are not
+//! independent evidence; the others are held out, so their agreement counts in full.
 
 use crate::{
     detect::quad::BORDER_SIGMA_PX,
@@ -69,8 +69,8 @@ pub struct PointEvidence {
     pub checked: usize,
     /// Those of them that agree.
     pub agreeing: usize,
-    /// log10 of the number of false alarms (expected such coincidences in one comparison with an unrelated patch):
-    /// 0 at most. A caller that compares with N landmarks adds log10 N.
+    /// log10 of the number of false alarms (expected such coincidences in one comparison with an
+    /// unrelated patch): 0 at most. A caller that compares with N landmarks adds log10 N.
     pub log10_nfa: f64,
     /// Quarters by which the patch was turned.
     pub turned: usize,
@@ -78,7 +78,8 @@ pub struct PointEvidence {
     pub corners_px: Corners,
     /// Their covariances, px^2.
     pub corner_covariance_px2: [Matrix2<f64>; 4],
-    /// Whether the corners are those of the homography, or were aligned from there with the learnt icon.
+    /// Whether the corners are those of the homography, or were aligned from there with the learnt
+    /// icon.
     pub found_by: FoundBy,
     /// Which parts of the landmark agree.
     pub agreement: Agreement,
@@ -115,7 +116,8 @@ impl Hypothesis {
     }
 }
 
-/// The homography that matches of `points` (of a patch, turned by `turned` quarters) with the target agree on.
+/// The homography that matches of `points` (of a patch, turned by `turned` quarters) with the
+/// target agree on.
 pub(crate) fn hypothesis(
     points: &[Point],
     turned: usize,
@@ -162,8 +164,9 @@ pub fn verified(seen: &SeenPatch, hypothesis: &Hypothesis, target: &Target) -> O
     })
 }
 
-/// Places that were not `used` yet and have texture, how many of them agree, and the mean number of points of a place
-/// (several views of a landmark differ): a place agrees if any of its points does.
+/// Places that were not `used` yet and have texture, how many of them agree, and the mean number of
+/// points of a place (several views of a landmark differ): a place agrees if any of its points
+/// does.
 fn held_out(checks: &[Check], target: &Target, used: &[[f32; 2]]) -> (usize, usize, f64) {
     let near = |a: &[f32; 2], b: &[f32; 2]| (a[0] - b[0]).abs() < APART && (a[1] - b[1]).abs() < APART;
     let mut places: Vec<([f32; 2], bool)> = Vec::new();
@@ -183,8 +186,8 @@ fn held_out(checks: &[Check], target: &Target, used: &[[f32; 2]]) -> (usize, usi
     (places.len(), agreeing, f64::from(points) / places.len().max(1) as f64)
 }
 
-/// Corners of the taught border in the image, with covariances from the residuals of the inliers and from the
-/// uncertainty of the taught border.
+/// Corners of the taught border in the image, with covariances from the residuals of the inliers
+/// and from the uncertainty of the taught border.
 fn corners(
     seen: &SeenPatch,
     turned: usize,
@@ -237,8 +240,9 @@ fn corners(
     Some((corners, std::array::from_fn(of)))
 }
 
-/// The evidence for one landmark, whose corners are expected at `predicted_px` (TL first), without a detected quad;
-/// the landmark may be partly outside the image. `None`: no homography with enough matches.
+/// The evidence for one landmark, whose corners are expected at `predicted_px` (TL first), without
+/// a detected quad; the landmark may be partly outside the image. `None`: no homography with enough
+/// matches.
 pub fn verify_at(image: &GrayImage, taught: &[TaughtPoint], predicted_px: &Corners) -> Option<PointEvidence> {
     let patch = Patch::new(image, predicted_px, inner_px(predicted_px))?;
     let seen = SeenPatch::new(patch, MAX_PATCH_POINTS);

@@ -1,5 +1,5 @@
-//! A division of all descriptors into words, so that a point is compared with few points of a map. The same for every
-//! map: its medoids are descriptors of generated textures, in two levels.
+//! A division of all descriptors into words, so that a point is compared with few points of a map.
+//! The same for every map: its medoids are descriptors of generated textures, in two levels.
 
 use crate::{
     frame::GrayImage,
@@ -105,8 +105,8 @@ fn tree() -> Tree {
     Tree { roots, leaves }
 }
 
-/// `count` medoids, fewer of fewer descriptors, by a few rounds of assignment; in each the new medoid is the
-/// bitwise majority of those assigned.
+/// `count` medoids, fewer of fewer descriptors, by a few rounds of assignment; in each the new
+/// medoid is the bitwise majority of those assigned.
 #[expect(clippy::inline_always, reason = "as above")]
 #[inline(always)]
 fn medoids(all: &[Descriptor], count: usize) -> Vec<Descriptor> {

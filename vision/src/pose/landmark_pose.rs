@@ -1,8 +1,8 @@
 //! Pose of a landmark in the camera frame from its four corners (method 13.1 to 13.5).
 //!
-//! In: corners with covariance, the landmark's size, a calibrated camera. Out: the best pose with its covariance,
-//! the other minimum of the reprojection error where there is one, and whether the two are ambiguous. The robot's
-//! pose is computed by `map::localise`.
+//! In: corners with covariance, the landmark's size, a calibrated camera. Out: the best pose with
+//! its covariance, the other minimum of the reprojection error where there is one, and whether the
+//! two are ambiguous. The robot's pose is computed by `map::localise`.
 
 use crate::{
     frame::Intrinsics,
@@ -15,14 +15,16 @@ use crate::{
     },
 };
 
-/// Pose of a recognised landmark: always with covariance, and with the second solution of the planar ambiguity.
+/// Pose of a recognised landmark: always with covariance, and with the second solution of the
+/// planar ambiguity.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LandmarkPose {
     /// The solution of least error.
     pub best: PoseSolution,
     /// The other local minimum, where there is one.
     pub second: Option<PoseSolution>,
-    /// The reprojection errors of both do not decide (ratio below [`AMBIGUOUS_RATIO`]): a prior is needed.
+    /// The reprojection errors of both do not decide (ratio below [`AMBIGUOUS_RATIO`]): a prior is
+    /// needed.
     pub ambiguous: bool,
     /// The corners used: localisation fits the robot's pose directly to them.
     pub measured: PoseMeasurement,
@@ -32,15 +34,17 @@ pub struct LandmarkPose {
 pub const AMBIGUOUS_RATIO: f64 = 2.0;
 /// Difference of chi2 below which two solutions are ambiguous.
 ///
-/// Departs from method 13.4: the ratio alone lets flips through, since a true pose with an unlucky chi2 of 6 next to
-/// a false one of 1 has ratio 2.4. For two minima whose predictions lie D sigma apart the false one wins by more than
-/// T with probability Q((T + D^2) / 2D) <= Q(sqrt T), at any D: 3e-5 for T = 16.
+/// Departs from method 13.4: the ratio alone lets flips through, since a true pose with an unlucky
+/// chi2 of 6 next to a false one of 1 has ratio 2.4. For two minima whose predictions lie D sigma
+/// apart the false one wins by more than T with probability Q((T + D^2) / 2D) <= Q(sqrt T), at any
+/// D: 3e-5 for T = 16.
 pub const AMBIGUOUS_CHI2: f64 = 16.0;
 /// Two minima nearer than this are the same.
 const SAME_POSE_RAD: f64 = 1e-4;
 
-/// Pose of a landmark of known `size` from its `corners` (pixels, distorted as seen, in the landmark's own order)
-/// with their covariance, joint or of each. Eq. (2), nearest rotation, then least squares from it and from its mirror image.
+/// Pose of a landmark of known `size` from its `corners` (pixels, distorted as seen, in the
+/// landmark's own order) with their covariance, joint or of each. Eq. (2), nearest rotation, then
+/// least squares from it and from its mirror image.
 pub fn landmark_pose(
     corners: &Corners,
     covariance_px2: impl Into<CornerCovariance>,
@@ -68,7 +72,8 @@ pub fn landmark_pose(
         second.chi2 - best.chi2 < AMBIGUOUS_CHI2
             || second.reprojection_rms_px < AMBIGUOUS_RATIO * best.reprojection_rms_px
     });
-    // Departs from method 13.5: where the plane's direction is poorly known, (J^T S^-1 J)^-1 is not its covariance.
+    // Departs from method 13.5: where the plane's direction is poorly known, (J^T S^-1 J)^-1 is not
+    // its covariance.
     let scale = (best.chi2 / CHI2_2_95).max(1.0);
     let poses = [Some(best.camera_from_landmark), second.as_ref().map(|s| s.camera_from_landmark)];
     for (i, solution) in [Some(&mut best), second.as_mut()].into_iter().enumerate() {

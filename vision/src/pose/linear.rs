@@ -1,4 +1,5 @@
-//! The linear pose of a plane from its homography, Eq. (2), and the mirror image of a pose (method 13.1, 13.2, 13.4).
+//! The linear pose of a plane from its homography, Eq. (2), and the mirror image of a pose (method
+//! 13.1, 13.2, 13.4).
 
 use crate::{
     geometry::homography::Homography,

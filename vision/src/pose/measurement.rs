@@ -1,4 +1,5 @@
-//! Corners of a landmark in; checked, undistorted corners out: the measurement that a pose is computed from.
+//! Corners of a landmark in; checked, undistorted corners out: the measurement that a pose is
+//! computed from.
 
 use crate::{
     frame::{Distortion, FrameError, Intrinsics},
@@ -49,7 +50,8 @@ pub const MAX_CORNER_SIGMA_PX: f64 = 1e4;
 /// Why there is no pose.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PoseError {
-    /// A side of the landmark is not finite or not in [`LandmarkSize::MIN_M`] to [`LandmarkSize::MAX_M`].
+    /// A side of the landmark is not finite or not in [`LandmarkSize::MIN_M`] to
+    /// [`LandmarkSize::MAX_M`].
     #[error("{field} = {value} is out of range")]
     Size {
         /// `width_m` or `height_m`.
@@ -111,8 +113,8 @@ pub struct UndistortedCorners {
     pub by_camera: [Matrix2x3<f64>; 4],
 }
 
-/// Corners and covariances as the pinhole of the same K would have them, and that pinhole. Checks camera, corners and
-/// covariances.
+/// Corners and covariances as the pinhole of the same K would have them, and that pinhole. Checks
+/// camera, corners and covariances.
 pub fn straightened(
     corners: &Corners,
     covariance_px2: &CornerCovariance,

@@ -1,4 +1,5 @@
-//! Least squares over the pose: the nearest minimum of the weighted reprojection error (method 13.3, 13.5).
+//! Least squares over the pose: the nearest minimum of the weighted reprojection error (method
+//! 13.3, 13.5).
 
 use crate::pose::{
     measurement::PoseMeasurement,
@@ -11,8 +12,8 @@ use nalgebra::{Isometry3, Matrix3, Matrix6, SMatrix, SVector, Vector6};
 pub struct PoseSolution {
     /// Maps landmark coordinates to camera coordinates.
     pub camera_from_landmark: Isometry3<f64>,
-    /// Covariance of the left perturbation (rotation vector rad, translation m), in that order, camera frame:
-    /// corners, and the camera's own errors where they are stated.
+    /// Covariance of the left perturbation (rotation vector rad, translation m), in that order,
+    /// camera frame: corners, and the camera's own errors where they are stated.
     pub covariance: Matrix6<f64>,
     /// Root mean square reprojection error per coordinate, in pixels.
     pub reprojection_rms_px: f64,
@@ -68,7 +69,8 @@ impl<'a> Problem<'a> {
         Some((self.whitening * j, self.whitening * r))
     }
 
-    /// Covariance of a minimum due to errors of the intrinsics, to first order. `None` where none are stated.
+    /// Covariance of a minimum due to errors of the intrinsics, to first order. `None` where none
+    /// are stated.
     pub(crate) fn spread_by_camera(&self, pose: &Isometry3<f64>) -> Option<Matrix6<f64>> {
         self.measured.camera.sigmas?;
         let (j, _) = self.whitened(pose)?;
@@ -117,11 +119,11 @@ impl<'a> Problem<'a> {
         Some(pose)
     }
 
-    /// The solution at a minimum, with `(J^T S^-1 J)^-1` scaled by max(1, chi2 / 5.99). `None` when it is not
-    /// determined.
-    // Departs from method 13.5 (max(1, chi2 / 2)): with 2 degrees of freedom that factor exceeds 1 in 37 % of
-    // consistent draws and makes the mean NEES 5.1 instead of 6, outside the consistency band. Scaling from the 95
-    // % quantile on still corrects corners with understated covariances.
+    /// The solution at a minimum, with `(J^T S^-1 J)^-1` scaled by max(1, chi2 / 5.99). `None` when
+    /// it is not determined.
+    // Departs from method 13.5 (max(1, chi2 / 2)): with 2 degrees of freedom that factor exceeds 1
+    // in 37 % of consistent draws and makes the mean NEES 5.1 instead of 6, outside the consistency
+    // band. Scaling from the 95 % quantile on still corrects corners with understated covariances.
     pub(crate) fn solution(&self, camera_from_landmark: Isometry3<f64>) -> Option<PoseSolution> {
         let (h, _) = self.normal_equations(&camera_from_landmark)?;
         let chi2 = self.chi2(&camera_from_landmark);

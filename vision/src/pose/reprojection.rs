@@ -1,5 +1,5 @@
-//! Pixels of a landmark's corners for a pose, with the derivatives by the pose and by the landmark's size.
-//! A pinhole is assumed: corners are undistorted before they come here.
+//! Pixels of a landmark's corners for a pose, with the derivatives by the pose and by the
+//! landmark's size. A pinhole is assumed: corners are undistorted before they come here.
 
 use crate::{frame::Intrinsics, pose::measurement::LandmarkSize};
 use nalgebra::{Isometry3, Matrix2x3, Matrix3, Point2, SMatrix, Vector3};

@@ -1,9 +1,10 @@
-//! Second moment of a pose around a minimum, by quadrature over the direction of the landmark's normal.
+//! Second moment of a pose around a minimum, by quadrature over the direction of the landmark's
+//! normal.
 //!
-//! Near the front view the corners hardly determine the direction, and chi2 is far from quadratic in it: the
-//! covariance at the minimum is several times too small (measured: mean NEES 10 to 15 instead of 6 at 6 m). Here
-//! the normal goes over a grid, roll and position are refitted at each point. Skipped where the direction is well
-//! determined.
+//! Near the front view the corners hardly determine the direction, and chi2 is far from quadratic
+//! in it: the covariance at the minimum is several times too small (measured: mean NEES 10 to 15
+//! instead of 6 at 6 m). Here the normal goes over a grid, roll and position are refitted at each
+//! point. Skipped where the direction is well determined.
 
 use crate::pose::{refine::Problem, reprojection::perturbed};
 use nalgebra::{Isometry3, Matrix2, Matrix4, Matrix6, SMatrix, Vector3, Vector6};
@@ -32,8 +33,8 @@ struct Sum<'a> {
     moment: Matrix6<f64>,
 }
 
-/// Second moment about the minimum `at` of covariance `linear`; `rival` is the other solution of an ambiguous pair:
-/// the grid excludes its side. `scale` divides chi2.
+/// Second moment about the minimum `at` of covariance `linear`; `rival` is the other solution of an
+/// ambiguous pair: the grid excludes its side. `scale` divides chi2.
 pub(crate) fn second_moment(
     problem: &Problem<'_>,
     at: &Isometry3<f64>,
@@ -99,7 +100,8 @@ impl Sum<'_> {
         }
     }
 
-    /// The pose turned by `turn`, with roll about the normal and position refitted, the normal fixed.
+    /// The pose turned by `turn`, with roll about the normal and position refitted, the normal
+    /// fixed.
     fn refit(&self, from: &Isometry3<f64>, turn: &Vector3<f64>) -> Option<Isometry3<f64>> {
         let mut pose = perturbed(from, turn, &Vector3::zeros());
         for _ in 0..REFITS {

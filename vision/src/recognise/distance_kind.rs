@@ -10,9 +10,9 @@ pub enum DistanceKind {
     Hausdorff,
     /// Bucketed correlation, C^r.
     Correlation,
-    /// Gradient similarity after alignment with the learnt icons of the short list; it must hold beyond the frame,
-    /// too, and one of the two distances must accept unless the similarity is very high. Ratios and order are those
-    /// of the gradient similarity.
+    /// Gradient similarity after alignment with the learnt icons of the short list; it must hold
+    /// beyond the frame, too, and one of the two distances must accept unless the similarity is
+    /// very high. Ratios and order are those of the gradient similarity.
     #[default]
     Both,
 }

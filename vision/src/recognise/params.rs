@@ -27,15 +27,16 @@ pub struct RecogniseParams {
     pub texture: TextureParams,
 }
 
-/// The search for landmarks that a frame shows without a border (`docs/method/25-recognition-by-points.md`).
+/// The search for landmarks that a frame shows without a border
+/// (`docs/method/25-recognition-by-points.md`).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct TextureParams {
-    /// Whether the points of the whole frame vote for landmarks, where the map's distance is `both` and points decide. It
-    /// also names the same picture in another frame.
+    /// Whether the points of the whole frame vote for landmarks, where the map's distance is `both`
+    /// and points decide. It also names the same picture in another frame.
     pub search: bool,
-    /// Only while fewer quads than this have a name, or where up is not known: two names support a robot's pose, which
-    /// needs the mounting of its camera.
+    /// Only while fewer quads than this have a name, or where up is not known: two names support a
+    /// robot's pose, which needs the mounting of its camera.
     pub enough: usize,
 }
 
@@ -49,12 +50,13 @@ impl Default for TextureParams {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct VerdictParams {
-    /// The nearest landmark is the answer only while its ratio is below this share of the runner-up's (method 10:
-    /// 0.7).
+    /// The nearest landmark is the answer only while its ratio is below this share of the
+    /// runner-up's (method 10: 0.7).
     pub margin: f64,
     /// Candidates below this ratio are verified by alignment; 0 turns verification off.
     pub verify_reach: f64,
-    /// After alignment a distance is accepted below this share of tau, because alignment favours the template.
+    /// After alignment a distance is accepted below this share of tau, because alignment favours
+    /// the template.
     pub verified_share: f64,
     /// Length of the short list; the picture is aligned with each.
     pub short_list: usize,
@@ -64,9 +66,9 @@ pub struct VerdictParams {
     pub signature_gap: f32,
     /// Number of landmarks up to which tau of the likeness is used unchanged.
     pub crowd: usize,
-    /// Beyond it tau shrinks by this share with every factor of e: the more landmarks, the nearer the nearest one
-    /// is to any distractor. On 732 quads of other buildings among 267 landmarks, the number of distractors below a
-    /// ratio grows by e with 0.08 of ratio.
+    /// Beyond it tau shrinks by this share with every factor of e: the more landmarks, the nearer
+    /// the nearest one is to any distractor. On 732 quads of other buildings among 267 landmarks,
+    /// the number of distractors below a ratio grows by e with 0.08 of ratio.
     pub crowd_share: f64,
     /// A landmark whose likeness uses more than this share of its tau...
     pub doubtful_share: f64,
@@ -78,16 +80,18 @@ pub struct VerdictParams {
     pub min_content: f64,
     /// From this likeness beyond the frame on...
     pub sure_content_likeness: f64,
-    /// ... in this many buckets, neither of the paper's distances is required: saturation changes them strongly.
+    /// ... in this many buckets, neither of the paper's distances is required: saturation changes
+    /// them strongly.
     pub sure_content: f64,
     /// Landmarks that are verified at most.
     pub max_verified: usize,
-    /// Whether points decide before the icons (`both`); quads without point evidence are left to the icons. See
-    /// `docs/method/25-recognition-by-points.md`.
+    /// Whether points decide before the icons (`both`); quads without point evidence are left to
+    /// the icons. See `docs/method/25-recognition-by-points.md`.
     pub points: bool,
-    /// Landmarks with more points than this are never accepted by their icons alone. One with fewer, whose icon
-    /// agrees, is ambiguous, with [`Plain`](crate::recognise::decision::result::MatchRefusal::Plain): the robot's
-    /// pose may identify it.
+    /// Landmarks with more points than this are never accepted by their icons alone. One with
+    /// fewer, whose icon agrees, is ambiguous, with
+    /// [`Plain`](crate::recognise::decision::result::MatchRefusal::Plain): the robot's pose may
+    /// identify it.
     pub max_icon_points: usize,
     /// Parameters of the alignment.
     pub align: AlignParams,
@@ -122,8 +126,8 @@ impl Default for VerdictParams {
 pub(crate) const LEAST_TAU_SHARE: f64 = 0.5;
 
 impl VerdictParams {
-    /// The share of tau of the likeness that holds among `landmarks`: as many distractors are accepted by a large
-    /// map as by one of `crowd` landmarks.
+    /// The share of tau of the likeness that holds among `landmarks`: as many distractors are
+    /// accepted by a large map as by one of `crowd` landmarks.
     pub fn tau_share(&self, landmarks: usize) -> f64 {
         let crowds = landmarks.max(1) as f64 / self.crowd.max(1) as f64;
         (1.0 - self.crowd_share * crowds.ln().max(0.0)).clamp(LEAST_TAU_SHARE, 1.0)

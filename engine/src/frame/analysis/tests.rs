@@ -22,7 +22,8 @@ use vision::{frame::GrayImage, geometry::homography::Homography, model::Landmark
 /// The first poster that is taught.
 const POSTER: LandmarkId = LandmarkId(1);
 
-/// A robot in front of the first poster, its camera turned clockwise about its axis by each of twelve angles.
+/// A robot in front of the first poster, its camera turned clockwise about its axis by each of
+/// twelve angles.
 struct Rolled {
     scene: Scene,
     map: Arc<MapSnapshot>,

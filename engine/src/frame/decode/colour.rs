@@ -1,5 +1,6 @@
-//! Interleaved pixels to a picture. In: pixels of red, green and blue in some order, or of luma and chroma. Out: a grey
-//! plane and three planes of colour. Grey is weighted as JPEG weights it, so that all encodings give the same grey.
+//! Interleaved pixels to a picture. In: pixels of red, green and blue in some order, or of luma and
+//! chroma. Out: a grey plane and three planes of colour. Grey is weighted as JPEG weights it, so
+//! that all encodings give the same grey.
 
 use protos::{Code, Rejection};
 use vision::frame::{FrameError, GrayImage, Picture};
@@ -7,8 +8,8 @@ use vision::frame::{FrameError, GrayImage, Picture};
 /// Bits behind the point of [`from_ycbcr`]'s weights.
 const BITS: u32 = 14;
 
-/// A picture of pixels of `N` bytes; `places` are those of red, green and blue in a pixel. Error: not as many pixels as the
-/// size says.
+/// A picture of pixels of `N` bytes; `places` are those of red, green and blue in a pixel. Error:
+/// not as many pixels as the size says.
 pub(super) fn from_rgb<const N: usize>(
     size: (usize, usize),
     pixels: &[u8],
@@ -20,7 +21,8 @@ pub(super) fn from_rgb<const N: usize>(
     Picture::from_colour([red?, green?, blue?]).map_err(|error| bad(&error))
 }
 
-/// A picture of pixels of Y, Cb and Cr (JFIF: ITU-R BT.601, full range). Y is the grey level. Error: as [`from_rgb`].
+/// A picture of pixels of Y, Cb and Cr (JFIF: ITU-R BT.601, full range). Y is the grey level.
+/// Error: as [`from_rgb`].
 pub(super) fn from_ycbcr(size: (usize, usize), pixels: &[u8]) -> Result<Picture, Rejection> {
     let weight = |x: f64| (x * f64::from(1 << BITS)).round() as i32;
     let (red_cr, green_cb, green_cr, blue_cb) =

@@ -1,5 +1,6 @@
-//! What a file is that is neither JPEG nor PNG, by its first bytes, and how to get one of those. More decoders would be more
-//! ways to attack the server: these formats come from phones and programs that save JPEG as well.
+//! What a file is that is neither JPEG nor PNG, by its first bytes, and how to get one of those.
+//! More decoders would be more ways to attack the server: these formats come from phones and
+//! programs that save JPEG as well.
 
 /// Kinds by the bytes at a place.
 const KINDS: [(usize, &[u8], &str); 13] = [

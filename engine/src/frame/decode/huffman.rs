@@ -1,5 +1,5 @@
-//! Huffman tables of JPEG files that have none, as many USB cameras' MJPEG streams: the tables of annex K of ITU-T T.81,
-//! which they mean.
+//! Huffman tables of JPEG files that have none, as many USB cameras' MJPEG streams: the tables of
+//! annex K of ITU-T T.81, which they mean.
 
 use std::borrow::Cow;
 
@@ -49,7 +49,8 @@ const TABLES: [Table; 4] = [
     (0x11, [0, 2, 1, 2, 4, 4, 3, 4, 7, 5, 4, 4, 0, 1, 2, 119], &AC_CHROMA),
 ];
 
-/// The file with the standard tables before its first scan, if it has no tables before it; else the file as it is.
+/// The file with the standard tables before its first scan, if it has no tables before it; else the
+/// file as it is.
 pub(super) fn with_standard_tables(file: &[u8]) -> Cow<'_, [u8]> {
     match first_scan_without_tables(file) {
         Some(at) => Cow::Owned([&file[..at], &segment(), &file[at..]].concat()),

@@ -1,6 +1,6 @@
-//! The image of a frame of which a robot sent quads alone. In: patches. Out: a grey image of the frame's size with their
-//! pixels, plain elsewhere, so that what follows is the same as for a whole frame. Colour serves the detection, which the
-//! robot has done.
+//! The image of a frame of which a robot sent quads alone. In: patches. Out: a grey image of the
+//! frame's size with their pixels, plain elsewhere, so that what follows is the same as for a whole
+//! frame. Colour serves the detection, which the robot has done.
 
 use super::{ImageLimits, colour::plane, decode_image};
 use protos::{Rejection, convert::CheckedQuad};
@@ -9,7 +9,8 @@ use vision::frame::GrayImage;
 /// Grey level where nothing is known.
 pub const UNKNOWN_GREY: u8 = 128;
 
-/// The patches of `quads` at their places in an image of `size` px. Errors: those of the decoder, with the patch.
+/// The patches of `quads` at their places in an image of `size` px. Errors: those of the decoder,
+/// with the patch.
 pub fn mosaic(
     quads: &[CheckedQuad],
     (width, height): (usize, usize),

@@ -32,7 +32,8 @@ pub(super) fn picture(size: (usize, usize), raw: &[u8], colours: ColorType) -> R
     }
 }
 
-/// Samples of 8 bits of those of 16: the highest of the bits that the colours use. Alpha uses all 16.
+/// Samples of 8 bits of those of 16: the highest of the bits that the colours use. Alpha uses
+/// all 16.
 fn narrowed(raw: &[u8], samples: usize, used: usize) -> Vec<u8> {
     let (pairs, _) = raw.as_chunks::<2>();
     let wide = || pairs.iter().map(|pair| u16::from_ne_bytes(*pair));

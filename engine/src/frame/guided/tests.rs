@@ -82,8 +82,8 @@ impl Stop {
     }
 }
 
-/// The map with a second landmark that looks like the poster and hangs `along_m` further along its wall: neither is in use
-/// by itself.
+/// The map with a second landmark that looks like the poster and hangs `along_m` further along its
+/// wall: neither is in use by itself.
 fn with_twin(map: &MapSnapshot, along_m: f64) -> MapSnapshot {
     let poster = map.models.get(POSTER).unwrap();
     let twin = Arc::new(vision::model::LandmarkModel { id: TWIN, ..(**poster).clone() });
@@ -119,8 +119,8 @@ fn what_the_picture_alone_names_is_not_guided() {
     assert_eq!(made.report.contradictions, 0);
 }
 
-/// Without points the poster matches by its icon alone. The picture leaves it open; the pose names it at its place, and a
-/// pose that is half a metre off does not.
+/// Without points the poster matches by its icon alone. The picture leaves it open; the pose names
+/// it at its place, and a pose that is half a metre off does not.
 #[test]
 fn what_an_icon_alone_speaks_for_is_named_by_the_pose() {
     let (stop, map) = Stop::new();
@@ -198,8 +198,8 @@ fn of_two_that_look_the_same_the_pose_says_which() {
     let named: Vec<_> = made.observations.iter().map(|s| (s.landmark, s.quad.is_some())).collect();
     assert!(named.contains(&(POSTER, true)), "{named:?}");
     assert!(!named.iter().any(|(id, _)| *id == TWIN), "{named:?}");
-    // By a pose two metres further along the wall, the same picture is the twin: what a pose names proves nothing of that
-    // pose.
+    // By a pose two metres further along the wall, the same picture is the twin: what a pose names
+    // proves nothing of that pose.
     let place = map.landmarks[&POSTER].place.unwrap();
     let along = Pose2::new(-2.0 * place.theta_rad.sin(), 2.0 * place.theta_rad.cos(), 0.0);
     let there =

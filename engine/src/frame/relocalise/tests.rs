@@ -1,4 +1,5 @@
-//! Relocalisation without images: three look-alike doors along a corridor, as in `sim`'s look-alikes.
+//! Relocalisation without images: three look-alike doors along a corridor, as in `sim`'s
+//! look-alikes.
 
 use super::*;
 use crate::snapshot::LandmarkInfo;
@@ -40,8 +41,8 @@ fn observed(x: f64, from: &Pose2) -> Vec<AmbiguousObservation> {
     vec![(0..DOORS.len() as u64).map(|i| (LandmarkId(i), relative)).collect()]
 }
 
-/// Drives east from x = 4 and observes each of `doors` from 1 to 2 m before it. Gives the pose in the end, and the most
-/// hypotheses at a time.
+/// Drives east from x = 4 and observes each of `doors` from 1 to 2 m before it. Gives the pose in
+/// the end, and the most hypotheses at a time.
 fn drive(doors: &[f64]) -> (Option<Pose2>, usize) {
     let (map, relocalisers) = (map(), Relocalisers::default());
     let (mut most, mut x) = (0, 4.0);
@@ -75,7 +76,8 @@ fn one_place_is_left_when_the_distances_between_doors_say_so() {
 
 #[test]
 fn where_doors_hang_nearly_evenly_no_place_is_taken_for_the_only_one() {
-    // The belief prefers the true pose: only the first two doors are 5.0 m apart. But 5.55 m are within the errors.
+    // The belief prefers the true pose: only the first two doors are 5.0 m apart. But 5.55 m are
+    // within the errors.
     let place_of = |x: f64| LandmarkInfo { place: Some(place(x)), ..LandmarkInfo::default() };
     let mut map = map();
     map.landmarks.insert(LandmarkId(2), place_of(16.55));
@@ -130,7 +132,8 @@ fn one_door_alone_never_settles_it() {
 
 #[test]
 fn an_object_that_could_only_be_one_door_settles_nothing_alone() {
-    // From so far away, the robot would stand outside of the map for the other door. But the object may be a distractor.
+    // From so far away, the robot would stand outside of the map for the other door. But the object
+    // may be a distractor.
     let mut map = map();
     map.landmarks.remove(&LandmarkId(2));
     let relocalisers = Relocalisers::default();

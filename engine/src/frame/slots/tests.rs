@@ -136,7 +136,8 @@ fn a_robot_with_many_cameras_has_one_share() {
     whole(&slots.counts());
 }
 
-/// Of three robots one frame a round is in time: each robot's in turn. Of cameras of one robot the same holds.
+/// Of three robots one frame a round is in time: each robot's in turn. Of cameras of one robot the
+/// same holds.
 #[test]
 fn a_frame_that_expired_was_no_turn() {
     for keys in [["r1", "r2", "r3"].map(|robot| key(robot, "front")), ["a", "b", "c"].map(|c| key("r1", c))] {
@@ -239,8 +240,8 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
 }
 
 proptest! {
-    /// Whatever happens in whatever order: nothing is lost, nothing counted twice, never two of one camera in work,
-    /// and what is taken is the newest of its camera.
+    /// Whatever happens in whatever order: nothing is lost, nothing counted twice, never two of one
+    /// camera in work, and what is taken is the newest of its camera.
     #[test]
     fn every_frame_ends_exactly_once(steps in steps()) {
         let slots = Slots::new(3, BYTES);

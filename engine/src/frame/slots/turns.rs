@@ -1,4 +1,5 @@
-//! Whose frame is next. In: slots with a waiting frame. Out: one after another, robots in turns, then the cameras of each.
+//! Whose frame is next. In: slots with a waiting frame. Out: one after another, robots in turns,
+//! then the cameras of each.
 
 use super::SlotKey;
 use protos::Name;
@@ -11,8 +12,9 @@ pub(super) struct Turn {
     pub(super) before: u64,
 }
 
-/// Slots with a waiting frame and none in work. The robot whose last turn was longest ago is next, and of its cameras the one
-/// whose last turn was: a robot that has always something to do gains nothing on one whose next frame is on its way.
+/// Slots with a waiting frame and none in work. The robot whose last turn was longest ago is next,
+/// and of its cameras the one whose last turn was: a robot that has always something to do gains
+/// nothing on one whose next frame is on its way.
 #[derive(Debug, Default)]
 pub(super) struct Turns {
     turn: u64,
@@ -45,7 +47,8 @@ impl Turns {
         Some((SlotKey { robot, camera }, Turn { number: self.turn, before }))
     }
 
-    /// A turn came to nothing: the robot's next frame has the place that this one had. Not where it has had another turn since.
+    /// A turn came to nothing: the robot's next frame has the place that this one had. Not where it
+    /// has had another turn since.
     pub(super) fn give_back(&mut self, robot: &Name, turn: Turn) {
         let Some(last) = self.of_robots.get_mut(robot).filter(|last| **last == turn.number) else { return };
         if self.robots.remove(&(*last, robot.clone())) {

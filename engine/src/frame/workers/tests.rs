@@ -169,7 +169,8 @@ fn a_map_that_is_gone_is_a_refusal() {
     assert_eq!(engine.answer_frame(&k, &job, &sent), FrameOutcome::Rejected(Code::UnknownMap));
 }
 
-/// Far more frames than the pool can take: each is answered or superseded, none is lost, none answered twice.
+/// Far more frames than the pool can take: each is answered or superseded, none is lost, none
+/// answered twice.
 #[test]
 fn overload_conserves_frames() {
     let (engine, sent) = (hall(), Arc::new(Sent::default()));
@@ -293,7 +294,8 @@ fn searches_are_spared_only_while_enough_frames_wait() {
     assert_eq!(spared(&mut robot), [false; 5]);
 }
 
-/// No expected landmark is found: the frame is searched at once, and the third contradiction replaces the pose.
+/// No expected landmark is found: the frame is searched at once, and the third contradiction
+/// replaces the pose.
 #[test]
 fn a_robot_that_was_carried_away_is_found_out_although_searches_are_spared() {
     let mut robot = RestingRobot::new(SearchPolicy::Scheduled);

@@ -1,4 +1,5 @@
-//! Poses that a robot is given as a whole: by the last hypothesis of its relocalisation, or by a person.
+//! Poses that a robot is given as a whole: by the last hypothesis of its relocalisation, or by a
+//! person.
 
 use super::RobotState;
 use map::{
@@ -40,8 +41,8 @@ impl RobotState {
         self.fuser.pose()
     }
 
-    /// Puts the robot where a person says it is, at its newest odometry. Nothing that supported an earlier pose supports this
-    /// one.
+    /// Puts the robot where a person says it is, at its newest odometry. Nothing that supported an
+    /// earlier pose supports this one.
     pub(in crate::motion) fn start_by_hand(&mut self, pose: &Pose2Covariance) -> Option<FusedPose> {
         let (at_ns, _) = self.newest?;
         let before = self.fuser.pose().map(|fused| fused.pose.pose);
@@ -56,7 +57,8 @@ impl RobotState {
         self.fuser.pose()
     }
 
-    /// Whether a frame was taken before a person said where the robot is: it was judged by the pose before.
+    /// Whether a frame was taken before a person said where the robot is: it was judged by the pose
+    /// before.
     pub(in crate::motion) fn is_before_by_hand(&self, captured_ns: i64) -> bool {
         self.by_hand_ns.is_some_and(|at_ns| captured_ns < at_ns)
     }

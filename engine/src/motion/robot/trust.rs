@@ -22,7 +22,8 @@ pub(in crate::motion) struct StatedPose {
 }
 
 impl RobotState {
-    /// The pose was wrong or is unknown: forgets its support, and withdraws the health changes that rest on it.
+    /// The pose was wrong or is unknown: forgets its support, and withdraws the health changes that
+    /// rest on it.
     pub(super) fn invalidate_pose(&mut self) {
         (self.landmarks_at_m, self.guided_at_m, self.laser_at_m) = (None, None, None);
         self.given_by = None;
@@ -55,7 +56,8 @@ impl RobotState {
         self.cameras.len() as u32 - 1
     }
 
-    /// Motion by odometry since the frame before, for a frame with this odometry or, without, the newest.
+    /// Motion by odometry since the frame before, for a frame with this odometry or, without, the
+    /// newest.
     pub(in crate::motion) fn since_last_frame(&mut self, odometry: Option<Pose2>) -> Pose2 {
         let Some(now) = odometry.or(self.newest.map(|(_, newest)| newest)) else { return Pose2::default() };
         let before = self.at_last_frame.replace(now).unwrap_or(now);
@@ -65,7 +67,8 @@ impl RobotState {
     /// The pose as it is published now.
     pub(in crate::motion) fn state_pose(&self, fused: FusedPose, now: Instant) -> StatedPose {
         let trust = match self.schedule.trust() {
-            // `NoPose`: the pose was carried over from another map, and no frame has checked it yet.
+            // `NoPose`: the pose was carried over from another map, and no frame has checked it
+            // yet.
             Trust::NoPose | Trust::Unsupported => PoseTrust::Unsupported,
             Trust::Supported => PoseTrust::Supported,
             Trust::Stale => PoseTrust::Stale,
@@ -89,7 +92,8 @@ impl RobotState {
         }
         match fix.modality {
             FixSource::Laser => self.laser_at_m = Some(self.distance_m),
-            // A landmark that the pose named cannot support the pose: it never becomes a supporting landmark.
+            // A landmark that the pose named cannot support the pose: it never becomes a supporting
+            // landmark.
             FixSource::Landmarks if role == FixRole::Guided => self.guided_at_m = Some(self.distance_m),
             FixSource::Landmarks => {
                 self.landmarks_at_m = Some(self.distance_m);

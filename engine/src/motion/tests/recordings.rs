@@ -63,7 +63,8 @@ fn modality_statistics_apply_from_the_next_message_on() {
     let (motion, r1) = motion();
     motion.odometry_of(&r1, odometry(1, 0.0));
     motion.apply_fix(&r1, at(1_000_000_000, 0.0), &fix(10.0)).unwrap();
-    // In these cells odometry was exact and landmarks were far off: the best modality alone is odometry.
+    // In these cells odometry was exact and landmarks were far off: the best modality alone is
+    // odometry.
     let sums = |error: f64| -> ModalityStats {
         let one = serde_json::json!({
             "steps": 100, "available": 100, "seconds": 1.0, "errors": [0.0, 0.0, 0.0],

@@ -1,5 +1,6 @@
-//! Robots of simulations, whose time runs slower or faster than the server's, stands still, or begins again, and clocks
-//! that drift. A robot drives along x at 1 m/s of its own time; in the map it is 7 m further on than in its odometry.
+//! Robots of simulations, whose time runs slower or faster than the server's, stands still, or
+//! begins again, and clocks that drift. A robot drives along x at 1 m/s of its own time; in the map
+//! it is 7 m further on than in its odometry.
 
 use super::*;
 use protos::CheckedFrame;

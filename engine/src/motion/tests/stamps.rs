@@ -1,5 +1,5 @@
-//! Stray stamps and clocks that are set, in odometry, scans and frames. A robot drives along x at 1 m/s; in the map it is
-//! 7 m further on than in its odometry.
+//! Stray stamps and clocks that are set, in odometry, scans and frames. A robot drives along x at 1
+//! m/s; in the map it is 7 m further on than in its odometry.
 
 use super::*;
 use protos::CheckedFrame;
@@ -162,7 +162,8 @@ fn one_stray_stamp_of_a_frame_changes_nothing() {
         let mut drive = Drive::new();
         drive.on(2.0, 3.0).unwrap();
         let refused = drive.frame(3.0, 3.0 + off_s, "front");
-        // A stamp one second behind may be a delay. Its fix contradicts the pose of that time and is gated.
+        // A stamp one second behind may be a delay. Its fix contradicts the pose of that time and
+        // is gated.
         assert_eq!(refused.is_err(), !(-2.0..=0.2).contains(&off_s), "{off_s}");
         if let Err(instead_ns) = refused {
             assert!((instead_ns - ns(3.0)).abs() < 1_000_000, "{off_s}: {instead_ns}");

@@ -1,5 +1,5 @@
-//! How fast a robot's clock runs by the server's. In: times of capture and receipt. Out: seconds of the robot's clock in a
-//! second of the server's: 1, or the factor of a simulation.
+//! How fast a robot's clock runs by the server's. In: times of capture and receipt. Out: seconds of
+//! the robot's clock in a second of the server's: 1, or the factor of a simulation.
 
 use super::{CLOCK_SET_AFTER, CLOCK_SET_COUNT, CLOCK_SET_SPREAD, MAX_LEADS, nanos};
 use std::{collections::VecDeque, time::Duration};
@@ -16,7 +16,8 @@ const RATE_JITTER: Duration = Duration::from_millis(150);
 /// A row goes back by no more than this.
 const ROW_AGE_NS: i64 = 3_000_000_000;
 
-/// Times of a message, ns: receipt by the server's clock since the first one, capture by the robot's.
+/// Times of a message, ns: receipt by the server's clock since the first one, capture by the
+/// robot's.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct TimePair {
     pub(super) received_ns: i64,
@@ -39,9 +40,10 @@ impl TimePair {
     }
 }
 
-/// The rate that messages in their order of receipt show, if `rate` does not explain them. The least delayed messages of
-/// three equal times must lie on a line: a link that stalls, or delays more from now on, shows no rate. In each, that is the
-/// lead of place `strays`, or the smallest of fewer.
+/// The rate that messages in their order of receipt show, if `rate` does not explain them. The
+/// least delayed messages of three equal times must lie on a line: a link that stalls, or delays
+/// more from now on, shows no rate. In each, that is the lead of place `strays`, or the smallest of
+/// fewer.
 pub(super) fn changed_rate(pairs: &VecDeque<TimePair>, rate: f64, strays: usize) -> Option<f64> {
     let (first_ns, last_ns) = (pairs.front()?.received_ns, pairs.back()?.received_ns);
     let third_ns = (last_ns - first_ns) / 3;
@@ -75,7 +77,8 @@ pub(super) struct ClockRow {
 }
 
 impl ClockRow {
-    /// Adds the next message. One that no clock shows after the one before it begins a row of its own.
+    /// Adds the next message. One that no clock shows after the one before it begins a row of its
+    /// own.
     pub(super) fn add(&mut self, pair: TimePair) {
         if let Some(last) = self.pairs.back() {
             let spread_ns = nanos(CLOCK_SET_SPREAD);
@@ -97,8 +100,8 @@ impl ClockRow {
         }
     }
 
-    /// The rate of the clock that the row shows, once there are enough over enough time: `rate` or 1 if that explains
-    /// them, else their own.
+    /// The rate of the clock that the row shows, once there are enough over enough time: `rate` or
+    /// 1 if that explains them, else their own.
     pub(super) fn rate(&self, rate: f64) -> Option<f64> {
         let (first, last) = (self.pairs.front()?, self.pairs.back()?);
         if self.count < CLOCK_SET_COUNT || last.received_ns - first.received_ns < nanos(CLOCK_SET_AFTER) {

@@ -4,7 +4,8 @@ use protos::{Name, v1};
 use serde::{Serialize, Serializer};
 use std::sync::Arc;
 
-/// Something happened. In JSON: the fields of the variant, without its name; [`LiveEvent::kind`] is the event's name.
+/// Something happened. In JSON: the fields of the variant, without its name; [`LiveEvent::kind`] is
+/// the event's name.
 #[derive(Debug, Clone, Serialize)]
 #[serde(untagged)]
 pub enum LiveEvent {

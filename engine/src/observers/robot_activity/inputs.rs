@@ -1,5 +1,5 @@
-//! What is used and what is refused of one robot's inputs. In: each input with its time. Out: counts by kind and by reason,
-//! and when the log is to be told of a reason again.
+//! What is used and what is refused of one robot's inputs. In: each input with its time. Out:
+//! counts by kind and by reason, and when the log is to be told of a reason again.
 
 use crate::inputs::{Input, Refused};
 use std::{
@@ -7,7 +7,8 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// Reasons that are kept of one kind. Codes are the server's own, far fewer than this; further ones are counted without.
+/// Reasons that are kept of one kind. Codes are the server's own, far fewer than this; further ones
+/// are counted without.
 pub const MAX_REASONS: usize = 64;
 /// How often the log is told of a reason that goes on.
 const TELL_EVERY: Duration = Duration::from_mins(1);

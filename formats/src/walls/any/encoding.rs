@@ -9,8 +9,9 @@ const XML_HEAD_BYTES: usize = 200;
 /// Encodings whose letters are those of Unicode, a byte each.
 const LATIN: [&str; 5] = ["iso-8859-1", "iso-8859-15", "iso_8859-1", "latin1", "windows-1252"];
 
-/// The text of bytes that may be packed by gzip, as `.svgz` is. Errors: more than `max` bytes when unpacked; another
-/// encoding than UTF-8, UTF-16 with a byte order mark, and Latin-1 where XML says so.
+/// The text of bytes that may be packed by gzip, as `.svgz` is. Errors: more than `max` bytes when
+/// unpacked; another encoding than UTF-8, UTF-16 with a byte order mark, and Latin-1 where XML says
+/// so.
 pub(super) fn decoded(bytes: Vec<u8>, max: u64) -> Result<String, WallFileError> {
     let bytes = if bytes.starts_with(&[0x1f, 0x8b]) { unpacked(&bytes, max)? } else { bytes };
     match bytes.as_slice() {

@@ -1,4 +1,5 @@
-//! Claim: the maps and plans of other people's programs are read, or refused with what to do; none is silently nothing.
+//! Claim: the maps and plans of other people's programs are read, or refused with what to do; none
+//! is silently nothing.
 
 use super::*;
 

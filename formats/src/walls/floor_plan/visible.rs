@@ -33,7 +33,8 @@ impl Drawn {
         self.clip_edges += edges;
     }
 
-    /// Whether the next shape is seen: it has an outline, or a fill that is neither the page nor white on white.
+    /// Whether the next shape is seen: it has an outline, or a fill that is neither the page nor
+    /// white on white.
     pub(super) fn is_seen(&mut self, path: &Path) -> bool {
         let fill = path.fill().filter(|fill| fill.opacity().get() > 0.0);
         let is_white = fill.is_some_and(|fill| is_white(fill.paint()));

@@ -1,10 +1,11 @@
-//! Longitude and latitude as metres about a place. In: positions in degrees (WGS 84, east and north positive). Out: metres
-//! east and north of the south-west corner of all.
+//! Longitude and latitude as metres about a place. In: positions in degrees (WGS 84, east and north
+//! positive). Out: metres east and north of the south-west corner of all.
 
 use serde_json::Value;
 use std::fmt;
 
-/// A plan within half a degree each way is in degrees: half a metre is no plan, and 55 km are no site.
+/// A plan within half a degree each way is in degrees: half a metre is no plan, and 55 km are no
+/// site.
 const MAX_SITE_DEG: f64 = 0.5;
 /// WGS 84: half the equator's diameter, metres, and the square of the eccentricity.
 const EQUATOR_M: f64 = 6_378_137.0;

@@ -1,4 +1,5 @@
-//! What a backup costs: making and downloading it, restoring it into an empty data directory, and starting a server there.
+//! What a backup costs: making and downloading it, restoring it into an empty data directory, and
+//! starting a server there.
 
 use super::{Args, MAP, large_map::settings};
 use anyhow::Context as _;
@@ -42,7 +43,8 @@ impl BackupCost {
     }
 }
 
-/// Makes a backup of the running server and downloads it to `file`. Gives the seconds of both together.
+/// Makes a backup of the running server and downloads it to `file`. Gives the seconds of both
+/// together.
 pub(super) async fn download_backup(maps: &MapClient, file: &Path) -> anyhow::Result<f64> {
     let started = Instant::now();
     let backup = maps.wait_for_backup(maps.make_backup().await?, LONGEST).await?;
@@ -55,7 +57,8 @@ pub(super) async fn download_backup(maps: &MapClient, file: &Path) -> anyhow::Re
     Ok(started.elapsed().as_secs_f64())
 }
 
-/// Restores `file` into an empty data directory and starts a server there. `backup_s`: what [`download_backup`] gave.
+/// Restores `file` into an empty data directory and starts a server there. `backup_s`: what
+/// [`download_backup`] gave.
 pub(super) async fn measure_restore(args: &Args, file: &Path, backup_s: f64) -> anyhow::Result<BackupCost> {
     let folder = scratch::Folder::new("restored")?;
     let backup_mb = fs::metadata(file).await?.len() as f64 / 1e6;

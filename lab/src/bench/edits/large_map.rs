@@ -1,4 +1,5 @@
-//! A large map for the benchmark of edits: through the server what is small, the models and places straight into its database.
+//! A large map for the benchmark of edits: through the server what is small, the models and places
+//! straight into its database.
 
 use super::{Args, MAP};
 use crate::bench::recognise::landmarks::models;
@@ -49,7 +50,8 @@ pub(super) fn settings(data: &Path, args: &Args) -> anyhow::Result<Config> {
     Ok(Config::try_from(raw)?)
 }
 
-/// Makes the map: through the server what is small, the models and places straight into its database.
+/// Makes the map: through the server what is small, the models and places straight into its
+/// database.
 pub(super) async fn fill(data: &Path, args: &Args) -> anyhow::Result<()> {
     let server = Server::start(settings(data, args)?).await?;
     let maps = MapClient::new(&format!("http://{}", server.http_addr))?;

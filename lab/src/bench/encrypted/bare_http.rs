@@ -1,5 +1,6 @@
-//! Requests a second of the server and of a bare handler of axum that returns the same bytes, over TLS with kept connections.
-//! The client is as small as it can be, so that its own share of the time hides little.
+//! Requests a second of the server and of a bare handler of axum that returns the same bytes, over
+//! TLS with kept connections. The client is as small as it can be, so that its own share of the
+//! time hides little.
 
 use super::{MAP, Served};
 use crate::evaluate::statistics::quantile;

@@ -1,4 +1,5 @@
-//! An echo of zenoh over TLS: a router that answers each frame at once with as many bytes as an answer has.
+//! An echo of zenoh over TLS: a router that answers each frame at once with as many bytes as an
+//! answer has.
 
 use super::{Served, WAIT};
 use anyhow::anyhow;

@@ -1,6 +1,7 @@
-//! The process of the robots. In: a plan. Out, on its standard output: what became of every frame. The load is open: frames have
-//! intended times, whatever became of the ones before, and latency counts from the intended time, so a server that
-//! stands still is charged for every frame that was due meanwhile.
+//! The process of the robots. In: a plan. Out, on its standard output: what became of every frame.
+//! The load is open: frames have intended times, whatever became of the ones before, and latency
+//! counts from the intended time, so a server that stands still is charged for every frame that was
+//! due meanwhile.
 
 use super::{
     plan::{End, Outcome, Phase, Plan, PlannedRobot, RobotOutcome, Sent},
@@ -33,7 +34,8 @@ const CONNECT: Duration = Duration::from_mins(1);
 const LEAD: Duration = Duration::from_secs(1);
 /// Answers are waited for so long after the last frame.
 const LAST_ANSWERS: Duration = Duration::from_secs(3);
-/// With faults, every so many frames one that the server refuses follows; and a robot is connected anew so often.
+/// With faults, every so many frames one that the server refuses follows; and a robot is connected
+/// anew so often.
 const REFUSED_EVERY: usize = 40;
 const RECONNECT_EVERY: Duration = Duration::from_mins(2);
 

@@ -1,4 +1,5 @@
-//! The server as a process of its own, and what the kernel says of a process: processor time, memory, threads, files.
+//! The server as a process of its own, and what the kernel says of a process: processor time,
+//! memory, threads, files.
 
 use anyhow::Context as _;
 use std::{

@@ -1,4 +1,5 @@
-//! The figures of a run: shares, percentiles, processor time, memory, and whether the counters add up.
+//! The figures of a run: shares, percentiles, processor time, memory, and whether the counters add
+//! up.
 
 use super::{
     Args,
@@ -11,7 +12,8 @@ use cli::screen::say;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
-/// The server has recovered from the second on from which 99 % of the answers of every further second take at most this, ms.
+/// The server has recovered from the second on from which 99 % of the answers of every further
+/// second take at most this, ms.
 const RECOVERED_MS: f64 = 150.0;
 /// The first minutes of a soak, in which memory still grows to its size.
 const WARM_UP_S: f64 = 300.0;
@@ -63,7 +65,8 @@ fn phase_figures(phase: &Phase, begins_s: f64, plan: &Plan, outcome: &Outcome) -
     }
 }
 
-/// Whole seconds after `begins_s` until every further second has its answers in time; `None`: never.
+/// Whole seconds after `begins_s` until every further second has its answers in time; `None`:
+/// never.
 fn recovery_s(begins_s: f64, ends_s: f64, outcome: &Outcome) -> Option<f64> {
     let mut seconds: BTreeMap<u64, Vec<f64>> = BTreeMap::new();
     for sent in outcome.robots.iter().flat_map(|robot| &robot.frames) {

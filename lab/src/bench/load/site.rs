@@ -1,5 +1,5 @@
-//! What the server of the load knows: a corridor whose posters are landmarks, robots with certificates, and a second map whose
-//! posters are learnt again and again.
+//! What the server of the load knows: a corridor whose posters are landmarks, robots with
+//! certificates, and a second map whose posters are learnt again and again.
 
 use super::{plan::PlannedRobot, process::ServerChild};
 use anyhow::Context as _;
@@ -36,8 +36,8 @@ const MUSEUM: &str = "museum";
 const VIEWS: usize = 3;
 /// Width of a poster of the museum, px.
 const POSTER_PX: usize = 240;
-/// Robots that get their certificates at a time: the server gathers changes so close together into one reopening of its
-/// encrypted listener.
+/// Robots that get their certificates at a time: the server gathers changes so close together into
+/// one reopening of its encrypted listener.
 const ENROLLING: usize = 32;
 /// Longest lesson.
 const LESSON: Duration = Duration::from_hours(1);

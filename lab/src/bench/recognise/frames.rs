@@ -1,5 +1,6 @@
-//! Whole frames of a corridor whose posters are among the landmarks: names and processor time in maps of several
-//! sizes, global and guided, and of SIFT with one index over all landmarks of one of these maps.
+//! Whole frames of a corridor whose posters are among the landmarks: names and processor time in
+//! maps of several sizes, global and guided, and of SIFT with one index over all landmarks of one
+//! of these maps.
 
 use super::{
     super::peers::{HINT, Python, written},

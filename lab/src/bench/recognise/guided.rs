@@ -1,5 +1,5 @@
-//! Guided recognition on frames of a robot whose pose is known. The corridor's posters have their places; the other
-//! landmarks hang in other parts of a large building.
+//! Guided recognition on frames of a robot whose pose is known. The corridor's posters have their
+//! places; the other landmarks hang in other parts of a large building.
 
 use super::scenes::{Scenes, number};
 use engine::{

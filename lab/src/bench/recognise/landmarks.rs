@@ -1,5 +1,6 @@
-//! Landmarks of the benchmark's maps: the first few learnt by a lesson against each other; each of the others, up
-//! to thousands, with three icons and points of its own and the thresholds of one of the first.
+//! Landmarks of the benchmark's maps: the first few learnt by a lesson against each other; each of
+//! the others, up to thousands, with three icons and points of its own and the thresholds of one of
+//! the first.
 
 use cli::screen;
 use sim::posters;
@@ -17,7 +18,8 @@ use vision::{
 
 /// Width of the posters' pictures, in pixels; also what SIFT learns from.
 const WIDTH: usize = 200;
-/// Width of the pictures of landmarks beyond the first [`LARGE`]: drawing would take longer than all else.
+/// Width of the pictures of landmarks beyond the first [`LARGE`]: drawing would take longer than
+/// all else.
 const SMALL_WIDTH: usize = 120;
 /// Landmarks with large pictures.
 const LARGE: usize = 1000;

@@ -23,7 +23,8 @@ pub(super) struct Report {
     pub(super) others: usize,
     /// Icons of the others, three each as in the server.
     pub(super) negatives: usize,
-    /// Time with views cut and negatives at hand; extracting the points of one photograph counts, if points are used.
+    /// Time with views cut and negatives at hand; extracting the points of one photograph counts,
+    /// if points are used.
     pub(super) ms: f64,
     pub(super) active: bool,
 }

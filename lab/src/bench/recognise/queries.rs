@@ -1,5 +1,5 @@
-//! Pictures of single quads with their corners as a detector would give them: a poster under a random viewpoint,
-//! light and noise.
+//! Pictures of single quads with their corners as a detector would give them: a poster under a
+//! random viewpoint, light and noise.
 
 use super::landmarks::{picture, whole};
 use nalgebra::{Matrix2, Point2};

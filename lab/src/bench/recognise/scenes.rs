@@ -14,7 +14,8 @@ use vision::frame::{GrayImage, Intrinsics};
 
 /// Posters in the corridor: the first landmarks.
 pub(super) const POSTERS: usize = 24;
-/// A poster counts as visible when each side is at least this long and the view angle is at most this.
+/// A poster counts as visible when each side is at least this long and the view angle is at most
+/// this.
 const MIN_SIDE_PX: f64 = 40.0;
 const MAX_ANGLE_RAD: f64 = 1.22;
 

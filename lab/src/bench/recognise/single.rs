@@ -1,4 +1,5 @@
-//! Single quads: from the picture to the verdict in maps of several sizes, by step; and recall of the short list.
+//! Single quads: from the picture to the verdict in maps of several sizes, by step; and recall of
+//! the short list.
 
 use super::{
     Args, fastest,
@@ -107,7 +108,8 @@ impl StepListener for StepClock {
     }
 }
 
-/// Of quads that are accepted when their landmark is the only one: those without it on the short list of `models`.
+/// Of quads that are accepted when their landmark is the only one: those without it on the short
+/// list of `models`.
 pub(super) fn recall(args: &Args, first: u64, models: &ModelSet, p: &Params) -> anyhow::Result<Recall> {
     let all: Vec<&Arc<LandmarkModel>> = models.iter().collect();
     let n = args.recall_quads as usize;

@@ -1,6 +1,7 @@
-//! `waymark-lab evaluate calibration`: auto-calibration from views of one quad (method 16; E9, Fig. 17). Error of
-//! the focal length over the number of views, on synthetic views and on real boards with a reference calibration; and
-//! what `waymark camera calibrate` answers to rendered pictures of canvases with shadows and framed pictures.
+//! `waymark-lab evaluate calibration`: auto-calibration from views of one quad (method 16; E9, Fig.
+//! 17). Error of the focal length over the number of views, on synthetic views and on real boards
+//! with a reference calibration; and what `waymark camera calibrate` answers to rendered pictures
+//! of canvases with shadows and framed pictures.
 
 mod photoreal;
 mod real;
@@ -24,10 +25,12 @@ const HIGHEST_PERCENT: f64 = 3.0;
 /// `waymark-lab evaluate calibration`.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// Folders with real views of a board: Zhang's Model.txt and data*.txt, OpenCV's yml with corners, or
-    /// photographs of a chessboard beside a yml that says its size (then python3 with OpenCV finds the corners).
+    /// Folders with real views of a board: Zhang's Model.txt and data*.txt, OpenCV's yml with
+    /// corners, or photographs of a chessboard beside a yml that says its size (then python3 with
+    /// OpenCV finds the corners).
     sets: Vec<PathBuf>,
-    /// Folder of rendered sets, one a folder: pictures and truth.json. Nothing else is measured then.
+    /// Folder of rendered sets, one a folder: pictures and truth.json. Nothing else is measured
+    /// then.
     #[arg(long, value_name = "FOLDER", conflicts_with_all = ["sets", "plot"])]
     photoreal: Option<PathBuf>,
     /// Sets of --photoreal by the numbers of their folders, such as 21-60; all if absent.

@@ -1,6 +1,8 @@
-//! Rendered sets of pictures of one object, each with its true camera: what `waymark camera calibrate` answers.
+//! Rendered sets of pictures of one object, each with its true camera: what
+//! `waymark camera calibrate` answers.
 //!
-//! A set is a folder with a `truth.json`: `fx` (px), `kind`, `size_m` (width, height) and `views` with a `file` each.
+//! A set is a folder with a `truth.json`: `fx` (px), `kind`, `size_m` (width, height) and `views`
+//! with a `file` each.
 
 use crate::evaluate::{
     experiment::of_each,

@@ -1,5 +1,6 @@
-//! Auto-calibration from one quad of a real board (its four outermost points), compared with the calibration from
-//! all its points and with the calibration that the set states: pinhole with pinhole, lens with lens.
+//! Auto-calibration from one quad of a real board (its four outermost points), compared with the
+//! calibration from all its points and with the calibration that the set states: pinhole with
+//! pinhole, lens with lens.
 
 use super::sets::{Set, Stated};
 use crate::evaluate::{experiment::mixed, statistics::median};
@@ -142,7 +143,8 @@ impl RealSet {
         lines
     }
 
-    /// Difference from all points and from the stated calibration of the same camera model, in percent.
+    /// Difference from all points and from the stated calibration of the same camera model, in
+    /// percent.
     fn against(&self, fx_px: f64, lens: bool) -> String {
         let all = if lens { &self.all_lens } else { &self.all_pinhole };
         let off = |reference: f64| 100.0 * (fx_px / reference - 1.0);
@@ -174,7 +176,8 @@ mod tests {
 
     #[test]
     fn a_board_without_noise_is_calibrated_exactly_by_its_quad() {
-        // Oracle: synthetic views of a 2 x 2 board that is the poster's quad alone: all points are the quad.
+        // Oracle: synthetic views of a 2 x 2 board that is the poster's quad alone: all points are
+        // the quad.
         let mut random = Random::new(5);
         let camera = vision::frame::Intrinsics {
             fx_px: 800.0,

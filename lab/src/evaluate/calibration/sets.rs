@@ -1,6 +1,6 @@
-//! Real views of calibration boards, in the formats of public sets, with each set's own calibration: `Model.txt`
-//! with `data*.txt` (Zhang), OpenCV's `corners` in yml files, and photographs of a chessboard, whose inner corners
-//! OpenCV finds, if Python has it.
+//! Real views of calibration boards, in the formats of public sets, with each set's own
+//! calibration: `Model.txt` with `data*.txt` (Zhang), OpenCV's `corners` in yml files, and
+//! photographs of a chessboard, whose inner corners OpenCV finds, if Python has it.
 
 use crate::bench::Python;
 use anyhow::Context as _;
@@ -201,7 +201,8 @@ fn matrix(text: &str, name: &str) -> Option<(usize, usize, Vec<f64>)> {
     Some((field("rows:")?, field("cols:")?, numbers(data)))
 }
 
-/// Focal lengths that the set's files state: `OpenCV`'s `camera_matrix`, a yaml's `fx`, Zhang's five numbers.
+/// Focal lengths that the set's files state: `OpenCV`'s `camera_matrix`, a yaml's `fx`, Zhang's
+/// five numbers.
 fn stated(files: &[PathBuf]) -> anyhow::Result<Vec<Stated>> {
     let mut all = vec![];
     for path in files.iter().filter(|p| is(p, "yml") || is(p, "yaml") || is(p, "txt")) {

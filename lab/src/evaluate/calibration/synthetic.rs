@@ -1,5 +1,5 @@
-//! Synthetic views of a poster by a level camera on a robot, as in method 16.5, and the error of the focal length
-//! over the number of views (E9, Fig. 17).
+//! Synthetic views of a poster by a level camera on a robot, as in method 16.5, and the error of
+//! the focal length over the number of views (E9, Fig. 17).
 
 use crate::evaluate::{
     experiment::{mixed, of_each},

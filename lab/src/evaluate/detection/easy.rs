@@ -13,7 +13,8 @@ pub(super) const MIN_CONTRAST: f64 = 20.0;
 const SAMPLES: usize = 64;
 /// Share of a side next to each corner that is left out.
 const CORNER_SHARE: f64 = 0.1;
-/// Distances from a side at which grey levels are read, in pixels: past the blur of the edge itself.
+/// Distances from a side at which grey levels are read, in pixels: past the blur of the edge
+/// itself.
 const BESIDE_PX: [f64; 3] = [2.0, 3.0, 4.0];
 
 /// Whether the quad counts, is large, and has contrast along all four sides.

@@ -1,6 +1,7 @@
-//! `waymark-lab evaluate detection`: the detector against labelled pictures. Recall at two overlaps, false quads,
-//! corner error, time; by class, stratum, size and angle, with confidence intervals; as a table, JSON, a plot and
-//! pictures of the worst. The detector runs on one thread, pictures one after the other.
+//! `waymark-lab evaluate detection`: the detector against labelled pictures. Recall at two
+//! overlaps, false quads, corner error, time; by class, stratum, size and angle, with confidence
+//! intervals; as a table, JSON, a plot and pictures of the worst. The detector runs on one thread,
+//! pictures one after the other.
 
 pub(crate) mod score;
 mod easy;
@@ -24,16 +25,15 @@ const DRAWN: usize = 20;
 /// `waymark-lab evaluate detection`.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// Folders in the evaluation format (each with a truth.json), or `corridor` or `scenes` for rendered
-    /// pictures with exact truth.
+    /// Folders in the evaluation format (each with a truth.json), or `corridor` or `scenes` for
+    /// rendered pictures with exact truth.
     #[arg(required = true)]
     sets: Vec<PathBuf>,
     /// Leave out labelled quads with a side shorter than this, in pixels.
     #[arg(long, default_value_t = 0.0)]
     min_side_px: f64,
-    /// Also evaluate these parameters: a file as for --params, `relaxation` for the paper's grouping, or one change
-    /// as for
-    /// --set. May be repeated.
+    /// Also evaluate these parameters: a file as for --params, `relaxation` for the paper's
+    /// grouping, or one change as for --set. May be repeated.
     #[arg(long, value_name = "FILE|relaxation|PATH=VALUE")]
     compare: Vec<PathBuf>,
     /// One JSON object per set and parameters instead of tables.
@@ -45,14 +45,16 @@ pub(crate) struct Args {
     /// Name the worst images (missed and false quads first, then loose and inexact ones).
     #[arg(long, value_name = "N")]
     worst: Option<usize>,
-    /// Write the worst images (20 without --worst) with labelled and detected quads drawn into this folder.
+    /// Write the worst images (20 without --worst) with labelled and detected quads drawn into this
+    /// folder.
     #[arg(long, value_name = "DIR")]
     draw: Option<PathBuf>,
     /// Name every labelled quad that was missed and every false one.
     #[arg(long)]
     misses: bool,
-    /// List of real quads that the set does not label, reviewed by a person: false quads on them are counted apart.
-    /// Default: the list that comes with the program, if there is one for the set.
+    /// List of real quads that the set does not label, reviewed by a person: false quads on them
+    /// are counted apart. Default: the list that comes with the program, if there is one for the
+    /// set.
     #[arg(long, value_name = "FILE")]
     reviewed: Option<PathBuf>,
     /// Write the rendered pictures to this folder, as a set like any other.

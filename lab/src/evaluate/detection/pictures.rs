@@ -16,7 +16,8 @@ use vision::frame::GrayImage;
 /// Shortest side of a picture that is drawn; smaller ones are enlarged.
 const MIN_DRAWN_PX: usize = 400;
 
-/// Writes the pictures of the `count` worst images into `folder`, the worst first in the order of names.
+/// Writes the pictures of the `count` worst images into `folder`, the worst first in the order of
+/// names.
 pub(crate) fn draw_worst(
     folder: &Path,
     truth: &Truth,

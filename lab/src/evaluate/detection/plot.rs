@@ -1,4 +1,5 @@
-//! The report as one SVG picture: recall over the overlap required, recall over the shortest side, corner errors.
+//! The report as one SVG picture: recall over the overlap required, recall over the shortest side,
+//! corner errors.
 
 use super::{
     report::Report,

@@ -1,4 +1,5 @@
-//! All pictures of a set together: figures with their 95 % confidence intervals, for everything and for groups.
+//! All pictures of a set together: figures with their 95 % confidence intervals, for everything and
+//! for groups.
 
 use super::score::{FOUND, FOUND_WELL, ImageScore, LabelScore};
 use crate::evaluate::{
@@ -26,7 +27,8 @@ pub(crate) struct Group {
     pub(crate) recall_85_interval: Interval,
     /// Missed, but an alternate of some detected quad overlaps by 0.7.
     pub(crate) missed_but_alternate: usize,
-    /// Median over found quads (`IoU` 0.7) of the mean distance of their four corners; `null` when none is found.
+    /// Median over found quads (`IoU` 0.7) of the mean distance of their four corners; `null` when
+    /// none is found.
     pub(crate) corner_error_px: Option<f64>,
     /// 90 % quantile of them.
     pub(crate) corner_error_90_px: Option<f64>,
@@ -53,8 +55,8 @@ pub(crate) struct ImageFigures {
     pub(crate) ms_per_image_interval: Option<Interval>,
 }
 
-/// The figures of one set under one set of parameters. Quads are those labelled fully in view, unless a group says
-/// otherwise.
+/// The figures of one set under one set of parameters. Quads are those labelled fully in view,
+/// unless a group says otherwise.
 #[derive(Debug, Serialize)]
 pub(crate) struct Report {
     pub(crate) set: String,
@@ -309,7 +311,8 @@ pub(super) mod tests {
         assert_eq!(r.by_view_angle.len(), 1);
         assert_eq!(r.by_class["poster"].quads, 4);
         assert_eq!(r.easy.as_ref().map(|easy| easy.quads), Some(1));
-        // A missed quad is worse than a loose one and a false one together; reviewed ones do not count.
+        // A missed quad is worse than a loose one and a false one together; reviewed ones do not
+        // count.
         assert_eq!(r.worst.len(), 1);
         assert_eq!((r.worst[0].file.as_str(), r.worst[0].false_quads, r.worst[0].loose), ("a", 1, 1));
     }

@@ -15,8 +15,8 @@ use vision::{
 
 /// Overlap from which a detected quad belongs to a labelled one at all.
 const IOU_SAME: f64 = 0.5;
-/// A detection inside a labelled quad by this share of its area, and covering at least [`INNER_AREA`] of it, is an
-/// inner border of the same object (mat, canvas).
+/// A detection inside a labelled quad by this share of its area, and covering at least
+/// [`INNER_AREA`] of it, is an inner border of the same object (mat, canvas).
 const INNER_SHARE: f64 = 0.97;
 const INNER_AREA: f64 = 0.25;
 
@@ -86,8 +86,8 @@ impl ImageScore {
     }
 }
 
-/// Detects on one thread and compares, in colour where the picture has colour. Quads with a side shorter than `min_side_px`
-/// do not count.
+/// Detects on one thread and compares, in colour where the picture has colour. Quads with a side
+/// shorter than `min_side_px` do not count.
 pub(crate) fn score<'a>(
     image: &TruthImage,
     picture: impl Into<PictureRef<'a>>,

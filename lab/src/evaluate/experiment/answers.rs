@@ -1,5 +1,6 @@
-//! Answers with their truth, to which a confidence is fitted and on which it is evaluated: maps of several sizes,
-//! landmarks under conditions from easy to hopeless, distractors, and a few look-alikes, in stated shares.
+//! Answers with their truth, to which a confidence is fitted and on which it is evaluated: maps of
+//! several sizes, landmarks under conditions from easy to hopeless, distractors, and a few
+//! look-alikes, in stated shares.
 
 use super::{
     Common,

@@ -1,5 +1,5 @@
-//! `waymark-lab evaluate viewpoint`, `scale`, `illumination` and `occlusion` (E5 to E8, the paper's Figs. 12 and 13):
-//! recognition over one condition that is changed step by step.
+//! `waymark-lab evaluate viewpoint`, `scale`, `illumination` and `occlusion` (E5 to E8, the paper's
+//! Figs. 12 and 13): recognition over one condition that is changed step by step.
 
 use super::{
     Common, Setting, curves,
@@ -37,8 +37,8 @@ pub(crate) struct Args {
 pub(crate) struct ViewpointArgs {
     #[command(flatten)]
     args: Args,
-    /// Side of the landmark (square root of its area) as it would appear from the front at the same distance. At
-    /// 300 a poster of 5 : 7 at 80 degrees is 44 px wide.
+    /// Side of the landmark (square root of its area) as it would appear from the front at the same
+    /// distance. At 300 a poster of 5 : 7 at 80 degrees is 44 px wide.
     #[arg(long, value_name = "PX", default_value_t = 300, value_parser = clap::value_parser!(u32).range(20..=400))]
     size_px: u32,
 }

@@ -1,5 +1,5 @@
-//! `waymark-lab evaluate confidence`: calibration of confidences. Of answers with confidence 0.9, nine in ten
-//! should be right.
+//! `waymark-lab evaluate confidence`: calibration of confidences. Of answers with confidence 0.9,
+//! nine in ten should be right.
 
 use super::{
     Common,
@@ -50,7 +50,8 @@ pub(crate) struct Reliability {
     largest_gap: f64,
     /// Mean squared error of the confidence.
     brier: f64,
-    /// Answers of at least 0.99, the wrong among them, and the exact upper 95 % bound of their share.
+    /// Answers of at least 0.99, the wrong among them, and the exact upper 95 % bound of their
+    /// share.
     sure: usize,
     sure_wrong: usize,
     sure_bound: f64,

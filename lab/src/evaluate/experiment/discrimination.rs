@@ -1,5 +1,5 @@
-//! `waymark-lab evaluate discrimination` (E3, E4, the paper's Fig. 11; E11, E14): share of distractors accepted, per
-//! pair by the paper's thresholds and per quad by the whole decision, and landmarks missed at the same thresholds.
+//! `waymark-lab evaluate discrimination` (E3, E4, the paper's Fig. 11; E11, E14): share of
+//! distractors accepted, by pair and by quad, and landmarks missed at the same thresholds.
 
 use super::{
     Common, Setting,
@@ -28,7 +28,7 @@ pub(crate) struct Args {
     /// Landmarks in the map; several numbers, several maps.
     #[arg(long, value_delimiter = ',', default_value = "50", value_parser = clap::value_parser!(u32).range(2..=1000))]
     landmarks: Vec<u32>,
-    /// Posters that are distractors, each a texture of its own; as many tenths of doors, windows, tiles and the like.
+    /// Posters that are distractors; as many tenths of doors, windows, tiles and the like.
     #[arg(long, default_value_t = 250, value_parser = clap::value_parser!(u32).range(2..=2000))]
     distractors: u32,
     /// Views of each distractor.

@@ -1,5 +1,6 @@
-//! Distances of a landmark's own views and of all else, as two histograms with normal curves (the paper's Fig. 11),
-//! both thresholds of method 8 and their errors. Distances in, figures and the picture out.
+//! Distances of a landmark's own views and of all else, as two histograms with normal curves (the
+//! paper's Fig. 11), both thresholds of method 8 and their errors. Distances in, figures and the
+//! picture out.
 
 use super::gaussian::{Gaussian, crossing};
 use crate::evaluate::{
@@ -57,8 +58,8 @@ pub(crate) struct DistanceHistograms {
     other_normal: Option<[f64; 2]>,
     /// Area under both normal curves.
     overlap: Option<f64>,
-    /// tau as learnt, and where the weighted normal curves cross; for each the share of others below and of own not
-    /// below.
+    /// tau as learnt, and where the weighted normal curves cross; for each the share of others
+    /// below and of own not below.
     tau: [Option<f64>; 2],
     false_positives: [Option<f64>; 2],
     false_negatives: [Option<f64>; 2],

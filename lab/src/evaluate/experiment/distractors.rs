@@ -1,5 +1,5 @@
-//! Pictures that are in no map, in strata from ordinary to hard: posters, photographs, the building, look-alikes. A
-//! class in, textures with the name of their stratum out.
+//! Pictures that are in no map, in strata from ordinary to hard: posters, photographs, the
+//! building, look-alikes. A class in, textures with the name of their stratum out.
 
 use super::{
     Common,
@@ -28,7 +28,8 @@ const LOOK_ALIKES: usize = 20;
 /// Number of the first poster that is a distractor: no map has as many landmarks.
 const FIRST_POSTER: usize = 10_000;
 
-/// `posters` that are not taught, `photographs`, quads of the building, and look-alikes of landmarks.
+/// `posters` that are not taught, `photographs`, quads of the building, and look-alikes of
+/// landmarks.
 pub(crate) fn distractors(
     class: &Class,
     photographs: &[Picture],

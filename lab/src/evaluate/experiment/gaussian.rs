@@ -1,5 +1,5 @@
-//! Two classes of distances in, modelled as normal; the threshold where their weighted densities cross out (method
-//! 8).
+//! Two classes of distances in, modelled as normal; the threshold where their weighted densities
+//! cross out (method 8).
 
 /// Normal model of a class of distances.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,8 +20,8 @@ impl Gaussian {
     }
 }
 
-/// Where the weighted densities cross between the means: for small sets (n+ < 30 or n- < 300). `None` if the mean
-/// of `own` is not the smaller one or the curves do not cross there.
+/// Where the weighted densities cross between the means: for small sets (n+ < 30 or n- < 300).
+/// `None` if the mean of `own` is not the smaller one or the curves do not cross there.
 pub(crate) fn crossing(own: Gaussian, others: Gaussian, weight: f64) -> Option<f64> {
     let (m1, s1, m0, s0) = (own.mean, own.deviation, others.mean, others.deviation);
     let a = 0.5 / (s0 * s0) - 0.5 / (s1 * s1);
@@ -47,7 +47,8 @@ mod tests {
         let (own, others) = (Gaussian { mean: 2.0, deviation: 0.7 }, Gaussian { mean: 5.0, deviation: 1.2 });
         let tau = crossing(own, others, 6.0).unwrap();
         assert!((tau - 2.7276).abs() < 5e-5, "{tau}");
-        // d(cost)/d(tau) by a fine sum of the densities: the cost falls before tau and rises after it.
+        // d(cost)/d(tau) by a fine sum of the densities: the cost falls before tau and rises after
+        // it.
         let density = |g: Gaussian, x: f64| (-0.5 * ((x - g.mean) / g.deviation).powi(2)).exp() / g.deviation;
         let slope = |x: f64| 6.0 * density(others, x) - density(own, x);
         assert!(slope(tau - 1e-4) < 0.0 && slope(tau + 1e-4) > 0.0);

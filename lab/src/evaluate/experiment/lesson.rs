@@ -1,5 +1,5 @@
-//! Teaches a map of pictures as the server does: views of each, negatives from all others, quality gates. Pictures
-//! in, the models of those that passed out.
+//! Teaches a map of pictures as the server does: views of each, negatives from all others, quality
+//! gates. Pictures in, the models of those that passed out.
 
 use super::{mixed, of_each, pictures::Picture};
 use serde::Serialize;
@@ -62,7 +62,8 @@ struct TrainingData {
     points: Vec<Vec<TaughtPoint>>,
 }
 
-/// Points of a few photographs, evenly chosen, as in a lesson of the server (`server/src/jobs/learn.rs`).
+/// Points of a few photographs, evenly chosen, as in a lesson of the server
+/// (`server/src/jobs/learn.rs`).
 pub(crate) fn points_of<'a>(photographs: &[(&'a GrayImage, &'a Corners)]) -> Vec<Vec<TaughtPoint>> {
     let chosen = photographs.len().min(MAX_POINT_VIEWS);
     let of = |i: usize| photographs[i * photographs.len() / chosen];

@@ -1,5 +1,6 @@
-//! `waymark-lab evaluate lookalikes`: pairs of pictures that are nearly the same. With one taught: is the other
-//! accepted as it? With both taught: are they distinguished, refused as ambiguous, or confused?
+//! `waymark-lab evaluate lookalikes`: pairs of pictures that are nearly the same. With one taught:
+//! is the other accepted as it? With both taught: are they distinguished, refused as ambiguous, or
+//! confused?
 
 use super::{
     Common, Setting,
@@ -46,7 +47,8 @@ struct Kind {
     /// Both are taught: pictures that failed a quality gate, and views of the active ones.
     inactive: usize,
     both: Counts,
-    /// Exact upper 95 % bound of the share accepted as the look-alike, with one taught and with both.
+    /// Exact upper 95 % bound of the share accepted as the look-alike, with one taught and with
+    /// both.
     alone_bound: f64,
     both_bound: f64,
     right_interval: Interval,

@@ -1,5 +1,6 @@
-//! Common parts of the experiments on recognition (method 18, E2 to E8, E11, E14): arguments, textures of three
-//! disjoint sets, a lesson, the outcome of a view. They run in this program, without a server, from a seed.
+//! Common parts of the experiments on recognition (method 18, E2 to E8, E11, E14): arguments,
+//! textures of three disjoint sets, a lesson, the outcome of a view. They run in this program,
+//! without a server, from a seed.
 
 pub(crate) mod pictures;
 pub(crate) mod lesson;
@@ -34,12 +35,12 @@ pub(crate) struct Common {
     /// The set of textures: tune, calibrate or test, which are disjoint. Use test for reports only.
     #[arg(long = "set", default_value = "test", value_parser = pictures::part)]
     pub(crate) part: Part,
-    /// A folder of pictures to use beside generated posters, or one with a truth.json of which the taught pictures
-    /// are used. May be repeated.
+    /// A folder of pictures to use beside generated posters, or one with a truth.json of which the
+    /// taught pictures are used. May be repeated.
     #[arg(long, value_name = "DIR")]
     pub(crate) photographs: Vec<PathBuf>,
-    /// How landmarks are taught: `views`, each from 30 rendered views as a robot would gather them, or `photograph`,
-    /// each from one view and 30 generated from it.
+    /// How landmarks are taught: `views`, each from 30 rendered views as a robot would gather them,
+    /// or `photograph`, each from one view and 30 generated from it.
     #[arg(long, default_value = "views", value_parser = lesson::taught)]
     taught: Taught,
     /// Seed of views, noise and the choice of posters.
@@ -154,7 +155,8 @@ pub(crate) fn mixed(parts: &[u64]) -> u64 {
     })
 }
 
-/// `work` on every item, over all processors, with a progress bar; results in the order of the items.
+/// `work` on every item, over all processors, with a progress bar; results in the order of the
+/// items.
 pub(crate) fn of_each<T: Sync, R: Send>(
     items: &[T],
     what: &'static str,

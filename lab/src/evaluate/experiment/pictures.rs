@@ -1,6 +1,6 @@
-//! The textures of the experiments: generated posters and, where folders are given, photographs, in three disjoint
-//! sets. A poster belongs to the set of its number modulo 3, a photograph to that of its file's bytes
-//! (docs/EVALUATION.md): nobody chooses by eye.
+//! The textures of the experiments: generated posters and, where folders are given, photographs, in
+//! three disjoint sets. A poster belongs to the set of its number modulo 3, a photograph to that of
+//! its file's bytes (docs/EVALUATION.md): nobody chooses by eye.
 
 use crate::evaluate::truth::Truth;
 use anyhow::Context as _;
@@ -19,7 +19,8 @@ use vision::{detect::pyramid, frame::GrayImage};
 const MAX_PHOTOGRAPHS: usize = 2000;
 /// Photographs are reduced to about this many pixels a side: as fine as generated posters.
 const SIDE_PX: usize = 640;
-/// Numbers of posters of one seed: disjoint from the next seed's, and from the posters of tests and demos.
+/// Numbers of posters of one seed: disjoint from the next seed's, and from the posters of tests and
+/// demos.
 const POSTERS_PER_SEED: u64 = 100_000;
 
 /// One of the three sets.
@@ -64,7 +65,8 @@ pub(crate) fn generated(part: Part, seed: u64, index: usize) -> Picture {
     Picture { name: format!("poster {number}"), texture: Arc::new(poster(number)), photograph: false }
 }
 
-/// The photographs of a set from all folders, by name; of several of one landmark (`same`) only the first.
+/// The photographs of a set from all folders, by name; of several of one landmark (`same`) only the
+/// first.
 pub(crate) fn photographs(folders: &[PathBuf], part: Part) -> anyhow::Result<Vec<Picture>> {
     let mut found = Vec::new();
     for folder in folders {

@@ -1,4 +1,5 @@
-//! D/tau over one condition that is changed step by step while all others vary as on a robot, and where it crosses
+//! D/tau over one condition that is changed step by step while all others vary as on a robot, and
+//! where it crosses
 //! 1. Views in, a curve with intervals out; `curves` prints and plots it.
 
 use super::{
@@ -43,7 +44,8 @@ pub(crate) struct Point {
     pub(crate) outcomes: BTreeMap<&'static str, usize>,
 }
 
-/// Value at which a curve crosses a level, with a 95 % interval over landmarks; at most the last value.
+/// Value at which a curve crosses a level, with a 95 % interval over landmarks; at most the last
+/// value.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub(crate) struct Crossing {
     pub(crate) at: f64,
@@ -168,8 +170,8 @@ fn point(value: f64, views: &[&ViewFigures]) -> Point {
     }
 }
 
-/// Value at which `heights` first reach `level`, linear between two values, half way from an infinite height;
-/// `None` if they never do.
+/// Value at which `heights` first reach `level`, linear between two values, half way from an
+/// infinite height; `None` if they never do.
 pub(crate) fn cross(values: &[f64], heights: &[f64], level: f64) -> Option<f64> {
     let first = heights.iter().position(|h| *h >= level || h.is_nan())?;
     let Some(before) = first.checked_sub(1) else { return values.first().copied() };

@@ -1,5 +1,5 @@
-//! One view of one picture against the landmarks of a map: the paper's distances over their thresholds, and the
-//! outcome of the whole decision.
+//! One view of one picture against the landmarks of a map: the paper's distances over their
+//! thresholds, and the outcome of the whole decision.
 
 use super::lesson::Class;
 use nalgebra::Matrix2;
@@ -73,8 +73,8 @@ impl Outcome {
 /// Figures of one view.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ViewFigures {
-    /// H^r / tau, C^r / tau where the corners were given, and (1 - gradient similarity) / tau after alignment;
-    /// infinite without.
+    /// H^r / tau, C^r / tau where the corners were given, and (1 - gradient similarity) / tau after
+    /// alignment; infinite without.
     pub(crate) ratios: [f64; 3],
     pub(crate) outcome: Outcome,
 }
@@ -108,7 +108,8 @@ pub(crate) fn detected(rendered: &Exhibit, p: &Params) -> Vec<Quad> {
     found.into_iter().map(|(_, q)| q).collect()
 }
 
-/// Recognises a view of landmark `id` in the quad at `corners`, or in those that the detector finds.
+/// Recognises a view of landmark `id` in the quad at `corners`, or in those that the detector
+/// finds.
 pub(crate) fn score_view(
     class: &Class,
     id: LandmarkId,

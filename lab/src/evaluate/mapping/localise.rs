@@ -1,4 +1,5 @@
-//! Localisation of single scans in the finished map: processor time, share of scans with an answer, error.
+//! Localisation of single scans in the finished map: processor time, share of scans with an answer,
+//! error.
 
 use crate::evaluate::statistics;
 use cli::clock::Clock;

@@ -1,5 +1,5 @@
-//! `waymark-lab evaluate mapping`: maps built from scan logs, and their paths compared with the known relations of
-//! the truth.
+//! `waymark-lab evaluate mapping`: maps built from scan logs, and their paths compared with the
+//! known relations of the truth.
 
 mod localise;
 mod odometry;
@@ -30,10 +30,10 @@ use std::{
     sync::Arc,
 };
 
-/// Figures of others on the same recordings: mean and standard deviation of the relative poses' translation error,
-/// by scan matching and by graph mapping (Kuemmerle et al. 2009, "On measuring the accuracy of SLAM algorithms",
-/// table of translational errors; their relations were picked by hand, ours are those of the log's corrected
-/// poses).
+/// Figures of others on the same recordings: mean and standard deviation of the relative poses'
+/// translation error, by scan matching and by graph mapping (Kuemmerle et al. 2009, "On measuring
+/// the accuracy of SLAM algorithms", table of translational errors; their relations were picked by
+/// hand, ours are those of the log's corrected poses).
 const PUBLISHED: [(&str, [f64; 2], [f64; 2]); 5] = [
     ("intel", [0.220, 0.296], [0.031, 0.026]),
     ("aces", [0.173, 0.614], [0.044, 0.044]),
@@ -47,15 +47,15 @@ const NUMBERED: [&str; 2] = ["intel-scans.txt.gz", "reference-poses.txt"];
 /// `waymark-lab evaluate mapping`.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// Scan logs as for `waymark map build`, or folders of them. Poses in a log are taken as the truth, and
-    /// odometry is made from them with noise. Numbered scans keep their odometry; the truth is
-    /// `reference-poses.txt` beside them (lines `scan x y theta`). Without any: a simulated corridor with exact
-    /// truth.
+    /// Scan logs as for `waymark map build`, or folders of them. Poses in a log are taken as the
+    /// truth, and odometry is made from them with noise. Numbered scans keep their odometry; the
+    /// truth is `reference-poses.txt` beside them (lines `scan x y theta`). Without any: a
+    /// simulated corridor with exact truth.
     logs: Vec<PathBuf>,
     #[command(flatten)]
     laser: LaserArgs,
-    /// Errors of the odometry made for a log, times this: by default 5 % of the way, 1.1 deg per root metre, 5 % of
-    /// the turn, and 0.23 deg per metre to one side.
+    /// Errors of the odometry made for a log, times this: by default 5 % of the way, 1.1 deg per
+    /// root metre, 5 % of the turn, and 0.23 deg per metre to one side.
     #[arg(long, default_value_t = 1.0)]
     odometry_noise: f64,
     /// Seed of that noise.

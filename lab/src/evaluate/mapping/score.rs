@@ -4,7 +4,8 @@ use formats::scan_log::{LineTokens, LogEntry, ReadError, lines};
 use map::{pose2::Pose2, slam::SlamMap};
 use std::path::Path;
 
-/// Poses within this distance of each other and far apart along the path: their relation is compared too.
+/// Poses within this distance of each other and far apart along the path: their relation is
+/// compared too.
 const NEAR_M: f64 = 3.0;
 /// Distance along the path that counts as far apart.
 const FAR_M: f64 = 10.0;
@@ -28,7 +29,8 @@ pub(super) fn reference(path: &Path, records: &mut [LogEntry]) -> Result<(), Rea
     })
 }
 
-/// Pairs of scans whose relative pose is known: each known pose with the next, and revisited places.
+/// Pairs of scans whose relative pose is known: each known pose with the next, and revisited
+/// places.
 pub(super) struct Relations(Vec<(usize, usize)>);
 
 impl Relations {

@@ -1,6 +1,7 @@
-//! `waymark-lab evaluate modalities` (method 15): gain by modality statistics. Robots drive a path on which each
-//! modality fails somewhere. The first drives are reference runs; the others are evaluated without statistics and
-//! in every fusion mode. Corners and ranges are drawn, nothing is rendered.
+//! `waymark-lab evaluate modalities` (method 15): gain by modality statistics. Robots drive a path
+//! on which each modality fails somewhere. The first drives are reference runs; the others are
+//! evaluated without statistics and in every fusion mode. Corners and ranges are drawn, nothing is
+//! rendered.
 
 mod drive;
 mod plot;
@@ -37,7 +38,8 @@ pub(crate) struct Args {
     /// Print one JSON object instead of a table.
     #[arg(long)]
     json: bool,
-    /// Write an SVG picture: the path from above with the best modality of every pose cell, and the errors along it.
+    /// Write an SVG picture: the path from above with the best modality of every pose cell, and the
+    /// errors along it.
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
 }

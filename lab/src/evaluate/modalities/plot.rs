@@ -1,4 +1,5 @@
-//! The path from above with the best modality of every pose cell; below it the 95 % quantile of the errors along it.
+//! The path from above with the best modality of every pose cell; below it the 95 % quantile of the
+//! errors along it.
 
 use super::{drive::Driven, world::World};
 use crate::evaluate::{chart::COLOURS, statistics::quantile};

@@ -1,5 +1,5 @@
-//! The building: a corridor, a hall and a workshop along x, with openings between. The map has the walls of before
-//! the workshop's were moved.
+//! The building: a corridor, a hall and a workshop along x, with openings between. The map has the
+//! walls of before the workshop's were moved.
 
 use map::{
     laser_fix::WallIndex,
@@ -27,7 +27,8 @@ pub(super) const ZONES: [Zone; 3] = [
 ];
 /// Half the width of the openings between them.
 const OPENING_M: f64 = 1.0;
-/// By how much the side walls of the workshop were moved to the left after they were mapped: new cupboards.
+/// By how much the side walls of the workshop were moved to the left after they were mapped: new
+/// cupboards.
 const MOVED_M: f64 = 0.12;
 /// Standard deviation of the mapped walls.
 const WALL_SIGMA_M: f64 = 0.01;

@@ -1,6 +1,7 @@
-//! One drive, with the code of the server's workers: scans and frames through the engine's motion tracker,
-//! landmarks checked, changes of landmark health put into the map. No transport, no threads; at equal times the
-//! scan comes before the frame. Compared with the truth; the start pose is unknown to the robot.
+//! One drive, with the code of the server's workers: scans and frames through the engine's motion
+//! tracker, landmarks checked, changes of landmark health put into the map. No transport, no
+//! threads; at equal times the scan comes before the frame. Compared with the truth; the start pose
+//! is unknown to the robot.
 
 use super::{
     super::experiment::mixed,
@@ -78,7 +79,8 @@ pub(super) struct Journey {
     pub(super) corners: BTreeMap<&'static str, Vec<(f64, f64)>>,
     /// Counts of right names by kind and state of the landmark.
     pub(super) named: BTreeMap<(&'static str, &'static str), Named>,
-    /// Frames that showed a landmark up to the first fix, itself included; none if there never was one.
+    /// Frames that showed a landmark up to the first fix, itself included; none if there never was
+    /// one.
     pub(super) frames_to_fix: Option<usize>,
     /// Outcomes of fixes and scans.
     pub(super) log: Corrections,

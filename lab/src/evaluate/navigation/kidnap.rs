@@ -1,5 +1,6 @@
-//! A kidnapped robot: it is carried forwards while its odometry stands still, so that its fused pose is wrong. True
-//! odometry in; odometry without the displacement out, and counts until the pose is right again or given up.
+//! A kidnapped robot: it is carried forwards while its odometry stands still, so that its fused
+//! pose is wrong. True odometry in; odometry without the displacement out, and counts until the
+//! pose is right again or given up.
 
 use map::pose2::{Pose2, Pose2Covariance};
 use serde::Serialize;
@@ -47,8 +48,8 @@ impl Kidnap {
         self.missed.map_or(odom_from_robot, |missed| missed.compose(&odom_from_robot))
     }
 
-    /// Counts a frame at `time_s`: whether it shows an active landmark, wrong names by the pose, and fused and true
-    /// pose after it.
+    /// Counts a frame at `time_s`: whether it shows an active landmark, wrong names by the pose,
+    /// and fused and true pose after it.
     pub(super) fn count_frame(
         &mut self,
         time_s: f64,

@@ -1,7 +1,8 @@
-//! `waymark-lab evaluate navigation` (method 18, E10 and E12): the paper's corridor, 25 m long with four posters. A
-//! first drive teaches; then robots drive through it, each from an unknown start pose, localised by landmarks,
-//! odometry and a laser, which does not constrain the pose along the corridor. It runs in this program, with the
-//! code that the server runs, without a server, from a seed.
+//! `waymark-lab evaluate navigation` (method 18, E10 and E12): the paper's corridor, 25 m long with
+//! four posters. A first drive teaches; then robots drive through it, each from an unknown start
+//! pose, localised by landmarks, odometry and a laser, which does not constrain the pose along the
+//! corridor. It runs in this program, with the code that the server runs, without a server, from a
+//! seed.
 
 mod journey;
 mod kidnap;
@@ -37,8 +38,8 @@ pub(crate) struct Args {
     /// Teach doors and windows, too.
     #[arg(long)]
     fittings: bool,
-    /// Teach exact corners of photographs and exact places of landmarks. Needed to compare the errors of named
-    /// corners with their covariances.
+    /// Teach exact corners of photographs and exact places of landmarks. Needed to compare the
+    /// errors of named corners with their covariances.
     #[arg(long)]
     true_lessons: bool,
     /// Photographs that the first drive takes of each landmark.
@@ -56,19 +57,19 @@ pub(crate) struct Args {
     /// Robots without a laser.
     #[arg(long)]
     no_laser: bool,
-    /// Draw errors of intrinsics, extrinsics and survey poses by their stated standard deviations; otherwise they
-    /// are exact. Needed to evaluate covariances.
+    /// Draw errors of intrinsics, extrinsics and survey poses by their stated standard deviations;
+    /// otherwise they are exact. Needed to evaluate covariances.
     #[arg(long)]
     own_errors: bool,
-    /// Kidnap every robot: carry it so far forwards, while its odometry stands still, 8 s after its first pose. The
-    /// report says after how many frames the wrong pose is detected.
+    /// Kidnap every robot: carry it so far forwards, while its odometry stands still, 8 s after its
+    /// first pose. The report says after how many frames the wrong pose is detected.
     #[arg(long, value_name = "M", default_value_t = 0.0, value_parser = kidnap, allow_negative_numbers = true)]
     kidnap_m: f64,
     /// Print one JSON object instead of a table.
     #[arg(long)]
     json: bool,
-    /// Write an SVG picture of the first drive: trajectories from above (true, odometry, corrected), and the error
-    /// over time with the band of three standard deviations.
+    /// Write an SVG picture of the first drive: trajectories from above (true, odometry,
+    /// corrected), and the error over time with the band of three standard deviations.
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
 }

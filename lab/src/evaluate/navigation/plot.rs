@@ -1,5 +1,6 @@
-//! The paper's Fig. 15 and the error over time: the corridor from above with the trajectories by truth, by odometry
-//! and corrected; below it the error along the corridor with the band of three standard deviations.
+//! The paper's Fig. 15 and the error over time: the corridor from above with the trajectories by
+//! truth, by odometry and corrected; below it the error along the corridor with the band of three
+//! standard deviations.
 
 use super::{
     journey::{Journey, Moment},

@@ -1,4 +1,5 @@
-//! Figures of all drives: errors along and across the corridor, consistency of the covariance, names.
+//! Figures of all drives: errors along and across the corridor, consistency of the covariance,
+//! names.
 
 use super::{
     journey::{Journey, Moment, Named, of},
@@ -73,8 +74,8 @@ struct CornerErrors {
     corners: usize,
     median_px: f64,
     p90_px: f64,
-    /// Squared Mahalanobis distance of a corner: mean (2 expected), median (1.39 expected); share of corners within
-    /// 95 %.
+    /// Squared Mahalanobis distance of a corner: mean (2 expected), median (1.39 expected); share
+    /// of corners within 95 %.
     nees: f64,
     median_square: f64,
     within_95: f64,
@@ -135,7 +136,8 @@ pub(super) struct Report {
     false_matches: usize,
     /// Wrong names by guided recognition.
     guided_false: usize,
-    /// Of taught landmarks with sides of 38 px and more of which a quarter is visible, active or not.
+    /// Of taught landmarks with sides of 38 px and more of which a quarter is visible, active or
+    /// not.
     named: Vec<Row>,
     corners: Vec<CornerErrors>,
     /// The robots had one.
@@ -162,7 +164,8 @@ pub(super) struct Report {
     /// Odometry alone from the true start; all frames.
     odometry_along_m: Option<Errors>,
     odometry_across_m: Option<Errors>,
-    /// Mean normalised squared error of the fused pose, 3 expected, and the share of frames within its 95 %.
+    /// Mean normalised squared error of the fused pose, 3 expected, and the share of frames within
+    /// its 95 %.
     nees: f64,
     nees_within_95: f64,
     /// Mean squared error over the stated variance: along, across, heading; 1 expected of each.

@@ -1,4 +1,5 @@
-//! The corridor and its map from a first drive: walls, places and models, as in a server, in memory.
+//! The corridor and its map from a first drive: walls, places and models, as in a server, in
+//! memory.
 
 use crate::evaluate::experiment::{lesson::points_of, mixed, of_each};
 use anyhow::Context as _;

@@ -1,5 +1,6 @@
-//! What corners can tell at most of a camera's position. In: the true camera and the landmarks as they hang. Out: the
-//! covariance of the position by their corners alone (Cramer and Rao), and errors drawn from it.
+//! What corners can tell at most of a camera's position. In: the true camera and the landmarks as
+//! they hang. Out: the covariance of the position by their corners alone (Cramer and Rao), and
+//! errors drawn from it.
 
 use super::world::{CameraTruth, LandmarkTruth};
 use nalgebra::{Matrix3, Matrix3x6, Matrix6, Vector3};
@@ -8,14 +9,14 @@ use vision::{
     random::Random,
 };
 
-/// Standard deviation of a coordinate of a corner, px: the best that edges of noisy pictures give (method 13.5,
-/// `BORDER_SIGMA_PX`).
+/// Standard deviation of a coordinate of a corner, px: the best that edges of noisy pictures give
+/// (method 13.5, `BORDER_SIGMA_PX`).
 pub(super) const CORNER_SIGMA_PX: f64 = 0.3;
 /// Errors drawn for each picture.
 const DRAWS: usize = 20;
 
-/// Covariance of the position (map frame, m^2), of independent corners with [`CORNER_SIGMA_PX`]; `None` where they do
-/// not determine it.
+/// Covariance of the position (map frame, m^2), of independent corners with [`CORNER_SIGMA_PX`];
+/// `None` where they do not determine it.
 pub(super) fn position_bound<'a>(
     landmarks: impl Iterator<Item = &'a LandmarkTruth>,
     camera: &CameraTruth,
@@ -29,7 +30,8 @@ pub(super) fn position_bound<'a>(
         }
     }
     let covariance = information.cholesky()?.inverse() * CORNER_SIGMA_PX.powi(2);
-    // The position is -R^T t of `camera_from_world`: by the rotation vector R^T [t]x, by the translation -R^T.
+    // The position is -R^T t of `camera_from_world`: by the rotation vector R^T [t]x, by the
+    // translation -R^T.
     let turn = camera.camera_from_world.rotation.inverse().to_rotation_matrix().into_inner();
     let mut by_pose = Matrix3x6::zeros();
     by_pose
@@ -62,7 +64,8 @@ mod tests {
         pose::{LandmarkSize, landmark_pose},
     };
 
-    /// A poster of 0.6 x 0.84 m on the wall x = 0, and a camera `distance_m` before it, `aside_m` to the right.
+    /// A poster of 0.6 x 0.84 m on the wall x = 0, and a camera `distance_m` before it, `aside_m`
+    /// to the right.
     fn scene(distance_m: f64, aside_m: f64) -> (LandmarkTruth, CameraTruth) {
         let size = LandmarkSize { width_m: 0.6, height_m: 0.84 };
         let landmark = LandmarkTruth { world_from_landmark: Isometry3::identity(), size };

@@ -1,4 +1,5 @@
-//! Pictures with what was missed: labels by outcome, quads that the detector shows, names, and why a label has none.
+//! Pictures with what was missed: labels by outcome, quads that the detector shows, names, and why
+//! a label has none.
 
 use super::{
     recognise::Recognised,

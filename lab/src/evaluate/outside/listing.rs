@@ -1,4 +1,5 @@
-//! Single results of a picture, a line each, for people: what was missed or is wrong, and how far off its pose is.
+//! Single results of a picture, a line each, for people: what was missed or is wrong, and how far
+//! off its pose is.
 
 use super::score::{PictureScore, PoseOutcome, View};
 use cli::screen;

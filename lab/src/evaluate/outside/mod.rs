@@ -1,5 +1,6 @@
-//! `waymark-lab evaluate outside`: worlds that nobody here made. Teaches each landmark from its one frontal picture,
-//! then recognises every picture as the server does a photograph, and compares quads, names and poses with the truth.
+//! `waymark-lab evaluate outside`: worlds that nobody here made. Teaches each landmark from its one
+//! frontal picture, then recognises every picture as the server does a photograph, and compares
+//! quads, names and poses with the truth.
 
 mod world;
 mod teach;
@@ -35,8 +36,8 @@ use world::{CameraSigmas, World};
 #[derive(Debug, clap::Args)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a switch of the command")]
 pub(crate) struct Args {
-    /// Worlds: folders with a truth.json that has `teach`, and a world.json where poses are known. A folder without a
-    /// truth.json stands for its sub-folders that have one, by name.
+    /// Worlds: folders with a truth.json that has `teach`, and a world.json where poses are known.
+    /// A folder without a truth.json stands for its sub-folders that have one, by name.
     #[arg(required = true)]
     folders: Vec<PathBuf>,
     /// One JSON object instead of tables.
@@ -45,18 +46,20 @@ pub(crate) struct Args {
     /// Name every full view without a name, and why, every wrong name and every false quad.
     #[arg(long)]
     misses: bool,
-    /// Name every camera pose with its error, the stated standard deviation, and what corners of 0.3 px can tell.
+    /// Name every camera pose with its error, the stated standard deviation, and what corners of
+    /// 0.3 px can tell.
     #[arg(long)]
     poses: bool,
-    /// Teach each world and show it the pictures of the next one: every name is wrong, but on a landmark that shows
-    /// the same picture (lab/reviewed/same-pictures.json).
+    /// Teach each world and show it the pictures of the next one: every name is wrong, but on a
+    /// landmark that shows the same picture (lab/reviewed/same-pictures.json).
     #[arg(long)]
     strangers: bool,
-    /// State no standard deviations of the cameras, so that the server takes usual ones (0.5 % of the focal length).
-    /// Default: they are stated to be exact, as they are.
+    /// State no standard deviations of the cameras, so that the server takes usual ones (0.5 % of
+    /// the focal length). Default: they are stated to be exact, as they are.
     #[arg(long)]
     usual_camera: bool,
-    /// Draw the pictures with a full view without a name, a wrong name or a false quad into this folder.
+    /// Draw the pictures with a full view without a name, a wrong name or a false quad into this
+    /// folder.
     #[arg(long, value_name = "DIR")]
     draw: Option<PathBuf>,
     /// Put OpenCV's SIFT with RANSAC on the same pictures beside it, where Python has OpenCV.
@@ -65,8 +68,8 @@ pub(crate) struct Args {
     /// The Python that has OpenCV.
     #[arg(long, default_value = "python3", value_name = "PROGRAM")]
     python: PathBuf,
-    /// Take the places of landmarks to be exact, as they are here, instead of measured with a tape (1 cm, half a
-    /// degree): then several landmarks in one picture tell more.
+    /// Take the places of landmarks to be exact, as they are here, instead of measured with a tape
+    /// (1 cm, half a degree): then several landmarks in one picture tell more.
     #[arg(long)]
     exact_places: bool,
     /// Set one parameter of the algorithm other than the detector's, after the lesson, such as

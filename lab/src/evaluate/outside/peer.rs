@@ -1,4 +1,5 @@
-//! OpenCV's SIFT with RANSAC on the same pictures: a landmark is named from ten inliers of a homography on.
+//! OpenCV's SIFT with RANSAC on the same pictures: a landmark is named from ten inliers of a
+//! homography on.
 
 use super::{
     score::{PICTURES, View, view},

@@ -1,4 +1,5 @@
-//! Poses against the truth: of the camera in the map, and of each named landmark in the camera frame.
+//! Poses against the truth: of the camera in the map, and of each named landmark in the camera
+//! frame.
 
 use super::{
     bound::position_bound,
@@ -19,7 +20,8 @@ use vision::{
 pub(super) struct CameraScore {
     pub(super) position_m: f64,
     pub(super) direction_rad: f64,
-    /// Of the position, 3 expected: as stated, with the error that a place by hand is taken to have.
+    /// Of the position, 3 expected: as stated, with the error that a place by hand is taken to
+    /// have.
     pub(super) nees: f64,
     /// Of the position by the covariance of the landmark's pose alone: places are exact here.
     pub(super) nees_of_view: Option<f64>,
@@ -102,8 +104,8 @@ fn distinct<'a>(all: impl Iterator<Item = &'a LandmarkTruth>) -> impl Iterator<I
     })
 }
 
-/// Covariance of the camera's position (map frame) by the landmark's pose in the camera frame, of the solution that
-/// gives this pose of the camera.
+/// Covariance of the camera's position (map frame) by the landmark's pose in the camera frame, of
+/// the solution that gives this pose of the camera.
 fn position_covariance(
     seen: &LandmarkPose,
     landmark: &LandmarkTruth,
@@ -117,7 +119,8 @@ fn position_covariance(
         Some(second) if distance(second) < distance(&seen.best) => second,
         _ => &seen.best,
     };
-    // The position is -R^T t in the landmark frame: by the rotation vector R^T [t]x, by the translation -R^T.
+    // The position is -R^T t in the landmark frame: by the rotation vector R^T [t]x, by the
+    // translation -R^T.
     let turn = map_from_camera.rotation.to_rotation_matrix().into_inner();
     let by_rotation = turn * cross(&solution.camera_from_landmark.translation.vector);
     let mut by_seen = Matrix3x6::zeros();

@@ -1,4 +1,5 @@
-//! Recognises one picture as `POST recognise` does, without a prior, and detects in it as `waymark detect` does.
+//! Recognises one picture as `POST recognise` does, without a prior, and detects in it as
+//! `waymark detect` does.
 
 use super::world::CameraTruth;
 use anyhow::Context as _;

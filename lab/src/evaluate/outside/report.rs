@@ -82,7 +82,8 @@ pub(super) struct CameraFigures {
     pub(super) nees_of_view: Nees,
     /// Standard deviation of the position by that covariance.
     pub(super) stated_m: Errors,
-    /// All of them, by the number of landmarks that give the pose, and by the distance of the nearest one.
+    /// All of them, by the number of landmarks that give the pose, and by the distance of the
+    /// nearest one.
     pub(super) groups: Vec<(String, PositionFigures)>,
     /// Why pictures have no pose, by the word.
     pub(super) refusals: Vec<(String, usize)>,

@@ -1,5 +1,6 @@
-//! Whether the ratio of sides that views show contradicts the true size of their landmark: the check that refuses a
-//! stated size (`aspect_differs`), with the borders that the detector shows, as a person accepts them when teaching.
+//! Whether the ratio of sides that views show contradicts the true size of their landmark: the
+//! check that refuses a stated size (`aspect_differs`), with the borders that the detector shows,
+//! as a person accepts them when teaching.
 
 use super::{
     score::{FOUND_WELL, PictureScore, View},
@@ -23,9 +24,11 @@ pub(super) struct SizeFigures {
     pub(super) stated: usize,
     pub(super) refused: usize,
     pub(super) doubted: usize,
-    /// Refused ones whose views all outline the landmark well, at the stricter overlap: the check alone is wrong there.
+    /// Refused ones whose views all outline the landmark well, at the stricter overlap: the check
+    /// alone is wrong there.
     pub(super) refused_wrongly: usize,
-    /// Times that width and height were stated in the other order, where that differs; how many were refused.
+    /// Times that width and height were stated in the other order, where that differs; how many
+    /// were refused.
     pub(super) swapped: usize,
     pub(super) swapped_refused: usize,
 }

@@ -1,5 +1,5 @@
-//! A world as strangers to the landmarks of another one. Names mean nothing between worlds; the same picture may hang
-//! in both, so landmarks that show it are listed.
+//! A world as strangers to the landmarks of another one. Names mean nothing between worlds; the
+//! same picture may hang in both, so landmarks that show it are listed.
 
 use super::world::World;
 use serde::Deserialize;
@@ -14,8 +14,8 @@ struct List {
     groups: Vec<Vec<String>>,
 }
 
-/// `shown` for a robot that knows the landmarks of `taught`: a label has the name of the taught landmark that shows the
-/// same picture, else one that is not taught. Without poses.
+/// `shown` for a robot that knows the landmarks of `taught`: a label has the name of the taught
+/// landmark that shows the same picture, else one that is not taught. Without poses.
 pub(super) fn as_strangers(shown: &World, taught: &World) -> anyhow::Result<World> {
     let list: List = serde_json::from_str(SAME_PICTURES)?;
     let of = |world: &World, name: &str| format!("{}/{name}", world.truth.name);

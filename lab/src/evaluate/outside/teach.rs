@@ -1,5 +1,6 @@
-//! Teaches the landmarks of a world to a server of its own, as a person would: one frontal picture each, with size and
-//! place. In: a world. Out: the version of the map that the server recognises with.
+//! Teaches the landmarks of a world to a server of its own, as a person would: one frontal picture
+//! each, with size and place. In: a world. Out: the version of the map that the server recognises
+//! with.
 
 use super::world::World;
 use anyhow::Context as _;

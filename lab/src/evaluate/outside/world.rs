@@ -1,6 +1,6 @@
-//! A world of the outside format: `truth.json` in the evaluation format and, where poses are known, `world.json` beside
-//! it with the camera of every picture and the corners of every landmark. In: a folder. Out: labels, cameras, sizes
-//! and places, checked.
+//! A world of the outside format: `truth.json` in the evaluation format and, where poses are known,
+//! `world.json` beside it with the camera of every picture and the corners of every landmark. In: a
+//! folder. Out: labels, cameras, sizes and places, checked.
 
 use crate::evaluate::truth::{Truth, TruthError};
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
@@ -16,7 +16,8 @@ use std::{
 };
 use vision::{frame::Intrinsics, pose::LandmarkSize};
 
-/// Largest departure of a rotation in the file from an orthonormal one: numbers there have seven digits.
+/// Largest departure of a rotation in the file from an orthonormal one: numbers there have seven
+/// digits.
 const MAX_SKEW: f64 = 1e-3;
 /// Largest share of the longer side by which opposite sides of a landmark may differ.
 const MAX_UNEVEN: f64 = 0.02;
@@ -109,7 +110,8 @@ impl World {
         Ok(world)
     }
 
-    /// Every picture has a camera and every taught landmark a pose: figures without them would leave out in silence.
+    /// Every picture has a camera and every taught landmark a pose: figures without them would
+    /// leave out in silence.
     fn complete(&self) -> Result<(), (&'static str, String)> {
         let mut shown = self.truth.images.iter().filter(|image| !image.whole_image);
         if let Some(image) = shown.find(|image| !self.cameras.contains_key(&image.file)) {

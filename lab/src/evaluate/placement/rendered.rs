@@ -1,5 +1,5 @@
-//! The simulator's corridor, rendered: posters on walls and lamps under the ceiling, with corners and covariances
-//! by the detector, from robot poses of known covariance.
+//! The simulator's corridor, rendered: posters on walls and lamps under the ceiling, with corners
+//! and covariances by the detector, from robot poses of known covariance.
 
 use super::{Outcome, Summary};
 use crate::evaluate::experiment::{mixed, of_each};

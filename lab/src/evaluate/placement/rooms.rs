@@ -1,5 +1,5 @@
-//! Rectangular rooms with a poster on a wall and a lamp under the ceiling: all that is uncertain (corners, robot
-//! pose, extrinsics, wall, ceiling) is drawn from its stated covariance.
+//! Rectangular rooms with a poster on a wall and a lamp under the ceiling: all that is uncertain
+//! (corners, robot pose, extrinsics, wall, ceiling) is drawn from its stated covariance.
 
 use super::{Outcome, Strays, Summary};
 use crate::evaluate::statistics::median;
@@ -68,7 +68,8 @@ fn room(random: &mut Random) -> Option<Room> {
         let middle = nalgebra::center(&a, &b);
         let turned = |p: &Point2<f64>| p + n * (shift + turn * d.dot(&(p - middle)));
         let normal = if n.dot(&middle.coords) < 0.0 { -n } else { n };
-        // Covariance of (alpha, rho) of a line known by its turn about its middle and by its shift there.
+        // Covariance of (alpha, rho) of a line known by its turn about its middle and by its shift
+        // there.
         let lever = Vector2::new(-normal.y, normal.x).dot(&middle.coords);
         let (va, vs) = (WALL_SIGMA[0].powi(2), WALL_SIGMA[1].powi(2));
         let covariance = Matrix2::new(va, lever * va, lever * va, vs + lever * lever * va);
@@ -137,7 +138,8 @@ impl SimulatedView {
     }
 }
 
-/// A view of the object from 1 to 3.5 m, the camera aimed at it; drawn again until it is wholly in the image.
+/// A view of the object from 1 to 3.5 m, the camera aimed at it; drawn again until it is wholly in
+/// the image.
 fn simulated_view(room: &Room, object: &LandmarkPlace, random: &mut Random) -> Option<SimulatedView> {
     let covariance = Matrix3::from_diagonal(&Vector3::from(ROBOT_SIGMA.map(|s| s * s)));
     for _ in 0..MAX_TRIES {

@@ -1,4 +1,5 @@
-//! The robot's pose on the floor from one, two or three landmarks at once, and fused over drives (method 13.6, 15).
+//! The robot's pose on the floor from one, two or three landmarks at once, and fused over drives
+//! (method 13.6, 15).
 
 use super::{
     single::{Cost, cost_of},

@@ -1,5 +1,6 @@
-//! `waymark-lab evaluate pose`: accuracy of poses and consistency of their covariances (method 13.3 to 13.6): the
-//! table of 13.3, NEES, flips of the planar ambiguity, OpenCV on the same corners, several landmarks, drives, cost.
+//! `waymark-lab evaluate pose`: accuracy of poses and consistency of their covariances (method 13.3
+//! to 13.6): the table of 13.3, NEES, flips of the planar ambiguity, OpenCV on the same corners,
+//! several landmarks, drives, cost.
 
 pub(crate) mod stated_camera;
 pub(crate) mod joint;

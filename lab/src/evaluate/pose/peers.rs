@@ -1,5 +1,5 @@
-//! The same corners through OpenCV's `solvePnP` with IPPE, both solutions refined by `solvePnPRefineLM`, the better
-//! by its residual taken.
+//! The same corners through OpenCV's `solvePnP` with IPPE, both solutions refined by
+//! `solvePnPRefineLM`, the better by its residual taken.
 
 use super::single::{draws, nearer_to_mirror};
 use crate::{bench::Python, evaluate::statistics::median};
@@ -34,7 +34,8 @@ pub(super) struct PeerComparison {
     /// On the draws that Waymark does not flag as ambiguous.
     pub(super) ours_unflagged: Errors,
     pub(super) theirs_unflagged: Errors,
-    /// Largest difference between Waymark's and OpenCV's poses where both took the same solution, metres.
+    /// Largest difference between Waymark's and OpenCV's poses where both took the same solution,
+    /// metres.
     pub(super) apart_m: f64,
     /// Microseconds of a pose by OpenCV, Python included.
     pub(super) their_us: f64,
@@ -87,7 +88,8 @@ pub(super) fn beside(python: &Path, n: usize, seed: u64) -> Result<PeerCompariso
     })
 }
 
-/// OpenCV's plane has x right, y up, z towards the viewer; Waymark's x towards the viewer, y right, z up.
+/// OpenCV's plane has x right, y up, z towards the viewer; Waymark's x towards the viewer, y right,
+/// z up.
 fn ours_of(pose: &[[f64; 3]; 2]) -> Isometry3<f64> {
     let turn = Rotation3::from_scaled_axis(Vector3::from(pose[0]));
     let theirs_from_ours = Matrix3::new(0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0);
@@ -121,7 +123,8 @@ mod tests {
 
     #[test]
     fn opencvs_axes_become_waymarks() {
-        // Frontal at 3 m in OpenCV's axes: turned by pi about x (y up to v down), z towards the viewer.
+        // Frontal at 3 m in OpenCV's axes: turned by pi about x (y up to v down), z towards the
+        // viewer.
         let pose = ours_of(&[[std::f64::consts::PI, 0.0, 0.0], [0.0, 0.0, 3.0]]);
         let normal = pose.rotation * Vector3::x();
         assert!((normal + Vector3::z()).norm() < 1e-9, "{normal}");

@@ -1,4 +1,5 @@
-//! The set-up of method 13.3: a poster of 0.60 x 0.84 m, a camera of 700 px 0.3 m below its centre, panned at it.
+//! The set-up of method 13.3: a poster of 0.60 x 0.84 m, a camera of 700 px 0.3 m below its centre,
+//! panned at it.
 
 use nalgebra::{Isometry3, Matrix2, Matrix3, Point2, Rotation3, UnitQuaternion, Vector2, Vector3};
 use vision::{
@@ -18,7 +19,8 @@ pub(super) const CAMERA: Intrinsics = Intrinsics {
     sigmas: None,
 };
 
-/// `camera_from_landmark` of a level camera `d_m` from the poster's centre in plan, at azimuth `psi_deg`.
+/// `camera_from_landmark` of a level camera `d_m` from the poster's centre in plan, at azimuth
+/// `psi_deg`.
 pub(super) fn view(d_m: f64, psi_deg: f64) -> Isometry3<f64> {
     let psi = psi_deg.to_radians();
     let centre = Vector3::new(d_m * psi.cos(), d_m * psi.sin(), -0.3);

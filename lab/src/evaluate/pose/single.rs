@@ -1,5 +1,5 @@
-//! One landmark: the table of method 13.3, exactness, consistency of the covariance, flips of the planar ambiguity,
-//! time.
+//! One landmark: the table of method 13.3, exactness, consistency of the covariance, flips of the
+//! planar ambiguity, time.
 
 use super::scene::{CAMERA, SIZE, in_plan, isotropic, noisy, projected, view};
 use nalgebra::{Isometry3, Matrix3, SMatrix, UnitQuaternion, Vector3, Vector6};
@@ -11,8 +11,8 @@ use vision::{
     random::Random,
 };
 
-/// Rows of the table: distance, azimuth; the method's sigma along the normal, along the wall, of the heading
-/// (degrees): refined, linear.
+/// Rows of the table: distance, azimuth; the method's sigma along the normal, along the wall, of
+/// the heading (degrees): refined, linear.
 const ROWS: [(f64, f64, [f64; 3], [f64; 3]); 5] = [
     (2.0, 0.0, [0.006, 0.020, 0.56], [0.006, 0.024, 0.65]),
     (4.0, 0.0, [0.022, 0.158, 2.25], [0.026, 0.176, 2.51]),
@@ -23,7 +23,8 @@ const ROWS: [(f64, f64, [f64; 3], [f64; 3]); 5] = [
 /// Corner noise of the table.
 const ROW_SIGMA_PX: f64 = 0.5;
 const ROW_DRAWS: usize = 2_000;
-/// Error of the squared Mahalanobis distance from which an unflagged pose nearer to the mirror image is a flip.
+/// Error of the squared Mahalanobis distance from which an unflagged pose nearer to the mirror
+/// image is a flip.
 const FLIP_NEES: f64 = 30.0;
 
 /// One row, all sigmas in metres and degrees.
@@ -108,8 +109,8 @@ pub(super) struct Cell {
     pub(super) distance_m: f64,
     pub(super) azimuth_deg: f64,
     pub(super) sigma_px: f64,
-    /// Mean of the squared Mahalanobis distance of the truth, 6 degrees of freedom, over the draws that were not
-    /// flagged.
+    /// Mean of the squared Mahalanobis distance of the truth, 6 degrees of freedom, over the draws
+    /// that were not flagged.
     pub(super) nees: f64,
     pub(super) unflagged: usize,
     pub(super) draws: usize,
@@ -173,7 +174,8 @@ pub(super) fn nearer_to_mirror(pose: &Isometry3<f64>, truth: &Isometry3<f64>) ->
     let normal = |p: &Isometry3<f64>| p.rotation * Vector3::x();
     let v = truth.translation.vector.normalize();
     let n = normal(truth);
-    // The outward normal points to the viewer: mirrored, its part along the sight stays and the rest turns round.
+    // The outward normal points to the viewer: mirrored, its part along the sight stays and the
+    // rest turns round.
     let mirrored = v * (2.0 * n.dot(&v)) - n;
     normal(pose).angle(&mirrored) < normal(pose).angle(&n)
 }

@@ -43,7 +43,8 @@ impl StatedCamera {
         Self { real, stated: if cameras == Cameras::WithSigmas { usual } else { *base } }
     }
 
-    /// Pose of an object of `size` for which `believed` is assumed; `None` if it is not wholly in the image.
+    /// Pose of an object of `size` for which `believed` is assumed; `None` if it is not wholly in
+    /// the image.
     pub(crate) fn observe(
         &self,
         camera_from_landmark: &Isometry3<f64>,

@@ -4,7 +4,8 @@ use super::*;
 use nalgebra::Vector2;
 use vision::{frame::GrayImage, paper::relaxation::similarity::pairs, random::Random};
 
-/// A segment between two points, as an ideal extractor would give it. The brighter side is right of p to q.
+/// A segment between two points, as an ideal extractor would give it. The brighter side is right of
+/// p to q.
 fn segment(p: [f64; 2], q: [f64; 2]) -> EdgeSegment {
     let (p_px, q_px) = (Point2::from(p), Point2::from(q));
     let along = (q_px - p_px).normalize();
@@ -154,8 +155,8 @@ fn pairs_are_labelled_by_quads() {
     for pair in &found {
         match (pair.k, pair.l) {
             (0, 2) | (1, 3) => assert!(of(pair)[0].opposite),
-            // Outer top and inner bottom overlap the label by more than half, as does the whole of the inner border's
-            // height by width; so it has no label.
+            // Outer top and inner bottom overlap the label by more than half, as does the whole of
+            // the inner border's height by width; so it has no label.
             (0, 6) | (2, 4) => assert!(of(pair).is_empty()),
             (2, 8) => assert!(of(pair).iter().all(|j| !j.opposite)),
             _ => {}

@@ -1,5 +1,5 @@
-//! The paper's corridor in small (method 18, E10): camera, fix and fusion together; all that is uncertain is drawn
-//! anew.
+//! The paper's corridor in small (method 18, E10): camera, fix and fusion together; all that is
+//! uncertain is drawn anew.
 
 use crate::{
     extrinsics::{CameraExtrinsics, pan_tilt},
@@ -24,8 +24,9 @@ use vision::{
 const SIZE: LandmarkSize = LandmarkSize { width_m: 0.6, height_m: 0.84 };
 const SIGMA_PX: f64 = 0.5;
 
-/// 25 m along x; posters on the walls at y = 1.2 and -1.2, observed from 1 to 4 m ahead by a camera turned to that
-/// wall. Mean squared error along the corridor after the first fix, NEES at the end, corrections.
+/// 25 m along x; posters on the walls at y = 1.2 and -1.2, observed from 1 to 4 m ahead by a camera
+/// turned to that wall. Mean squared error along the corridor after the first fix, NEES at the end,
+/// corrections.
 fn corridor(random: &mut Random) -> (f64, f64, u64) {
     let camera = Intrinsics::new(500.0, 500.0, 320.0, 240.0, Distortion::None).unwrap();
     let places: Vec<LandmarkPlace> = (0..4)
@@ -110,7 +111,8 @@ fn the_error_along_the_corridor_is_below_twenty_centimetres() {
         (squares, nees) = (squares + s, nees + e);
     }
     let (rms, nees) = ((squares / f64::from(drives)).sqrt(), nees / f64::from(drives));
-    // Paper: below 20 cm along the corridor. NEES: 99 % band of the mean of 60 draws, 3 degrees of freedom.
+    // Paper: below 20 cm along the corridor. NEES: 99 % band of the mean of 60 draws, 3 degrees of
+    // freedom.
     assert!(rms < 0.2, "{rms} m along");
     assert!((2.25..3.85).contains(&nees), "{nees}");
 }

@@ -1,5 +1,5 @@
-//! Landmarks and scans together: drives along a corridor with errors in the map's walls, a long standstill, and the
-//! limits of what a scan may do.
+//! Landmarks and scans together: drives along a corridor with errors in the map's walls, a long
+//! standstill, and the limits of what a scan may do.
 
 use super::fix;
 use crate::{
@@ -53,7 +53,8 @@ struct Driven {
     scans: u64,
 }
 
-/// A landmark every 7 m, observed three times; scans at every step if there are parameters for them.
+/// A landmark every 7 m, observed three times; scans at every step if there are parameters for
+/// them.
 fn drive(random: &mut Random, scans: Option<&LaserFixParams>) -> Driven {
     let p = FuseParams::default();
     let walls = corridor();
@@ -98,8 +99,8 @@ fn drive(random: &mut Random, scans: Option<&LaserFixParams>) -> Driven {
 
 #[test]
 fn scans_make_the_pose_more_certain_and_keep_it_consistent() {
-    // The simulated ranges have independent errors; by default errors of points count as shared, as with real
-    // lasers.
+    // The simulated ranges have independent errors; by default errors of points count as shared, as
+    // with real lasers.
     let exact = LaserFixParams { correlated: 1.0, floor: [0.0; 2], ..LaserFixParams::default() };
     let careful = LaserFixParams::default();
     let mut random = Random::new(3);
@@ -135,7 +136,8 @@ fn a_long_standstill_does_not_shrink_the_covariance() {
     let both = Fix { landmarks: vec![LandmarkId(1), LandmarkId(2)], ..fix(2, at, 0.04, 0.02) };
     fuser.apply_fix(0, &both).unwrap();
     let once = fuser.pose().unwrap();
-    // Half a minute: scans between observations of one landmark, of another and of both do not make these new.
+    // Half a minute: scans between observations of one landmark, of another and of both do not make
+    // these new.
     for i in 1..300 {
         let now = i * SECOND / 10;
         fuser.apply_odometry(now, Pose2::default()).unwrap();

@@ -14,7 +14,8 @@ use vision::random::Random;
 
 #[test]
 fn systematic_odometry_errors_are_estimated() {
-    // 24 drives past a landmark every 6 m, by a robot with a systematic scale and drift of odometry.
+    // 24 drives past a landmark every 6 m, by a robot with a systematic scale and drift of
+    // odometry.
     let p = FuseParams::default();
     let mut random = Random::new(5);
     let (mut before, mut after, mut nees, drives) = (0.0, 0.0, 0.0, 24);
@@ -47,7 +48,8 @@ fn systematic_odometry_errors_are_estimated() {
         assert!(known.covariance[(0, 0)] < 0.15 * p.scale_sigma.powi(2), "{}", known.covariance);
     }
     assert!(after < 0.35 * before, "{after} m before the fourth landmark, {before} m before the second");
-    // The drives lack the noise that the filter assumes: errors are smaller than stated, never larger.
+    // The drives lack the noise that the filter assumes: errors are smaller than stated, never
+    // larger.
     assert!(nees / f64::from(drives) < 2.6, "{nees}");
 }
 

@@ -34,7 +34,8 @@ fn a_late_fix_has_the_same_effect_as_one_in_time() {
     assert_eq!(b.corrections, 2);
     assert!(a.pose.pose.minus(&b.pose.pose).norm() < 1e-12);
     assert!((a.pose.covariance - b.pose.covariance).norm() < 1e-12);
-    // 55 ms after a reading lies half-way to the next: the fix of x = 0.56 at odometry 0.55 moved the pose forward.
+    // 55 ms after a reading lies half-way to the next: the fix of x = 0.56 at odometry 0.55 moved
+    // the pose forward.
     assert!(a.pose.pose.x_m > 1.17, "{a:?}");
 }
 

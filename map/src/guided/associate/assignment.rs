@@ -14,10 +14,12 @@ pub enum NotAssociated {
     },
     /// It is outside of the gate of every candidate: the prior, the map or the identity is wrong.
     OutsideGates {
-        /// Squared Mahalanobis distance to the nearest, 8 degrees of freedom; infinite when all are far beyond.
+        /// Squared Mahalanobis distance to the nearest, 8 degrees of freedom; infinite when all are
+        /// far beyond.
         distance2: f64,
     },
-    /// It is in a gate, but contradicts the other observations, or another one explains the landmark better.
+    /// It is in a gate, but contradicts the other observations, or another one explains the
+    /// landmark better.
     Incompatible,
 }
 

@@ -6,7 +6,8 @@ use vision::{geometry::Corners, model::LandmarkId};
 
 /// Most observations of one image; a longer list is refused.
 pub const MAX_OBSERVATIONS: usize = 32;
-/// Most candidates of one observation; a longer list is refused. As many as a look-alike class may have.
+/// Most candidates of one observation; a longer list is refused. As many as a look-alike class may
+/// have.
 pub const MAX_CANDIDATES: usize = 512;
 /// Largest evidence, nats; larger values are clamped.
 const MAX_EVIDENCE_NATS: f64 = 1e6;
@@ -16,8 +17,9 @@ const MAX_EVIDENCE_NATS: f64 = 1e6;
 pub struct Candidate {
     /// Number of the landmark.
     pub landmark: LandmarkId,
-    /// Picture evidence, nats: ln of p(picture, if it is this landmark) over p(picture, if it is none). Members of
-    /// one look-alike class get the same value: what differs between them is not evidence.
+    /// Picture evidence, nats: ln of p(picture, if it is this landmark) over p(picture, if it is
+    /// none). Members of one look-alike class get the same value: what differs between them is not
+    /// evidence.
     pub picture_nats: f64,
     /// Prior odds besides the predicted corners, nats; 0 where nothing is known.
     pub prior_nats: f64,
@@ -26,8 +28,8 @@ pub struct Candidate {
 /// A quad observed in the image.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Observation {
-    /// Corners in the landmark's order (TL, TR, BR, BL), px of the image as it comes. Of a landmark that the image
-    /// border cuts, corners outside of the image come from alignment.
+    /// Corners in the landmark's order (TL, TR, BR, BL), px of the image as it comes. Of a landmark
+    /// that the image border cuts, corners outside of the image come from alignment.
     pub corners_px: Corners,
     /// Their covariance (u, v of TL, TR, BR, BL), px^2.
     pub covariance_px2: SMatrix<f64, 8, 8>,

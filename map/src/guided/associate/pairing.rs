@@ -16,8 +16,8 @@ use crate::{
 use nalgebra::{Matrix2, SMatrix};
 use vision::geometry::polygon;
 
-/// Pairings with a corner this many times beyond the gate of rivals are left out before anything is computed of them.
-/// Far beyond, since the distance of one corner rests on a linear prediction.
+/// Pairings with a corner this many times beyond the gate of rivals are left out before anything is
+/// computed of them. Far beyond, since the distance of one corner rests on a linear prediction.
 const FAR_FACTOR: f64 = 4.0;
 
 /// An observation and a landmark that pass the individual gate of rivals.
@@ -43,8 +43,8 @@ pub(super) struct Row {
     pub(super) pairings: Vec<Pairing>,
 }
 
-/// Squared distances within which a pairing, or `count` of them together, is accepted, and within which it is a
-/// rival.
+/// Squared distances within which a pairing, or `count` of them together, is accepted, and within
+/// which it is a rival.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Gates {
     pub(super) z: f64,
@@ -132,7 +132,8 @@ fn pairing(
     })
 }
 
-/// Whether one corner alone is beyond a squared Mahalanobis distance. That of all eight coordinates is larger still.
+/// Whether one corner alone is beyond a squared Mahalanobis distance. That of all eight coordinates
+/// is larger still.
 fn is_far_off(expected: &Expected, observed: &Observation, chi2: f64) -> bool {
     (0..4).any(|c| {
         let block = |m: &SMatrix<f64, 8, 8>| Matrix2::from(m.fixed_view::<2, 2>(2 * c, 2 * c));
@@ -142,8 +143,8 @@ fn is_far_off(expected: &Expected, observed: &Observation, chi2: f64) -> bool {
     })
 }
 
-/// Logarithm of the density, per px^8, of the corners of a quad that is on no map: its middle anywhere in the image,
-/// the other six coordinates anywhere within its own size.
+/// Logarithm of the density, per px^8, of the corners of a quad that is on no map: its middle
+/// anywhere in the image, the other six coordinates anywhere within its own size.
 fn log_clutter(expectations: &Expectations, observed: &Observation) -> f64 {
     let [width, height] = expectations.image_px;
     let size_px = polygon::area(observed.corners_px.points()).sqrt().max(1.0);

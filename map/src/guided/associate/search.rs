@@ -1,5 +1,5 @@
-//! Depth-first branch and bound over assignments: the best that is jointly compatible, and all that come within the
-//! margin.
+//! Depth-first branch and bound over assignments: the best that is jointly compatible, and all that
+//! come within the margin.
 
 use crate::guided::{
     associate::pairing::{Gates, Row},
@@ -25,7 +25,8 @@ pub(super) struct Hypothesis {
 pub(super) struct Outcome {
     /// The best within the joint gate; the empty assignment is always within it.
     pub best: Hypothesis,
-    /// All within the wider gate of rivals that score within the margin of the best, the best among them.
+    /// All within the wider gate of rivals that score within the margin of the best, the best among
+    /// them.
     pub rivals: Vec<Hypothesis>,
     pub nodes: usize,
     pub is_exhausted: bool,
@@ -97,7 +98,8 @@ impl Search<'_> {
         self.visit(&Node { chosen, error: node.error.clone(), ..*node });
     }
 
-    /// The node with one more pairing; `None` when its landmark is taken or the joint gate of rivals rules it out.
+    /// The node with one more pairing; `None` when its landmark is taken or the joint gate of
+    /// rivals rules it out.
     fn paired(&self, node: &Node, row: &Row, index: usize) -> Option<Node> {
         let pairing = &row.pairings[index];
         if node.used[pairing.expected] {

@@ -1,4 +1,5 @@
-//! The landmarks expected in one image, and their corners as a function of the errors that they share.
+//! The landmarks expected in one image, and their corners as a function of the errors that they
+//! share.
 
 use crate::{
     extrinsics::CameraExtrinsics,
@@ -25,7 +26,8 @@ pub struct Expected {
     pub view: InView,
     /// Predicted corners TL, TR, BR, BL, px; of a cut landmark some are outside the image.
     pub corners_px: [Point2<f64>; 4],
-    /// Covariance of the predicted corners (u, v of TL, TR, BR, BL), px^2: prior pose, place, extrinsics, intrinsics.
+    /// Covariance of the predicted corners (u, v of TL, TR, BR, BL), px^2: prior pose, place,
+    /// extrinsics, intrinsics.
     pub covariance_px2: SMatrix<f64, 8, 8>,
     /// A search gate for each corner.
     pub gates: [SearchGate; 4],
@@ -37,10 +39,11 @@ pub struct Expected {
     pub side_px: f64,
     /// Share of its face that obstacles leave free, 0 to 1.
     pub unoccluded_share: f64,
-    /// Whether it is in full view wherever within [`super::ExpectParams::sure_sigmas`] the robot is: not finding it
-    /// is evidence against the prior, or against the landmark.
+    /// Whether it is in full view wherever within [`super::ExpectParams::sure_sigmas`] the robot
+    /// is: not finding it is evidence against the prior, or against the landmark.
     pub is_sure: bool,
-    /// Whether obstacles hide it from everywhere within its uncertainty: then nothing in the image can be it.
+    /// Whether obstacles hide it from everywhere within its uncertainty: then nothing in the image
+    /// can be it.
     pub(in crate::guided) is_hidden: bool,
     /// Its place in the map.
     pub(super) place: LandmarkPlace,

@@ -138,8 +138,8 @@ impl Frame<'_> {
         })
     }
 
-    /// Second moment of what the derivative by the pose leaves over, over draws of the pose. A draw from which a
-    /// corner has no pixel counts as far off as the image is large.
+    /// Second moment of what the derivative by the pose leaves over, over draws of the pose. A draw
+    /// from which a corner has no pixel counts as far off as the image is large.
     fn not_linear(
         &self,
         place: &LandmarkPlace,
@@ -174,8 +174,8 @@ impl Frame<'_> {
         }
     }
 
-    /// Share in sight from the prior pose; largest share in sight from there and around; whether all is in sight from
-    /// all of them.
+    /// Share in sight from the prior pose; largest share in sight from there and around; whether
+    /// all is in sight from all of them.
     fn occlusion(&self, known: &KnownLandmark<'_>) -> (f64, f64, bool) {
         let share = |camera: &Point3<f64>| {
             if known.visible.is_some_and(|area| area.contains(&camera.xy())) {

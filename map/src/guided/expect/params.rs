@@ -18,11 +18,13 @@ pub struct ExpectParams {
     pub min_unoccluded_share: f64,
     /// Standard deviation of a measured corner that the search gates allow for, px.
     pub corner_sigma_px: f64,
-    /// Size of the search gates: squared Mahalanobis distance, 2 degrees of freedom. 13.816 is 99.9 %.
+    /// Size of the search gates: squared Mahalanobis distance, 2 degrees of freedom. 13.816 is 99.9
+    /// %.
     pub gate_chi2: f64,
     /// Largest half extent of a search gate, px; beyond it the prior is too uncertain to guide.
     pub max_gate_px: f64,
-    /// A landmark is surely in view when it is so within this many standard deviations of the prior.
+    /// A landmark is surely in view when it is so within this many standard deviations of the
+    /// prior.
     pub sure_sigmas: f64,
     /// How far before its wall a landmark is taken to hang when lines of sight are tested, metres.
     pub standoff_m: f64,

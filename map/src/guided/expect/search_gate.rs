@@ -7,7 +7,8 @@ use nalgebra::{Matrix2, Point2, Vector2};
 pub struct SearchGate {
     /// Predicted corner, px.
     pub center_px: Point2<f64>,
-    /// Covariance of a measured corner about it, px^2: prediction plus [`super::ExpectParams::corner_sigma_px`].
+    /// Covariance of a measured corner about it, px^2: prediction plus
+    /// [`super::ExpectParams::corner_sigma_px`].
     pub covariance_px2: Matrix2<f64>,
     /// Squared Mahalanobis distance of the border.
     pub chi2: f64,

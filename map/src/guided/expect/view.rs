@@ -41,8 +41,8 @@ pub enum InView {
     Full,
     /// The image border cuts it.
     Cut {
-        /// The part in the image: a convex polygon, px, in the order of the corners. Sides bent by the lens count as
-        /// straight.
+        /// The part in the image: a convex polygon, px, in the order of the corners. Sides bent by
+        /// the lens count as straight.
         visible_px: Vec<Point2<f64>>,
         /// Share of its area that is in the image, 0 to 1.
         share: f64,

@@ -15,11 +15,13 @@ pub struct ScheduleParams {
     pub max_guided_frames: u32,
     /// or without support for this distance, metres.
     pub max_guided_m: f64,
-    /// With a larger position uncertainty in its worst direction every frame is searched globally, metres,
+    /// With a larger position uncertainty in its worst direction every frame is searched globally,
+    /// metres,
     pub max_sigma_m: f64,
     /// or with a larger heading uncertainty, radians.
     pub max_sigma_rad: f64,
-    /// A global fix within this squared Mahalanobis distance of the pose supports it (3 degrees of freedom).
+    /// A global fix within this squared Mahalanobis distance of the pose supports it (3 degrees of
+    /// freedom).
     pub support_chi2: f64,
     /// A global fix beyond this contradicts the pose (3 degrees of freedom).
     pub contradict_chi2: f64,

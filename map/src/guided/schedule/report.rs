@@ -79,7 +79,8 @@ impl GuidedReport {
 pub struct FrameReport<'a> {
     /// The camera, as in [`super::Schedule::plan`].
     pub camera: u32,
-    /// Motion by odometry since the frame before, in the robot frame then; the identity for the first.
+    /// Motion by odometry since the frame before, in the robot frame then; the identity for the
+    /// first.
     pub motion: Pose2,
     /// The pose at the frame's time without the frame, if there is one.
     pub prior: Option<&'a Pose2Covariance>,
@@ -87,8 +88,9 @@ pub struct FrameReport<'a> {
     pub searched: bool,
     /// The pose by the uniquely recognised landmarks of that search alone, made without any prior.
     pub global: Option<&'a FixResult>,
-    /// Landmarks surely in view ([`crate::guided::Expected::is_sure`]) that neither way found. Only those that are
-    /// recognised reliably when they are there: not members of look-alike classes, not quarantined ones.
+    /// Landmarks surely in view ([`crate::guided::Expected::is_sure`]) that neither way found. Only
+    /// those that are recognised reliably when they are there: not members of look-alike classes,
+    /// not quarantined ones.
     pub missed: &'a [LandmarkId],
 }
 
@@ -97,10 +99,11 @@ pub struct FrameReport<'a> {
 pub enum Decision {
     /// No global fix, or one without information on the pose.
     Keep,
-    /// The global fix agrees with the pose, or starts one: it goes to the fuser as `FixRole::Independent`.
+    /// The global fix agrees with the pose, or starts one: it goes to the fuser as
+    /// `FixRole::Independent`.
     Use,
-    /// The global fix contradicts the pose: it goes to the fuser as `FixRole::Independent`, which leaves it out and
-    /// counts it.
+    /// The global fix contradicts the pose: it goes to the fuser as `FixRole::Independent`, which
+    /// leaves it out and counts it.
     Doubt {
         /// How many global fixes in a row contradict the pose and agree with one another.
         in_a_row: u32,

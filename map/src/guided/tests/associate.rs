@@ -15,8 +15,8 @@ fn by_default(e: &Expectations, observations: &[Observation]) -> Assignment {
     super::super::associate(e, observations, &AssociateParams::default()).unwrap()
 }
 
-/// Joint squared distance of pairings by the stacked covariance, linearised at the prior; and with the logarithm of
-/// its determinant.
+/// Joint squared distance of pairings by the stacked covariance, linearised at the prior; and with
+/// the logarithm of its determinant.
 fn stacked(e: &Expectations, pairs: &[(&Observation, LandmarkId)]) -> (f64, f64) {
     let n = 8 * pairs.len();
     let (mut by_common, mut own) = (DMatrix::zeros(n, joint::COMMON), DMatrix::zeros(n, n));
@@ -61,9 +61,9 @@ fn the_joint_distance_is_that_of_the_stacked_covariance() {
 
 #[test]
 fn the_bounded_search_finds_the_best_of_all_assignments() {
-    // Doors closer than the uncertainty of the pose: several candidates for each observation. Oracle: all
-    // assignments of three observations to doors by the stacked covariance, the densest first; all distances are
-    // short beside the range, so that the derivative at the prior serves.
+    // Doors closer than the uncertainty of the pose: several candidates for each observation.
+    // Oracle: all assignments of three observations to doors by the stacked covariance, the densest
+    // first; all distances are short beside the range, so that the derivative at the prior serves.
     let places: BTreeMap<_, _> =
         (1..=5).map(|i| (LandmarkId(i), on_wall(3.0 + 0.12 * i as f64, 1.0, 0.9, 2.0))).collect();
     let mut random = Random::new(8);
@@ -304,7 +304,8 @@ fn extreme_input_gives_an_error_or_a_result_and_lists_are_bounded() {
 
 #[test]
 fn the_search_stops_at_its_bound_and_then_nothing_is_unique() {
-    // Twenty doors in the same place to a few pixels and as many observations: factorially many assignments.
+    // Twenty doors in the same place to a few pixels and as many observations: factorially many
+    // assignments.
     let places: BTreeMap<_, _> =
         (1..=DOORS).map(|i| (LandmarkId(i), on_wall(3.0 + 0.01 * i as f64, 1.0, 0.9, 2.0))).collect();
     let mut random = Random::new(14);

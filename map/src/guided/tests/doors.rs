@@ -1,5 +1,5 @@
-//! Twelve identical doors in a row, from image to fused pose: doors correct a right pose and do not support a wrong
-//! one.
+//! Twelve identical doors in a row, from image to fused pose: doors correct a right pose and do not
+//! support a wrong one.
 
 mod fix_role;
 
@@ -219,7 +219,8 @@ fn with_a_known_pose_identical_doors_are_named_rightly() {
             right += made.unique().filter(|(i, id)| *id == shown[*i].0).count();
             wrong += made.unique().filter(|(i, id)| *id != shown[*i].0).count();
             nodes = nodes.max(made.nodes);
-            // The joint distance of right assignments is chi2 if corners have their stated errors only.
+            // The joint distance of right assignments is chi2 if corners have their stated errors
+            // only.
             let exact = AssociateParams { model_sigma_px: 0.0, ..AssociateParams::default() };
             let made = super::super::associate(&e, &observations, &exact).unwrap();
             if made.unique().count() == shown.len() {
@@ -258,8 +259,9 @@ fn a_robot_with_a_right_pose_uses_every_door() {
     assert!(right > frames && worst_m < 0.15, "{right} {worst_m}");
 }
 
-/// Drives with a pose that is wrong by `off_m` from between the doors until the poster has been in view for a while.
-/// Frames with the poster until the pose is contradicted, and until it is right again.
+/// Drives with a pose that is wrong by `off_m` from between the doors until the poster has been in
+/// view for a while. Frames with the poster until the pose is contradicted, and until it is right
+/// again.
 fn frames_to_recover(spacing_m: f64, off_m: f64, seed: u64) -> (usize, usize) {
     let mut drive = Drive::new(spacing_m, 2.5 * spacing_m, off_m, seed);
     let (mut shown, mut doubted, mut replaced, mut misled) = (0, None, None, 0);
@@ -343,7 +345,8 @@ fn a_contradicted_pose_is_no_longer_corrected_by_doors() {
     while drive.truth.x_m < 2.0 {
         drive.frame();
     }
-    // Carried by ten spacings, in front of the last poster: no other unique landmark is in view or expected.
+    // Carried by ten spacings, in front of the last poster: no other unique landmark is in view or
+    // expected.
     drive.truth = drive.truth.compose(&Pose2::new(20.0, 0.0, 0.0));
     let (mut shown, mut doubted) = (0, None);
     for _ in 0..14 {

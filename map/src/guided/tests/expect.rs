@@ -1,4 +1,5 @@
-//! Predicted corners and their covariance against projection, finite differences and Monte Carlo; what is in view.
+//! Predicted corners and their covariance against projection, finite differences and Monte Carlo;
+//! what is in view.
 
 use super::*;
 use crate::visibility::{Obstacle, PanTiltCamera, VisibilityParams, visibility};
@@ -51,8 +52,8 @@ fn a_frontal_square_has_its_pinhole_corners() {
 
 #[test]
 fn the_covariance_of_a_frontal_square_by_hand() {
-    // Only the robot's position is uncertain: 1 cm aside moves every corner by 512 * 0.01 / 4 px; 1 cm ahead moves it
-    // from the centre by 64 * 0.01 / 4 px.
+    // Only the robot's position is uncertain: 1 cm aside moves every corner by 512 * 0.01 / 4 px; 1
+    // cm ahead moves it from the centre by 64 * 0.01 / 4 px.
     let mut place = ahead(4.0, 0.0, 1.0);
     place.covariance = Matrix6::zeros();
     let mounting = CameraExtrinsics { covariance: Matrix6::zeros(), ..level(0.0) };
@@ -117,7 +118,8 @@ fn the_covariance_is_consistent_at_all_ranges_and_priors() {
         ] {
             let mean = mean_nees(sigma_m, sigma_deg, range_m, &lens, &mut random);
             println!("{sigma_m} m, {sigma_deg} deg at {range_m} m: mean NEES {mean:.2} of 8");
-            // Standard deviation of the mean of 400 draws: 0.2. Non-linearity makes it larger, never smaller.
+            // Standard deviation of the mean of 400 draws: 0.2. Non-linearity makes it larger,
+            // never smaller.
             assert!((5.5..8.6).contains(&mean), "{sigma_m} {sigma_deg} {range_m}: {mean}");
         }
     }
@@ -190,8 +192,8 @@ fn visibility_of_landmarks_is_reported() {
     let hidden = of(&ahead(4.0, 0.0, 1.0), &[wall]).unwrap();
     assert_eq!(hidden.view, InView::Occluded { unoccluded_share: 0.0 });
     assert!(hidden.is_hidden && !hidden.is_sure);
-    // A wall that ends where the line of sight to the middle runs: two columns of three are free, and it is not
-    // surely in view.
+    // A wall that ends where the line of sight to the middle runs: two columns of three are free,
+    // and it is not surely in view.
     let beside = Obstacle { a: Point2::new(2.0, 0.02), b: Point2::new(2.0, 2.0), height_m: None };
     let partly = of(&ahead(4.0, 0.0, 1.0), &[beside]).unwrap();
     assert_eq!(partly.view, InView::Full);
@@ -209,7 +211,8 @@ fn inside_its_visibility_area_no_line_of_sight_is_tested() {
     let area = visibility(&place, &[], &viewer, &limits).unwrap();
     let (seat, camera) = (level(0.0), camera());
     let view = CameraView { mounting: &seat, intrinsics: &camera, image_px: IMAGE_PX };
-    // An obstacle that the area does not contain: the area decides inside of it, sight lines elsewhere.
+    // An obstacle that the area does not contain: the area decides inside of it, sight lines
+    // elsewhere.
     let wall = [Obstacle { a: Point2::new(2.0, -2.0), b: Point2::new(2.0, 2.0), height_m: None }];
     let at = prior(Pose2::default(), 0.01, 0.1);
     let share = |visible| {

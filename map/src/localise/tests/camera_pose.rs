@@ -1,10 +1,12 @@
-//! The pose of a camera held in a hand: exact corners, honest covariance, the planar ambiguity, refusals.
+//! The pose of a camera held in a hand: exact corners, honest covariance, the planar ambiguity,
+//! refusals.
 
 use super::*;
 use crate::localise::camera_pose::{CameraPose, CameraPoseRefusal, camera_pose};
 use nalgebra::UnitQuaternion;
 
-/// A camera at `d_m` and azimuth `psi_deg` from the landmark's normal, 1.6 m high, tilted and rolled as hands do.
+/// A camera at `d_m` and azimuth `psi_deg` from the landmark's normal, 1.6 m high, tilted and
+/// rolled as hands do.
 fn held(place: &LandmarkPlace, d_m: f64, psi_deg: f64) -> Isometry3<f64> {
     let robot = robot(place, d_m, psi_deg).to_isometry3();
     let roll = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 0.04);

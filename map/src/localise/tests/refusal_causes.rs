@@ -65,7 +65,8 @@ fn is_right(cause: &RefusalCause, truth: f64, tolerance: f64) -> bool {
     off < tolerance && off < 4.0 * cause.sigma
 }
 
-/// Of all views, the share in which the quantity is named rightly: among the causes, as the first, as the only one.
+/// Of all views, the share in which the quantity is named rightly: among the causes, as the first,
+/// as the only one.
 fn shares<'a>(
     all: impl ExactSizeIterator<Item = &'a Vec<RefusalCause>>,
     quantity: FixQuantity,
@@ -108,7 +109,8 @@ fn a_wrong_number_is_named_with_its_value() {
         let posed = shares(views.iter().map(|[_, posed]| posed), quantity, value, tolerance);
         eprintln!("{name}: {} refused, alone {alone:.2?}, with a prior {posed:.2?}", views.len());
         assert!(views.len() >= 20, "{name}: {} refused", views.len());
-        // Among the causes of nearly every view; with a prior pose the first, and most often the only one.
+        // Among the causes of nearly every view; with a prior pose the first, and most often the
+        // only one.
         assert!(alone[0] >= 0.95 && posed[1] >= 0.95 && posed[2] >= 0.85, "{name}: {alone:?} {posed:?}");
         // One landmark alone does not tell size from height.
         let is_size = matches!(quantity, FixQuantity::Size(_));

@@ -1,5 +1,5 @@
-//! A camera whose intrinsics are not those that it states: its fixes stay within three of their standard deviations, or the
-//! monitor suspects it. Nothing in between is silent.
+//! A camera whose intrinsics are not those that it states: its fixes stay within three of their
+//! standard deviations, or the monitor suspects it. Nothing in between is silent.
 
 use super::{camera, mounting, nees, observation, observe_by, off, stated};
 use crate::{
@@ -21,7 +21,8 @@ const THREE_SIGMA: f64 = 14.16;
 const FEW: f64 = 0.03;
 const FRAMES: usize = 240;
 
-/// Share of the fixes that are outside of three sigma, how many fixes there are, and whether the camera is suspect.
+/// Share of the fixes that are outside of three sigma, how many fixes there are, and whether the
+/// camera is suspect.
 fn driven(real: &Intrinsics, said: &Intrinsics, seed: u64) -> (f64, usize, bool) {
     let mut random = Random::new(seed);
     let mut monitor = IntrinsicsMonitor::default();

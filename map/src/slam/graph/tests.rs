@@ -48,7 +48,8 @@ fn jacobians_are_the_finite_differences() {
     }
 }
 
-/// The same problem by dense Gauss-Newton with numeric derivatives. Gives poses and the inverse of its matrix.
+/// The same problem by dense Gauss-Newton with numeric derivatives. Gives poses and the inverse of
+/// its matrix.
 fn dense(poses: &[Pose2], edges: &[PoseConstraint]) -> (Vec<Pose2>, DMatrix<f64>) {
     let mut at = poses.to_vec();
     let n = 3 * (at.len() - 1);

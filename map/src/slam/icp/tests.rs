@@ -27,7 +27,8 @@ fn a_corridor_gives_no_information_along_itself() {
     let mut random = Random::new(2);
     let walls = vec![[-60.0, -1.0, 60.0, -1.0], [-60.0, 1.0, 60.0, 1.0]];
     for turn in [0.0_f64, 0.7, 2.0] {
-        // The same corridor, the robot turned: the unknown direction follows the walls, not the robot.
+        // The same corridor, the robot turned: the unknown direction follows the walls, not the
+        // robot.
         let at = Pose2::new(0.0, 0.1, turn.sin() * 0.3);
         let old = cloud_at(&walls, &at, 0.01, &mut random);
         let reference = SurfaceIndex::new([(at, &old)].into_iter(), 0.5);
@@ -58,7 +59,8 @@ fn the_covariance_agrees_with_monte_carlo() {
         let e = found.pose.minus(&b);
         sum += e.dot(&(found.information * e));
     }
-    // 3 degrees of freedom. Never overconfident; real scans have shared errors, so a lower value is right.
+    // 3 degrees of freedom. Never overconfident; real scans have shared errors, so a lower value is
+    // right.
     let mean = sum / draws as f64;
     assert!((0.3..3.2).contains(&mean), "{mean}");
 }

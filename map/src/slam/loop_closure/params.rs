@@ -22,7 +22,8 @@ pub struct LoopParams {
     pub every_m: f64,
     /// Distance along the path on each side of the old keyframe whose scans are matched to, metres.
     pub old_m: f64,
-    /// Distance back from the new keyframe whose scans are matched when the uncertainty is large, metres.
+    /// Distance back from the new keyframe whose scans are matched when the uncertainty is large,
+    /// metres.
     pub new_m: f64,
     /// Error of the scans joined along that distance: position, metres,
     pub way_m: f64,
@@ -30,7 +31,8 @@ pub struct LoopParams {
     pub way_rad: f64,
     /// Standard deviation up to which a single loop is accepted, metres.
     pub sure_m: f64,
-    /// Factor on the graph's standard deviations: errors of neighbouring matches are not independent.
+    /// Factor on the graph's standard deviations: errors of neighbouring matches are not
+    /// independent.
     pub doubt: f64,
     /// Correlative search, used when the uncertainty is large.
     pub search: CorrelativeParams,

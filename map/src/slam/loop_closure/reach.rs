@@ -1,5 +1,5 @@
-//! Relative covariances of all keyframes from the newest one, and which of them may observe the same walls. In: the
-//! pose graph. Out: the old keyframes worth a try.
+//! Relative covariances of all keyframes from the newest one, and which of them may observe the
+//! same walls. In: the pose graph. Out: the old keyframes worth a try.
 
 use crate::{
     pose2::{Pose2, Pose2Covariance},
@@ -40,8 +40,8 @@ impl Ord for Reached {
     }
 }
 
-/// `new_from_pose` of every pose with covariance along the most certain chain of constraints: never more certain than
-/// by the whole graph (Olson 2009).
+/// `new_from_pose` of every pose with covariance along the most certain chain of constraints: never
+/// more certain than by the whole graph (Olson 2009).
 pub(super) fn relative_covariances(
     keys: &[Keyframe],
     path: &[PoseConstraint],

@@ -1,5 +1,6 @@
-//! Verifies one loop: matches the scans of a new keyframe to those around an old one. In: two keyframes and their
-//! expected relative pose. Out: the measured relative pose as a constraint, or nothing.
+//! Verifies one loop: matches the scans of a new keyframe to those around an old one. In: two
+//! keyframes and their expected relative pose. Out: the measured relative pose as a constraint, or
+//! nothing.
 
 use crate::{
     pose2::{Pose2, Pose2Covariance},

@@ -14,8 +14,8 @@ use crate::{
 use nalgebra::{Point2, Rotation2, Vector2};
 use std::f64::consts::FRAC_PI_2;
 
-/// The same scene with the landmark under the ceiling, on the floor or leaning, at any height, and a camera that
-/// can be tilted to it.
+/// The same scene with the landmark under the ceiling, on the floor or leaning, at any height, and
+/// a camera that can be tilted to it.
 fn random_tilted_map(seed: u64) -> (LandmarkPlace, Vec<Obstacle>, PanTiltCamera) {
     let (mut landmark, mut obstacles, mut viewer) = random_map(seed);
     let mut dice = Dice::new(5000 + seed);
@@ -70,7 +70,8 @@ pub(super) fn random_map(seed: u64) -> (LandmarkPlace, Vec<Obstacle>, PanTiltCam
 
 type Scene = fn(u64) -> (LandmarkPlace, Vec<Obstacle>, PanTiltCamera);
 
-/// Over 200 points of each map: points compared, points that differ, points from which it is visible.
+/// Over 200 points of each map: points compared, points that differ, points from which it is
+/// visible.
 fn compared_with_brute_force(scene: Scene, seeds: u64) -> (u32, u32, u32) {
     let p = VisibilityParams::default();
     let (mut compared, mut differ, mut visible) = (0, 0, 0);
@@ -95,7 +96,8 @@ fn compared_with_brute_force(scene: Scene, seeds: u64) -> (u32, u32, u32) {
 
 #[test]
 fn polygons_agree_with_brute_force() {
-    // Oracle: every condition at every point separately. The whole comparison is `waymark-lab evaluate visibility`.
+    // Oracle: every condition at every point separately. The whole comparison is
+    // `waymark-lab evaluate visibility`.
     let (compared, differ, visible) = compared_with_brute_force(random_map, 40);
     assert!(visible > 500, "{visible} of {compared}");
     assert!(differ <= 1, "{differ} of {compared}");

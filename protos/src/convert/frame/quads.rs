@@ -41,8 +41,8 @@ pub struct CheckedPatch {
     pub image: EncodedImage,
 }
 
-/// Checks the quads of an image of `size` px: their number, their corners, and that each patch lies within the image and holds
-/// its quad. All patches together have at most [`MAX_FRAME_PX`] pixels.
+/// Checks the quads of an image of `size` px: their number, their corners, and that each patch lies
+/// within the image and holds its quad. All patches together have at most [`MAX_FRAME_PX`] pixels.
 pub(super) fn checked(quads: Vec<v1::FoundQuad>, size: (u32, u32)) -> Result<Vec<CheckedQuad>, Rejection> {
     if quads.len() > MAX_FOUND_QUADS {
         let detail = format!("{} quads are more than {MAX_FOUND_QUADS}", quads.len());

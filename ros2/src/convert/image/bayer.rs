@@ -1,7 +1,8 @@
-//! Colours of a sensor with one colour a pixel (Bayer's pattern). In: a level each pixel. Out: red, green and blue, those
-//! that a pixel lacks as the mean of its neighbours'.
+//! Colours of a sensor with one colour a pixel (Bayer's pattern). In: a level each pixel. Out: red,
+//! green and blue, those that a pixel lacks as the mean of its neighbours'.
 
-/// Pixels of red, green and blue, row-major. `red` is the place of red in each square of four; blue is across. Sides are even.
+/// Pixels of red, green and blue, row-major. `red` is the place of red in each square of four; blue
+/// is across. Sides are even.
 pub(super) fn rgb_of_bayer(
     levels: &[u8],
     [width, height]: [usize; 2],

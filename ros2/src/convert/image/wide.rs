@@ -2,8 +2,8 @@
 
 use protos::convert::sample_bits;
 
-/// The highest 8 of the bits that the image's colours use. `colours` is how many samples a pixel has, and how many of them,
-/// from the first, are colours.
+/// The highest 8 of the bits that the image's colours use. `colours` is how many samples a pixel
+/// has, and how many of them, from the first, are colours.
 pub(super) fn narrowed(bytes: &[u8], is_big_endian: bool, (samples, used): (usize, usize)) -> Vec<u8> {
     let (pairs, _) = bytes.as_chunks::<2>();
     let sample =

@@ -1,6 +1,6 @@
-//! Any bytes as a bundle, by changes of a real one from a seed: at any place with the right seal, and in one of its files with
-//! the right digests, so that changes reach what is behind both. `WAYMARK_RUNS` says how many; the other stored bytes are
-//! fuzz targets.
+//! Any bytes as a bundle, by changes of a real one from a seed: at any place with the right seal,
+//! and in one of its files with the right digests, so that changes reach what is behind both.
+//! `WAYMARK_RUNS` says how many; the other stored bytes are fuzz targets.
 
 use super::{super::unpack::unpack, *};
 use crate::store::pictures::hex;

@@ -1,5 +1,5 @@
-//! Who a client with a certificate is. In: the certificate that TLS has verified. Out: the robot, for as long as its
-//! certificate is valid and not revoked.
+//! Who a client with a certificate is. In: the certificate that TLS has verified. Out: the robot,
+//! for as long as its certificate is valid and not revoked.
 
 use crate::identity::certificates::{CertificateError, CertificateRegistry, Certificates, acceptor};
 use arc_swap::ArcSwap;

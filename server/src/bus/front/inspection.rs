@@ -1,11 +1,12 @@
-//! What a connection sends, read by zenoh's own codec before a router gets it. In: batches of the transport. Out: what each of
-//! them costs, or why the connection ends.
+//! What a connection sends, read by zenoh's own codec before a router gets it. In: batches of the
+//! transport. Out: what each of them costs, or why the connection ends.
 //!
-//! A router panics where it forwards a key of more than 65 535 bytes, which a declared prefix and a suffix may make, and where
-//! it compares a key that is no key expression with peers; its access control looks at a message after that. So each declared
-//! key is kept here, and of what a message names, the whole must be a key expression of at most [`MAX_KEY_BYTES`]. Of a message
-//! in fragments, the first one names its key. What follows it is a fragment of the same message for the router only if it goes
-//! on without a gap, so each gap ends the connection.
+//! A router panics where it forwards a key of more than 65 535 bytes, which a declared prefix and a
+//! suffix may make, and where it compares a key that is no key expression with peers; its access
+//! control looks at a message after that. So each declared key is kept here, and of what a message
+//! names, the whole must be a key expression of at most [`MAX_KEY_BYTES`]. Of a message in
+//! fragments, the first one names its key. What follows it is a fragment of the same message for
+//! the router only if it goes on without a gap, so each gap ends the connection.
 
 use super::lasting::{InterestKeys, MAX_INTEREST_BYTES};
 use std::{
@@ -26,12 +27,13 @@ use zenoh_protocol::{
 
 /// Longest key, in bytes: names of ROS 2 with their types have some hundreds.
 pub(crate) const MAX_KEY_BYTES: usize = 4096;
-/// Most declared keys, subscriptions, queryables, tokens and lasting interests of one connection together. A router of ROS 2
-/// on a robot has some hundreds.
+/// Most declared keys, subscriptions, queryables, tokens and lasting interests of one connection
+/// together. A router of ROS 2 on a robot has some hundreds.
 pub(crate) const MAX_DECLARED: usize = 4096;
 /// Most bytes of the keys of all these.
 pub(crate) const MAX_DECLARED_BYTES: usize = 1 << 20;
-/// Most bytes of the keys of a router that are kept. What rests on a further one ends the connection.
+/// Most bytes of the keys of a router that are kept. What rests on a further one ends the
+/// connection.
 pub(crate) const MAX_ROUTER_KEY_BYTES: usize = 4 << 20;
 /// Largest sequence number that a router agrees to.
 const MAX_SN: u64 = u32::MAX as u64;
@@ -93,8 +95,8 @@ struct Agreed {
     is_router: bool,
 }
 
-/// What is known of a connection. At most [`MAX_DECLARED`] entries of the robot, [`MAX_ROUTER_KEY_BYTES`] of keys of the router,
-/// and one message in fragments of each priority.
+/// What is known of a connection. At most [`MAX_DECLARED`] entries of the robot,
+/// [`MAX_ROUTER_KEY_BYTES`] of keys of the router, and one message in fragments of each priority.
 #[derive(Debug, Default)]
 pub(super) struct Inspection {
     agreed: Option<Agreed>,
@@ -118,7 +120,8 @@ impl Inspection {
         Self { interests, ..Self::default() }
     }
 
-    /// Reads a batch of the router for the keys that it declares, on which those of the robot may rest.
+    /// Reads a batch of the router for the keys that it declares, on which those of the robot may
+    /// rest.
     pub(super) fn of_router(&mut self, mut batch: &[u8]) {
         while let Some(first) = batch.first()
             && imsg::mid(*first) == zenoh_protocol::transport::id::FRAME
@@ -288,7 +291,8 @@ impl Inspection {
         }
     }
 
-    /// A key that is declared twice stays what it was for a router, and no client of zenoh does that.
+    /// A key that is declared twice stays what it was for a router, and no client of zenoh does
+    /// that.
     fn key_begins(&mut self, id: u16, key: &WireExpr<'_>) -> Result<(), Violation> {
         let Some(whole) = self.whole(key)? else { return Ok(()) };
         match self.keys.entry(id) {
@@ -302,8 +306,8 @@ impl Inspection {
         self.is_within_bounds()
     }
 
-    /// A router keeps for ever what was declared before with the same number, if that had another key. No client of zenoh uses a
-    /// number again before its end.
+    /// A router keeps for ever what was declared before with the same number, if that had another
+    /// key. No client of zenoh uses a number again before its end.
     fn begins(&mut self, kind: Kind, id: u32, key: String) -> Result<(), Violation> {
         let of_router = self.of_router_without_number(id);
         let keys = self.declared.entry((kind, id)).or_default();
@@ -352,8 +356,9 @@ impl Inspection {
         self.whole(key).map(Option::unwrap_or_default)
     }
 
-    /// The whole of a key, with its prefix; `None` if that has ended, which the end may have overtaken. The prefix of one that
-    /// is declared is always of the other end: zenoh writes no mapping there.
+    /// The whole of a key, with its prefix; `None` if that has ended, which the end may have
+    /// overtaken. The prefix of one that is declared is always of the other end: zenoh writes no
+    /// mapping there.
     fn whole(&self, key: &WireExpr<'_>) -> Result<Option<String>, Violation> {
         let prefix = match key.mapping {
             _ if key.scope == 0 => "",

@@ -1,8 +1,10 @@
-//! What a router keeps for ever of what connects to it: the keys of interests. In: each such key. Out: whether it may pass.
+//! What a router keeps for ever of what connects to it: the keys of interests. In: each such key.
+//! Out: whether it may pass.
 //!
-//! A router of zenoh 1.10.2 makes an entry for each chunk of the key of an interest, and drops none of them when the interest or
-//! its session ends. Access control does not look at interests in subscribers and queryables. So whoever connects may name a
-//! bounded number of different keys as long as the router lives; the same keys pass again.
+//! A router of zenoh 1.10.2 makes an entry for each chunk of the key of an interest, and drops none
+//! of them when the interest or its session ends. Access control does not look at interests in
+//! subscribers and queryables. So whoever connects may name a bounded number of different keys as
+//! long as the router lives; the same keys pass again.
 
 use protos::Name;
 use std::{
@@ -12,8 +14,8 @@ use std::{
     sync::{Arc, Mutex, PoisonError},
 };
 
-/// Most bytes that the router keeps for one robot, or for one address that connects without a certificate: about 500 keys of
-/// eight chunks.
+/// Most bytes that the router keeps for one robot, or for one address that connects without a
+/// certificate: about 500 keys of eight chunks.
 pub(crate) const MAX_INTEREST_BYTES: usize = 2 << 20;
 /// Bytes of a router's entry for one chunk of a key, beside its text.
 const CHUNK_BYTES: usize = 512;

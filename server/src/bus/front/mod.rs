@@ -1,10 +1,12 @@
-//! Where robots connect. In: TCP connections, with TLS where it is on. Out: each is relayed to a router of this process, which
-//! no other program reaches: plain ones to the server's own, those with a certificate to the gate, under the robot's name.
+//! Where robots connect. In: TCP connections, with TLS where it is on. Out: each is relayed to a
+//! router of this process, which no other program reaches: plain ones to the server's own, those
+//! with a certificate to the gate, under the robot's name.
 //!
-//! zenoh's own listener of TLS reads and writes one stream from two threads at once (eclipse-zenoh/zenoh#2557); this one does
-//! not. Handshakes have a deadline and places of their own, a robot has [`LINKS_OF_ROBOT`] connections, and what a connection
-//! sends is read before a router gets it ([`inspection`]), at a bounded pace ([`pace`]). What a router would keep for ever is bounded
-//! ([`lasting`]).
+//! zenoh's own listener of TLS reads and writes one stream from two threads at once
+//! (eclipse-zenoh/zenoh#2557); this one does not. Handshakes have a deadline and places of their
+//! own, a robot has [`LINKS_OF_ROBOT`] connections, and what a connection sends is read before a
+//! router gets it ([`inspection`]), at a bounded pace ([`pace`]). What a router would keep for ever
+//! is bounded ([`lasting`]).
 
 mod admission;
 mod inspection;
@@ -136,8 +138,8 @@ impl Front {
     }
 }
 
-/// Closes an encrypted connection, and reads what was on the way: the client can tell this end from a certificate that is not
-/// believed.
+/// Closes an encrypted connection, and reads what was on the way: the client can tell this end from
+/// a certificate that is not believed.
 async fn end_in_order(mut stream: impl AsyncRead + AsyncWrite + Unpin) {
     let ended = async {
         stream.shutdown().await?;

@@ -1,5 +1,5 @@
-//! How fast a connection may send. In: what each batch costs. Out: a wait, after which the rate holds; the robot's own queue
-//! fills meanwhile, and nothing is lost here.
+//! How fast a connection may send. In: what each batch costs. Out: a wait, after which the rate
+//! holds; the robot's own queue fills meanwhile, and nothing is lost here.
 
 use super::inspection::Cost;
 use std::time::Duration;

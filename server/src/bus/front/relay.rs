@@ -1,5 +1,5 @@
-//! One connection between a robot and a router: batches of zenoh's transport go both ways, and those of the robot are read
-//! first. In: both ends. Out: why it ended.
+//! One connection between a robot and a router: batches of zenoh's transport go both ways, and
+//! those of the robot are read first. In: both ends. Out: why it ended.
 
 use super::{
     inspection::{Cost, Inspection, Violation},

@@ -234,8 +234,8 @@ fn no_bytes_panic() {
     assert!(passed > 0 && passed < 20_000, "{passed}");
 }
 
-/// What the front rests on inside zenoh: the name of the protocol of QUIC, its one stream and framing, access control by the
-/// name in the certificate.
+/// What the front rests on inside zenoh: the name of the protocol of QUIC, its one stream and
+/// framing, access control by the name in the certificate.
 #[tokio::test(flavor = "multi_thread")]
 async fn a_gate_of_zenoh_takes_a_stream_of_quic_for_the_robot_that_its_certificate_names() {
     let link = Arc::new(LinkCertificates::new(crate::store::now_ms()).unwrap());

@@ -1,10 +1,13 @@
-//! The way from the front to the gate, inside the machine: QUIC on loopback, whose both ends are sound under load, with a
-//! certificate of the robot's name that is made for each connection and known to the gate alone.
+//! The way from the front to the gate, inside the machine: QUIC on loopback, whose both ends are
+//! sound under load, with a certificate of the robot's name that is made for each connection and
+//! known to the gate alone.
 //!
-//! Both ends have one socket for all robots, and what finds it full is lost. A window that shrinks by such losses would starve
-//! a robot while the processors are busy: in this direction it is small and fixed, in the other the socket is large.
+//! Both ends have one socket for all robots, and what finds it full is lost. A window that shrinks
+//! by such losses would starve a robot while the processors are busy: in this direction it is small
+//! and fixed, in the other the socket is large.
 //!
-//! Of zenoh's QUIC links this uses that the protocol `zenoh` has one stream, which the client opens, framed as TLS is.
+//! Of zenoh's QUIC links this uses that the protocol `zenoh` has one stream, which the client
+//! opens, framed as TLS is.
 
 use super::{lasting::Lasting, relay::ToRouter};
 use crate::identity::certificates::LinkCertificates;
@@ -31,7 +34,8 @@ const PROTOCOL: &[u8] = b"zenoh";
 const LONGEST: Duration = Duration::from_secs(10);
 /// What the gate may have sent and the robot not taken, in bytes: more would only be older.
 const WINDOW: u32 = 256 << 10;
-/// What is on the way to the gate at most, in bytes of one robot: less than a socket of Linux takes by default.
+/// What is on the way to the gate at most, in bytes of one robot: less than a socket of Linux takes
+/// by default.
 const ON_THE_WAY: u64 = 64 << 10;
 /// Room for what is on the way from the gate, in bytes of all robots, if the system gives it.
 const RECEIVED: usize = 4 << 20;

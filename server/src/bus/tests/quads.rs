@@ -41,7 +41,8 @@ async fn quads_found_on_board_are_answered_as_the_frame_they_are_of() {
         named += names.len();
         if let (Some(a), Some(b)) = (pose, pose_of_quads) {
             let off_m = (a.x_m - b.x_m).hypot(a.y_m - b.y_m);
-            // The border of a frame is estimated again from the edges beside it; that of quads is as found.
+            // The border of a frame is estimated again from the edges beside it; that of quads is
+            // as found.
             assert!(off_m < 0.02, "{off_m} m between frame and quads");
             let fused = tokio::time::timeout(WAIT, poses.recv()).await.unwrap().unwrap();
             assert!(fused.corrections > 0, "quads correct the fused pose");

@@ -1,4 +1,5 @@
-//! Every operation of the OpenAPI document, asked for by each role in its own map, in another and in none.
+//! Every operation of the OpenAPI document, asked for by each role in its own map, in another and
+//! in none.
 
 use super::*;
 use crate::{
@@ -17,7 +18,8 @@ use std::{
 };
 use tower::ServiceExt as _;
 
-/// `hall` with `r1`, job 1 and answer 1 are the principal's own; `yard` with `r2`, job 2 and answer 2 are not.
+/// `hall` with `r1`, job 1 and answer 1 are the principal's own; `yard` with `r2`, job 2 and answer
+/// 2 are not.
 const OWN: [&str; 3] = ["hall", "r1", "1"];
 const FOREIGN: [&str; 3] = ["yard", "r2", "2"];
 const MISSING: [&str; 3] = ["nowhere", "r9", "99"];
@@ -168,7 +170,8 @@ async fn every_operation_answers_each_principal_as_the_authorisation_table_says(
                 }
                 let found = outcome(service.ask_as_it_is(request).await, &named).await;
                 let wanted = expected(access, *role, *is_scoped, target);
-                // What does not exist, or what this operation has deleted, looks hidden to those who may see all.
+                // What does not exist, or what this operation has deleted, looks hidden to those
+                // who may see all.
                 let is_gone = target == MISSING || method == "DELETE";
                 let may_miss = is_gone && wanted == Outcome::Admitted && found == Outcome::Hidden;
                 assert!(found == wanted || may_miss, "{named}: {found:?}, not {wanted:?}");
@@ -250,7 +253,8 @@ async fn a_refusal_names_the_role_and_the_next_command() {
 async fn an_operation_without_a_row_is_refused_to_everybody() {
     let service = service().await;
     let admin = token(&service, Role::Admin, None, None).await;
-    // As an operation would be that was added without its row: `/maps` has rows for GET and POST, the other path none.
+    // As an operation would be that was added without its row: `/maps` has rows for GET and POST,
+    // the other path none.
     let (forgotten, called) = ("/api/v1/forgotten", Arc::new(AtomicUsize::new(0)));
     let counted = called.clone();
     let handler = move || {

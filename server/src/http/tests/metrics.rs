@@ -1,4 +1,5 @@
-//! Metrics and readiness by the routes: what is counted, who may ask, and what a part that stands still does to both.
+//! Metrics and readiness by the routes: what is counted, who may ask, and what a part that stands
+//! still does to both.
 
 use super::*;
 use engine::heartbeats::STALLED;

@@ -1,5 +1,6 @@
-//! Numbers that are none, too large, too small or too precise, in every number of every body of the OpenAPI document: each is
-//! taken or refused with its field, nothing panics, and nothing is stored of what is refused.
+//! Numbers that are none, too large, too small or too precise, in every number of every body of the
+//! OpenAPI document: each is taken or refused with its field, nothing panics, and nothing is stored
+//! of what is refused.
 
 use super::{openapi::prepared, *};
 use crate::http::router::parts;
@@ -95,8 +96,9 @@ async fn rows(service: &Service) -> Vec<(String, i64)> {
     all
 }
 
-/// Whether a refusal is about the number at this place: it names a part of its path, or the whole. Of two numbers that do
-/// not fit, either may be the field; views that fit no camera are what `not_determined` says.
+/// Whether a refusal is about the number at this place: it names a part of its path, or the whole.
+/// Of two numbers that do not fit, either may be the field; views that fit no camera are what
+/// `not_determined` says.
 fn names(answer: &Value, at: &[String]) -> bool {
     let said = |name: &str| answer[name].as_str().unwrap_or_default();
     let names: Vec<&String> = at.iter().filter(|part| part.parse::<usize>().is_err()).collect();

@@ -1,11 +1,12 @@
-//! Lists where objects belong: in every object of every body of the OpenAPI document, and in parts of forms. Each is refused
-//! with its place, and nothing is stored.
+//! Lists where objects belong: in every object of every body of the OpenAPI document, and in parts
+//! of forms. Each is refused with its place, and nothing is stored.
 
 use super::{openapi::prepared, *};
 use crate::http::router::parts;
 use serde_json::json;
 
-/// The paths of all objects in an example, as refusals name them, each with the example that has `[]` there.
+/// The paths of all objects in an example, as refusals name them, each with the example that has
+/// `[]` there.
 fn places(example: &Value, at: &str, whole: &dyn Fn(Value) -> Value, found: &mut Vec<(String, Value)>) {
     match example {
         Value::Object(object) => {

@@ -1,4 +1,5 @@
-//! The OpenAPI document: names of schemas are unique, every body has an example, and each example is accepted.
+//! The OpenAPI document: names of schemas are unique, every body has an example, and each example
+//! is accepted.
 
 use super::*;
 use crate::store::{landmark_placement::tests::seen_from, track_acceptance::tests::gathered};
@@ -81,8 +82,8 @@ fn poster(seed: u64) -> Vec<u8> {
     engine::picture::png(poster.width(), poster.height(), poster.data()).unwrap()
 }
 
-/// Map `hall` with walls, the landmark `poster` with a view, and robot `r1`, which has been recorded or has gathered where the
-/// operation asks for it.
+/// Map `hall` with walls, the landmark `poster` with a view, and robot `r1`, which has been
+/// recorded or has gathered where the operation asks for it.
 pub(super) async fn prepared(operation: &str) -> (Service, String) {
     let service = Service::start(Limits::default()).await;
     let walls = json!({ "segments": [{ "a": [0.0, 0.0], "b": [6.0, 0.0] }] }).to_string();
@@ -165,7 +166,8 @@ const KEPT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/openapi.json");
 /// Largest size of the document, in bytes: as it is kept and as it is served.
 const MAX_BYTES: usize = 270_000;
 
-/// JSON with one line for every operation and every part of `components`, so that a change shows what it changes.
+/// JSON with one line for every operation and every part of `components`, so that a change shows
+/// what it changes.
 #[derive(Default)]
 struct Lines {
     depth: usize,

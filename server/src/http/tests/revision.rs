@@ -1,4 +1,5 @@
-//! Changes say which revision they are meant for; what somebody else has changed meanwhile is not overwritten.
+//! Changes say which revision they are meant for; what somebody else has changed meanwhile is not
+//! overwritten.
 
 use super::{
     openapi::{read_long, takes},

@@ -296,7 +296,8 @@ async fn two_landmarks_that_are_one_object_become_one() {
     assert_eq!((status, &back["views"], &back["place"]), (200, &json!(2), &place), "{back}");
 }
 
-/// The picture of a camera on its side is taught upright: its mounting says which corner is the top-left one.
+/// The picture of a camera on its side is taught upright: its mounting says which corner is the
+/// top-left one.
 #[tokio::test]
 async fn a_view_of_a_rolled_camera_is_taught_upright() {
     let service = Service::start(Limits::default()).await;
@@ -318,7 +319,8 @@ async fn a_view_of_a_rolled_camera_is_taught_upright() {
         });
         capture.to_string()
     };
-    // Top-left in the image; a camera that is turned clockwise sees the top of a landmark at the left.
+    // Top-left in the image; a camera that is turned clockwise sees the top of a landmark at the
+    // left.
     for (roll_rad, first) in [(0.0, [99.5, 59.5]), (FRAC_PI_2, [99.5, 189.5]), (PI, [219.5, 189.5])] {
         let name = format!("poster-{}", (10.0 * roll_rad) as u32);
         let (status, view) =

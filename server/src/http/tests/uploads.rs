@@ -1,4 +1,5 @@
-//! Places for large bodies: slow ones of one token hold half of them, and those of others are read at once.
+//! Places for large bodies: slow ones of one token hold half of them, and those of others are read
+//! at once.
 
 use super::{
     authorisation::{token, with_token},

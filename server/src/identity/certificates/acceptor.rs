@@ -1,4 +1,5 @@
-//! TLS of a listener: the server's certificate in use, and where it asks for them, certificates of clients.
+//! TLS of a listener: the server's certificate in use, and where it asks for them, certificates of
+//! clients.
 
 use super::{CertificateError, ServerCertificate};
 use rustls::{
@@ -22,8 +23,8 @@ impl ResolvesServerCert for Current {
     }
 }
 
-/// TLS 1.2 or 1.3. `authorities`: PEM of those whose certificates a client must have. `protocols`: what may be spoken inside;
-/// whatever the client likes, if there is none.
+/// TLS 1.2 or 1.3. `authorities`: PEM of those whose certificates a client must have. `protocols`:
+/// what may be spoken inside; whatever the client likes, if there is none.
 pub(crate) fn acceptor(
     certificate: watch::Receiver<Arc<ServerCertificate>>,
     authorities: Option<&str>,

@@ -1,5 +1,5 @@
-//! The built-in authority: a key and a self-signed certificate in the folder `tls` of the data directory, made once. It
-//! signs the server's certificate and those of robots.
+//! The built-in authority: a key and a self-signed certificate in the folder `tls` of the data
+//! directory, made once. It signs the server's certificate and those of robots.
 
 use super::{CertificateError, PemKey};
 use crate::identity::private_file;
@@ -46,12 +46,13 @@ pub(crate) struct SignedCertificate {
     pub(crate) expires_ms: i64,
 }
 
-/// Longest common name of a certificate, in characters (RFC 5280, `ub-common-name`): OpenSSL refuses longer ones.
+/// Longest common name of a certificate, in characters (RFC 5280, `ub-common-name`): OpenSSL
+/// refuses longer ones.
 const MAX_COMMON_NAME: usize = 64;
 
-/// The name in a robot's certificate: `{robot}.{serial}`, the robot's name cut where the two are too long for a common name.
-/// Robots' names have no dot, and each certificate has a serial and so a name of its own: one can be revoked and the others
-/// stay, and none is another robot's.
+/// The name in a robot's certificate: `{robot}.{serial}`, the robot's name cut where the two are
+/// too long for a common name. Robots' names have no dot, and each certificate has a serial and so
+/// a name of its own: one can be revoked and the others stay, and none is another robot's.
 pub(crate) fn common_name(robot: &str, serial: &str) -> String {
     let room = MAX_COMMON_NAME.saturating_sub(serial.len() + 1);
     let shown = robot.get(..room).unwrap_or(robot);
@@ -146,8 +147,8 @@ impl Authority {
         Ok((params.signed_by(&pair, &self.issuer)?.pem(), PemKey(pair.serialize_pem())))
     }
 
-    /// Signs a robot's request (PKCS #10, PEM). Of the request only the public key is taken; it must prove that its sender
-    /// has the private one.
+    /// Signs a robot's request (PKCS #10, PEM). Of the request only the public key is taken; it
+    /// must prove that its sender has the private one.
     pub(crate) fn issue_robot(
         &self,
         robot: &Name,

@@ -1,5 +1,5 @@
-//! Certificates of the link between the front and the gate of one server process: made at the start and for each connection,
-//! only in memory.
+//! Certificates of the link between the front and the gate of one server process: made at the start
+//! and for each connection, only in memory.
 
 use super::{Authority, CertificateError, PemKey, authority::AUTHORITY_VALID, server::certified};
 use rustls::{

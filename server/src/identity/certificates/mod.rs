@@ -1,5 +1,5 @@
-//! Certificates. In: the settings of encryption and the folder `tls` of the data directory. Out: the server's certificate in
-//! use, for HTTP and zenoh, and certificates of robots.
+//! Certificates. In: the settings of encryption and the folder `tls` of the data directory. Out:
+//! the server's certificate in use, for HTTP and zenoh, and certificates of robots.
 
 mod acceptor;
 mod authority;
@@ -115,7 +115,8 @@ impl Certificates {
         &self.authority
     }
 
-    /// The server's certificate in use, and each one that replaces it: listeners take it for new connections.
+    /// The server's certificate in use, and each one that replaces it: listeners take it for new
+    /// connections.
     pub(crate) fn current(&self) -> watch::Receiver<Arc<ServerCertificate>> {
         self.current.subscribe()
     }
@@ -157,7 +158,8 @@ impl Certificates {
         Ok(is_other)
     }
 
-    /// Renews the server's certificate in time, and reads the operator's files again, until the server stops.
+    /// Renews the server's certificate in time, and reads the operator's files again, until the
+    /// server stops.
     pub(crate) async fn keep_valid(self: Arc<Self>, mut stopping: watch::Receiver<bool>) {
         loop {
             tokio::select! {

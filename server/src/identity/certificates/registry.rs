@@ -1,5 +1,5 @@
-//! Robots' certificates in memory. In: the rows after each commit. Out: which of them are valid, and robots that have lost
-//! theirs.
+//! Robots' certificates in memory. In: the rows after each commit. Out: which of them are valid,
+//! and robots that have lost theirs.
 
 use super::common_name;
 use arc_swap::ArcSwap;
@@ -50,7 +50,8 @@ impl CertificateRegistry {
         self.applied.send_replace(change);
     }
 
-    /// Waits until access control follows what was published, for ten seconds at most. Whether it does.
+    /// Waits until access control follows what was published, for ten seconds at most. Whether it
+    /// does.
     pub(crate) async fn applied(&self) -> bool {
         let (wanted, mut applied) = (*self.changes.borrow(), self.applied.subscribe());
         matches!(tokio::time::timeout(APPLY, applied.wait_for(|count| *count >= wanted)).await, Ok(Ok(_)))
@@ -70,8 +71,8 @@ impl CertificateRegistry {
         all.values().flatten().find(of).map(|certificate| certificate.robot.clone())
     }
 
-    /// Whether messages of a robot are taken: not where it had certificates and none is valid any more. One that never had
-    /// one comes by a listener that asks for none.
+    /// Whether messages of a robot are taken: not where it had certificates and none is valid any
+    /// more. One that never had one comes by a listener that asks for none.
     pub(crate) fn admits(&self, robot: &Name, now_ms: i64) -> bool {
         let all = self.by_robot.load();
         all.get(robot.as_str()).is_none_or(|all| all.iter().any(|c| is_valid(c, now_ms)))

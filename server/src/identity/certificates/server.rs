@@ -1,4 +1,5 @@
-//! The server's certificate in use. In: names, or files of the operator's own. Out: chain and key, renewed in time.
+//! The server's certificate in use. In: names, or files of the operator's own. Out: chain and key,
+//! renewed in time.
 
 use super::{Authority, CertificateError, PemKey};
 use crate::config::OwnCertificate;

@@ -231,7 +231,8 @@ async fn look_alikes_at_different_places_are_a_class_that_a_pose_tells_apart() {
     assert!(map.look_alikes.classes.values().all(|members| members.len() == 3));
 }
 
-/// Landmark, digest, thresholds and all else of every stored model of the map, and whether its bytes have that digest.
+/// Landmark, digest, thresholds and all else of every stored model of the map, and whether its
+/// bytes have that digest.
 async fn stored_models(school: &School) -> Vec<String> {
     let sql = "SELECT quote(m.landmark_id) || quote(m.sha256) || quote(m.params_hash) || m.active || m.reasons || m.facts || \
                m.views || m.generated_views || m.learnt_ms || quote(m.looks_like) || quote(c.bytes) FROM models m \
@@ -252,7 +253,8 @@ async fn a_wrong_view_is_undone_with_the_thresholds_of_all_others() {
     let (models, matched) = (stored_models(&school).await, school.matched());
     assert_eq!(matched.len(), 3);
 
-    // A view of another poster, which looks like that of b: a is learnt, and b and c get its icons as negatives.
+    // A view of another poster, which looks like that of b: a is learnt, and b and c get its icons
+    // as negatives.
     school.teach("a", 2, true).await;
     school.learn(&["a"]).await;
     let spoilt = stored_models(&school).await;

@@ -61,8 +61,8 @@ fn png(image: &GrayImage) -> Vec<u8> {
     picture::png(image.width(), image.height(), image.data()).unwrap()
 }
 
-/// Map `a` with landmarks `whole` and `damaged`, each with one view and a model without points. The picture of `damaged` cannot
-/// be decoded.
+/// Map `a` with landmarks `whole` and `damaged`, each with one view and a model without points. The
+/// picture of `damaged` cannot be decoded.
 async fn taught(config: &Config) -> (Catalogue, CatalogueTasks) {
     let (store, task) = Catalogue::open(config).await.unwrap();
     store.write(|tx| Box::pin(maps::create(tx, "a", DistanceKind::Both, 2))).await.unwrap();

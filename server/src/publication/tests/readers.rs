@@ -1,4 +1,5 @@
-//! Readers beside the writer: each answer is that of one version, and no version is seen before it is on the disk.
+//! Readers beside the writer: each answer is that of one version, and no version is seen before it
+//! is on the disk.
 
 use super::{super::*, config};
 use crate::store::{landmarks, maps, walls};
@@ -69,7 +70,8 @@ struct Read {
     answers: Mutex<BTreeMap<u64, Vec<f64>>>,
 }
 
-/// Reads until it is told to stop. A version that is new to the reader is looked for on the disk at once.
+/// Reads until it is told to stop. A version that is new to the reader is looked for on the disk at
+/// once.
 fn read(snapshots: &Snapshots, file: &Path, landmark: LandmarkId, to: &Read) {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
     let (mut last, mut own) = (0, BTreeMap::<u64, Vec<f64>>::new());

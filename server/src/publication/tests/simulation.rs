@@ -1,10 +1,12 @@
-//! The store under clients that repeat, hang up and edit the same things, with a server that is stopped in between: the real
-//! store and publication, steps that follow from a seed, and a model that says after each step what must be stored.
+//! The store under clients that repeat, hang up and edit the same things, with a server that is
+//! stopped in between: the real store and publication, steps that follow from a seed, and a model
+//! that says after each step what must be stored.
 //!
-//! `WAYMARK_SEED=n` runs one seed, `WAYMARK_SEEDS=n` so many. When a caller hangs up between two polls, or a writer is ended,
-//! the moment depends on SQLite's thread: a seed repeats the steps, not these moments. So some stops come from a disk that
-//! fails at a write of the log, which a seed repeats: they fall into any of the commits that a creation has. Frames are
-//! simulated in `engine/tests/simulation`.
+//! `WAYMARK_SEED=n` runs one seed, `WAYMARK_SEEDS=n` so many. When a caller hangs up between two
+//! polls, or a writer is ended, the moment depends on SQLite's thread: a seed repeats the steps,
+//! not these moments. So some stops come from a disk that fails at a write of the log, which a seed
+//! repeats: they fall into any of the commits that a creation has. Frames are simulated in
+//! `engine/tests/simulation`.
 
 use super::{super::*, config};
 use crate::{
@@ -52,7 +54,8 @@ struct World {
     created: BTreeSet<String>,
     /// Creations whose outcome the client does not know.
     unknown: BTreeSet<String>,
-    /// The number that the walls say, after the last acknowledged edit, and those of edits without an answer.
+    /// The number that the walls say, after the last acknowledged edit, and those of edits without
+    /// an answer.
     walls: i64,
     maybe: BTreeSet<i64>,
     next: i64,
@@ -157,7 +160,8 @@ impl World {
         }
     }
 
-    /// Creations until the disk has failed, at one of the next writes of the log; the one that met it.
+    /// Creations until the disk has failed, at one of the next writes of the log; the one that met
+    /// it.
     async fn fail_at_a_write_of_the_log(&mut self) -> Option<usize> {
         let number = 1 + self.below(LOG_WRITES) as u64;
         let error = IoError { call: Call::Write, file: OfFile::Log, number, is_lasting: true };
@@ -246,7 +250,8 @@ impl World {
         (self.store, self.tasks) = (store, Some(tasks));
     }
 
-    /// What was acknowledged is in the snapshot in use and on the disk; nothing is there that was not asked for.
+    /// What was acknowledged is in the snapshot in use and on the disk; nothing is there that was
+    /// not asked for.
     fn check(&mut self) {
         let map = self.store.snapshots().get("a").unwrap();
         assert!(map.version >= self.version, "version {} after {}", map.version, self.version);

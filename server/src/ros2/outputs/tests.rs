@@ -113,7 +113,8 @@ fn map_to_odom_fits_the_odometry_of_the_same_time() {
     assert_eq!(transform.header.stamp, Time { sec: 2, nanosec: 100_000_000 }, "newest odometry and a second");
     let offset = isometry_of_transform(&transform.transform).unwrap().translation.vector;
     assert!((offset.x - (10.0 - 4.1)).abs() < 1e-9 && (offset.y - 2.0).abs() < 1e-9);
-    // The same stamp again would be refused by tf2; without odometry of the time there is no transform.
+    // The same stamp again would be refused by tf2; without odometry of the time there is no
+    // transform.
     assert_eq!(outputs.of_pose(&fused(1100, 10.1, v1::PoseTrust::Stale), &robot), []);
     let later = super::tests::robot(&[(1200, 4.4)]);
     assert_eq!(outputs.of_pose(&fused(1250, 10.4, v1::PoseTrust::Stale), &later), []);

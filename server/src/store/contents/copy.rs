@@ -1,4 +1,5 @@
-//! A map as a new one, beside the writer: the contents are read first, and written only if they are still those.
+//! A map as a new one, beside the writer: the contents are read first, and written only if they are
+//! still those.
 
 use super::{MapContents, Written, read, write};
 use crate::{
@@ -16,8 +17,8 @@ pub(crate) async fn contents_of(store: &Store, map: &str) -> Result<(MapRow, Map
     read(&mut reading, map).await
 }
 
-/// Copies a map with all that is in it. Robots stay where they are, and the copy begins a history of its own. Errors:
-/// `NotFound`, `Exists`, `Limit`; `Busy` while others keep changing the map.
+/// Copies a map with all that is in it. Robots stay where they are, and the copy begins a history
+/// of its own. Errors: `NotFound`, `Exists`, `Limit`; `Busy` while others keep changing the map.
 pub(crate) async fn copy(
     store: &Store,
     from: &str,

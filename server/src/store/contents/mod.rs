@@ -1,5 +1,6 @@
-//! All that a map consists of, as one value: what is copied, exported, imported, compared and published. Numbers of rows are
-//! those of the map that it was read from; a map that is written of it has new ones, also inside of its models.
+//! All that a map consists of, as one value: what is copied, exported, imported, compared and
+//! published. Numbers of rows are those of the map that it was read from; a map that is written of
+//! it has new ones, also inside of its models.
 //!
 //! Not in it: the map's name, its history, its robots, gatherings, jobs and stored answers.
 

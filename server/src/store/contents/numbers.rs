@@ -1,4 +1,5 @@
-//! Numbers of landmarks inside of what is stored of a model: in its bytes, and in the texts that name look-alikes.
+//! Numbers of landmarks inside of what is stored of a model: in its bytes, and in the texts that
+//! name look-alikes.
 
 use super::ModelContents;
 use crate::failed_gates;
@@ -8,7 +9,8 @@ use vision::model::{LandmarkId, renumbered};
 /// Numbers of landmarks in one map, with those of the same landmarks in another.
 pub(crate) type Numbers = BTreeMap<LandmarkId, LandmarkId>;
 
-/// The same model for the landmark `of` of another map. Bytes that are no model stay what they are: no map uses them.
+/// The same model for the landmark `of` of another map. Bytes that are no model stay what they are:
+/// no map uses them.
 pub(crate) fn in_other_map(model: &ModelContents, of: LandmarkId, numbers: &Numbers) -> ModelContents {
     let mut made = model.clone();
     if let Ok(bytes) = renumbered(&model.bytes, of) {

@@ -37,8 +37,8 @@ statements! {
              + (SELECT coalesce(sum(length(cells)), 0) FROM runs WHERE map_id = ?1)";
 }
 
-/// A map and its contents. The connection is inside of a transaction, so that all is of one state. Errors: `NotFound`;
-/// `Limit` beyond [`MAX_CONTENTS_BYTES`].
+/// A map and its contents. The connection is inside of a transaction, so that all is of one state.
+/// Errors: `NotFound`; `Limit` beyond [`MAX_CONTENTS_BYTES`].
 pub(crate) async fn read(
     conn: &mut SqliteConnection,
     map: &str,

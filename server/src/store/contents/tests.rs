@@ -40,7 +40,8 @@ const TABLES: [(&str, &str); 8] = [
     ("underlays", "map_id = ?1"),
 ];
 
-/// Columns that number rows or count changes, and the name; `sha256` of a model and what names other landmarks hold numbers.
+/// Columns that number rows or count changes, and the name; `sha256` of a model and what names
+/// other landmarks hold numbers.
 const OWN: [&str; 15] = [
     "id",
     "map_id",
@@ -94,7 +95,8 @@ fn place() -> LandmarkGeometry {
     LandmarkGeometry { size: Some(size), place: Some(place), size_from_views: true }
 }
 
-/// Map `a` in map `outer`, with something in every column of every table; landmarks `p1` (number 1) and `p2` (2).
+/// Map `a` in map `outer`, with something in every column of every table; landmarks `p1` (number 1)
+/// and `p2` (2).
 pub(crate) async fn filled(store: &Catalogue) {
     let corners_m = vec![[0.0, 0.0], [1.0 / 3.0, 0.0], [1.0, 3.0]];
     let settings = ModalitySettings {

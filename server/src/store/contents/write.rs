@@ -46,8 +46,8 @@ pub(crate) struct Written {
     pub(crate) landmarks: Numbers,
 }
 
-/// Writes a new map of this name: one transaction, so one commit of its history. Errors: `Exists`; `NotFound` of the map that it
-/// lies in; `Limit` where it is larger than a map may be.
+/// Writes a new map of this name: one transaction, so one commit of its history. Errors: `Exists`;
+/// `NotFound` of the map that it lies in; `Limit` where it is larger than a map may be.
 pub(crate) async fn write(
     tx: &mut Tx,
     name: &str,

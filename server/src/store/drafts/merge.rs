@@ -1,6 +1,6 @@
-//! What a publication would change, and what is in its way: a three-way comparison by row. In: rows when the draft began, rows
-//! of the map now, rows of the draft now. A row that only the draft has changed is taken from it; one that both have changed,
-//! to something else, is a conflict.
+//! What a publication would change, and what is in its way: a three-way comparison by row. In: rows
+//! when the draft began, rows of the map now, rows of the draft now. A row that only the draft has
+//! changed is taken from it; one that both have changed, to something else, is a conflict.
 
 use super::{
     Both,
@@ -92,8 +92,8 @@ fn changed_and_removed(states: &BTreeMap<RowKey, RowState>) -> Vec<RowKey> {
     lost.map(RowKey::Landmark).collect()
 }
 
-/// Whether both sides have learnt something. A model that went with its landmark was not learnt; what is the same on both sides
-/// was not learnt on either alone.
+/// Whether both sides have learnt something. A model that went with its landmark was not learnt;
+/// what is the same on both sides was not learnt on either alone.
 fn were_both_taught(states: &BTreeMap<RowKey, RowState>) -> bool {
     let models =
         || states.iter().filter(|(key, state)| matches!(key, RowKey::Model(_)) && state.map != state.draft);

@@ -1,8 +1,9 @@
 //! Drafts: maps that are made of another one, edited beside it, and published to it as one commit.
 //!
-//! A draft is a map of its own, so every operation on maps works on it; no robot can be put on it. What both were when it
-//! began is kept as digests of rows ([`rows`]). From these, the present map and the present draft [`merge`] finds what a
-//! publication would change and what is in its way; [`publish`] does it.
+//! A draft is a map of its own, so every operation on maps works on it; no robot can be put on it.
+//! What both were when it began is kept as digests of rows ([`rows`]). From these, the present map
+//! and the present draft [`merge`] finds what a publication would change and what is in its way;
+//! [`publish`] does it.
 
 mod difference;
 mod merge;
@@ -126,7 +127,8 @@ async fn base(conn: &mut SqliteConnection, draft: i64) -> Result<Base, StoreErro
     rows.iter().map(one).collect::<Result<_, sqlx::Error>>().map_err(at())
 }
 
-/// Begins a draft. Errors: `NotFound`, `Exists`, `Limit`; `InUse` of a draft; `Busy` while others keep changing the map.
+/// Begins a draft. Errors: `NotFound`, `Exists`, `Limit`; `InUse` of a draft; `Busy` while others
+/// keep changing the map.
 pub(crate) async fn begin(
     store: &Store,
     map: &str,

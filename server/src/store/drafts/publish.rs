@@ -1,5 +1,6 @@
-//! Publishes a draft: what it has changed of its map, by one commit of the map, and the draft is gone. All of it or nothing, in
-//! one transaction. What the draft has not changed is not touched, so it stays byte for byte.
+//! Publishes a draft: what it has changed of its map, by one commit of the map, and the draft is
+//! gone. All of it or nothing, in one transaction. What the draft has not changed is not touched,
+//! so it stays byte for byte.
 
 use super::{
     Both, both,
@@ -44,9 +45,10 @@ statements! {
     COUNT_RUNS = "SELECT count(*) FROM runs WHERE map_id = ?1";
 }
 
-/// Publishes a draft; says whether that changed anything of the map. `is` is the revision of the map that it is meant for.
-/// Errors: `NotFound`, `ChangedMeanwhile`; `Conflicts` where both sides have changed the same; `InUse` while a job works on
-/// either, `Limit`; `Busy` while others keep changing them.
+/// Publishes a draft; says whether that changed anything of the map. `is` is the revision of the
+/// map that it is meant for. Errors: `NotFound`, `ChangedMeanwhile`; `Conflicts` where both sides
+/// have changed the same; `InUse` while a job works on either, `Limit`; `Busy` while others keep
+/// changing them.
 pub(crate) async fn publish(
     store: &Store,
     (map, draft): (&str, &str),
@@ -308,7 +310,8 @@ impl<'a> Publication<'a> {
     }
 }
 
-/// Gives a landmark the name, size and place that it has in the draft. A finding stays with the place that it is about.
+/// Gives a landmark the name, size and place that it has in the draft. A finding stays with the
+/// place that it is about.
 async fn change(tx: &mut Tx, old: &LandmarkContents, new: &LandmarkContents) -> Result<(), StoreError> {
     let id = old.number.0 as i64;
     landmarks::set_geometry(tx, id, &new.geometry).await?;

@@ -1,5 +1,5 @@
-//! What a map consists of, row by row: a key that says what a row is, and the digest of what it says. Keys are in numbers of
-//! the map that a draft is of, so rows of both can be compared.
+//! What a map consists of, row by row: a key that says what a row is, and the digest of what it
+//! says. Keys are in numbers of the map that a draft is of, so rows of both can be compared.
 
 use crate::store::{
     contents::{CropContents, LandmarkContents, MapContents, ModelContents, RunContents},
@@ -81,7 +81,8 @@ fn digest<'a>(parts: impl IntoIterator<Item = &'a [u8]>) -> RowDigest {
     hash.finalize().into()
 }
 
-/// Every column of a value, as its debugging form has it: exact, and complete when a column is added.
+/// Every column of a value, as its debugging form has it: exact, and complete when a column is
+/// added.
 fn digest_of(value: &impl std::fmt::Debug) -> RowDigest {
     digest([format!("{value:?}").as_bytes()])
 }

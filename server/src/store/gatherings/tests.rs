@@ -113,7 +113,8 @@ async fn an_acceptance_is_whole_or_nothing() {
         .await
         .unwrap();
     let landmarks = async || store.snapshots().get("a").unwrap().landmarks.len();
-    // The second is not there; a new landmark is one too many; the job is one too many: nothing of the first stays.
+    // The second is not there; a new landmark is one too many; the job is one too many: nothing of
+    // the first stays.
     assert!(matches!(accepted(&store, id, &[(1, "x"), (7, "y")]).await, Err(StoreError::NotFound { .. })));
     at_bound(&accepted(&store, id, &[(1, "x"), (2, "y")]).await, "landmarks");
     assert_eq!((landmarks().await, track_views(store.reads(), id, 1).await.unwrap().len()), (1, 2));

@@ -1,7 +1,9 @@
-//! Goes back: a map as it was at a kept commit, or without one commit. The change is a commit of its own. Numbers of restored
-//! rows are those that they had, so models, thresholds and views are what they were, byte for byte.
+//! Goes back: a map as it was at a kept commit, or without one commit. The change is a commit of
+//! its own. Numbers of restored rows are those that they had, so models, thresholds and views are
+//! what they were, byte for byte.
 //!
-//! A map keeps its name. What robots found out about a landmark that stays where it is (its health) stays too.
+//! A map keeps its name. What robots found out about a landmark that stays where it is (its health)
+//! stays too.
 
 use super::{
     before, get,
@@ -29,7 +31,8 @@ statements! {
     COUNT_WALLS = "UPDATE maps SET walls_version = walls_version + 1 WHERE id = ?1";
     IS_OPEN = "SELECT count(*) FROM commits WHERE map_id = ?1 AND open = 1";
     OPEN_JOB = "SELECT id FROM jobs WHERE map = ?1 AND state IN ('queued', 'running') LIMIT 1";
-    // What is in the way of taking back commit ?1 of map ?2: a row that it changed was changed since, or others hang on it.
+    // What is in the way of taking back commit ?1 of map ?2: a row that it changed was changed
+    // since, or others hang on it.
     LATER = "SELECT what, by FROM ( \
              SELECT 'landmark ' || coalesce(l.name, p.name, n.name, '') AS what, n.commit_id AS by FROM past_landmarks p \
              JOIN past_landmarks n ON n.id = p.id AND n.commit_id > ?1 LEFT JOIN landmarks l ON l.id = p.id \
@@ -81,8 +84,8 @@ fn restore(KeptTable { name, key, before, restored_as, .. }: &KeptTable, columns
     )
 }
 
-/// What makes the rows of a table what they were. In order: what is removed or set aside comes first, so that nothing restored
-/// meets it.
+/// What makes the rows of a table what they were. In order: what is removed or set aside comes
+/// first, so that nothing restored meets it.
 fn steps(table: &KeptTable, columns: &[KeptColumn]) -> Vec<String> {
     let KeptTable { name, key, before, .. } = table;
     let gone = format!("SELECT {key} FROM {before} WHERE present = 0");
@@ -101,8 +104,8 @@ fn steps(table: &KeptTable, columns: &[KeptColumn]) -> Vec<String> {
     steps
 }
 
-/// Makes a map what it was at a kept commit; says whether that changed anything. Errors: `NotFound`; `InUse` while a job works
-/// on the map, or if the map that it lay in is gone.
+/// Makes a map what it was at a kept commit; says whether that changed anything. Errors:
+/// `NotFound`; `InUse` while a job works on the map, or if the map that it lay in is gone.
 pub(crate) async fn roll_back(tx: &mut Tx, map: &str, to: i64) -> Result<bool, StoreError> {
     let map = maps::of(tx, map).await?;
     get(&mut tx.conn, map.id, to).await?;
@@ -111,8 +114,9 @@ pub(crate) async fn roll_back(tx: &mut Tx, map: &str, to: i64) -> Result<bool, S
     apply(tx, &map, (to, newest)).await
 }
 
-/// Takes one commit back. Errors: `NotFound`; `InUse` as for [`roll_back`], or where the commit has nothing that can be taken
-/// back; `ChangedSince` where later commits have changed the same rows; `Exists` where a name is taken.
+/// Takes one commit back. Errors: `NotFound`; `InUse` as for [`roll_back`], or where the commit has
+/// nothing that can be taken back; `ChangedSince` where later commits have changed the same rows;
+/// `Exists` where a name is taken.
 pub(crate) async fn undo(tx: &mut Tx, map: &str, commit: i64) -> Result<(), StoreError> {
     let map = maps::of(tx, map).await?;
     get(&mut tx.conn, map.id, commit).await?;
@@ -147,7 +151,8 @@ pub(in crate::store) async fn no_job_on(tx: &mut Tx, map: &MapRow) -> Result<(),
     }
 }
 
-/// Restores the rows before the commits after `from`, up to `to`; says whether that changed anything.
+/// Restores the rows before the commits after `from`, up to `to`; says whether that changed
+/// anything.
 async fn apply(tx: &mut Tx, map: &MapRow, (from, to): (i64, i64)) -> Result<bool, StoreError> {
     for table in &PARTS {
         let columns = table.columns(&mut tx.conn).await.map_err(StoreError::during("read the schema"))?;

@@ -1,5 +1,5 @@
-//! Closes the commits of a transaction, before it is committed: who, when, what, why. Then it forgets the oldest commits beyond
-//! the bounds; what only they referred to goes with them.
+//! Closes the commits of a transaction, before it is committed: who, when, what, why. Then it
+//! forgets the oldest commits beyond the bounds; what only they referred to goes with them.
 
 use super::{Author, difference};
 use crate::store::{StoreError, Tx, now_ms, statements::statements};

@@ -1,5 +1,5 @@
-//! What differs between a map at one commit and at a later one. A row that was changed and changed back does not differ.
-//! Distractors are left out: nobody edits them.
+//! What differs between a map at one commit and at a later one. A row that was changed and changed
+//! back does not differ. Distractors are left out: nobody edits them.
 
 use super::before;
 use crate::store::{
@@ -113,7 +113,8 @@ pub(crate) struct LandmarkChange {
     pub(crate) present: [bool; 2],
     /// Name before and after, where they are known from its row.
     pub(crate) names: [Option<String>; 2],
-    /// Size and place before and after; of one whose row has not changed, absent until [`fill_unchanged`].
+    /// Size and place before and after; of one whose row has not changed, absent until
+    /// [`fill_unchanged`].
     pub(crate) geometry: [Option<SizeAndPlace>; 2],
     /// Of a landmark that stays: which of `name`, `size` and `place` differ.
     pub(crate) fields: Vec<&'static str>,
@@ -175,7 +176,8 @@ pub(crate) struct Difference {
     pub(crate) runs: [u64; 2],
 }
 
-/// What differs between the states after the commits `from` and `to` of a map; `from` is less than `to`.
+/// What differs between the states after the commits `from` and `to` of a map; `from` is less than
+/// `to`.
 pub(crate) async fn between(
     conn: &mut SqliteConnection,
     map: i64,

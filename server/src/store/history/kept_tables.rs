@@ -1,5 +1,6 @@
-//! The tables whose rows the history keeps. The schema of what keeps them (`store/derived_schema.rs`) and the way back
-//! ([`super::apply`]) are made of the columns that these tables have.
+//! The tables whose rows the history keeps. The schema of what keeps them
+//! (`store/derived_schema.rs`) and the way back ([`super::apply`]) are made of the columns that
+//! these tables have.
 
 use super::before;
 use crate::store::statements::statements;
@@ -52,7 +53,7 @@ macro_rules! kept {
     };
 }
 
-/// Rows that go with their landmark find its map by what was just stored of it.
+/// Child rows deleted by cascade find their map in the landmark's history row.
 const BY_LANDMARK: &str = "coalesce((SELECT map_id FROM landmarks WHERE id = ROW.landmark_id), (SELECT c.map_id FROM commits c \
                            JOIN past_landmarks p ON p.commit_id = c.id WHERE c.open = 1 AND p.id = ROW.landmark_id))";
 const BY_MAP: &str = "ROW.map_id";
@@ -88,7 +89,8 @@ pub(in crate::store) const LANDMARKS: KeptTable = KeptTable {
     ..kept!("landmarks", "id", BY_MAP)
 };
 
-/// What belongs to a map and to its landmarks. Landmarks come first: the others go and come with them.
+/// What belongs to a map and to its landmarks. Landmarks come first: the others go and come with
+/// them.
 pub(in crate::store) const PARTS: [KeptTable; 6] = [
     LANDMARKS,
     kept!("views", "id", BY_LANDMARK),

@@ -1,8 +1,10 @@
-//! Maps as versions. A commit is what one transaction changed of a map: who, when, what, why, and the rows as they were before.
-//! The schema writes those rows by triggers (`store/derived_schema.rs`); the writer closes the commit in the same transaction
-//! ([`close`]). [`kept_tables`] says which rows, [`apply`] goes back, [`difference`] compares.
+//! Maps as versions. A commit is what one transaction changed of a map: who, when, what, why, and
+//! the rows as they were before. The schema writes those rows by triggers
+//! (`store/derived_schema.rs`); the writer closes the commit in the same transaction ([`close`]).
+//! [`kept_tables`] says which rows, [`apply`] goes back, [`difference`] compares.
 //!
-//! The state at a commit is found backwards: a row is as the oldest commit after it has stored it, or else as it is now.
+//! The state at a commit is found backwards: a row is as the oldest commit after it has stored it,
+//! or else as it is now.
 
 mod apply;
 mod close;

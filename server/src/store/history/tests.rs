@@ -28,7 +28,8 @@ use map::{landmark_health::LandmarkHealth, modality_stats::FusionMode, visibilit
 use std::collections::BTreeMap;
 use vision::{model::LandmarkId, pose::LandmarkSize, recognise::DistanceKind};
 
-/// Columns that count and are not gone back to: of a row's life, not of what it says. A map keeps its name.
+/// Columns that count and are not gone back to: of a row's life, not of what it says. A map keeps
+/// its name.
 const COUNTERS: [&str; 10] = [
     "revision",
     "changed_ms",
@@ -59,7 +60,8 @@ async fn columns(store: &Catalogue, table: &str) -> Vec<String> {
     sqlx::query_scalar(sql).bind(table).fetch_all(store.reads()).await.unwrap()
 }
 
-/// All rows of all maps, as text; REAL numbers to the last bit. Without what only counts, and without names of maps.
+/// All rows of all maps, as text; REAL numbers to the last bit. Without what only counts, and
+/// without names of maps.
 async fn state(store: &Catalogue) -> BTreeMap<&'static str, Vec<String>> {
     let mut all = BTreeMap::new();
     for (table, _) in TABLES {
@@ -266,8 +268,8 @@ async fn every_column_of_a_map_is_in_its_history() {
                      AND f.\"table\" IN ('maps', 'landmarks') ORDER BY 1";
     let mut tables: Vec<String> = sqlx::query_scalar(referring).fetch_all(store.reads()).await.unwrap();
     tables.dedup();
-    // Not of what the map knows: where robots are, what they were answered, what was refused, what waits for a decision, and
-    // what is computed.
+    // Not of what the map knows: where robots are, what they were answered, what was refused, what
+    // waits for a decision, and what is computed.
     let others = [
         "commits",
         "robots",

@@ -90,7 +90,8 @@ async fn a_taught_landmark_is_placed_on_its_wall_and_a_place_by_hand_stays() {
     let place = of(&store).unwrap();
     assert!((place.x_m - 2.0).abs() < 1e-6 && place.y_m.abs() < 1e-6 && (place.z_m - 1.5).abs() < 1e-6);
     assert!((place.size.width_m - 0.6).abs() < 1e-6);
-    // Its covariance follows from the views: across the wall, corners at 1 px give less than the wall itself.
+    // Its covariance follows from the views: across the wall, corners at 1 px give less than the
+    // wall itself.
     let hand = PlaceSigmas::default();
     let row = landmarks::get(store.reads(), "a", "p1").await.unwrap().geometry;
     assert!(row.size_from_views && row.place.unwrap().covariance.is_some());
@@ -158,7 +159,8 @@ fn corners_are_worth_what_is_known_of_them_and_no_more_than_borders_are() {
         // It survives the JSON of the store.
         serde_json::from_str::<StoredCapture>(&serde_json::to_string(&capture).unwrap()).unwrap()
     };
-    // The width is all corners', so its variance goes with theirs: 1 px; 0.2 px and what borders are off by.
+    // The width is all corners', so its variance goes with theirs: 1 px; 0.2 px and what borders
+    // are off by.
     let camera = width(&StoredCapture {
         intrinsics: v1::Intrinsics {
             focal_sigma_px: Some(0.0),

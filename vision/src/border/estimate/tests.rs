@@ -22,7 +22,8 @@ fn pose(yaw: f64) -> Isometry3<f64> {
     Isometry3::from_parts(Vector3::new(0.1, -0.05, 3.0).into(), turn * facing)
 }
 
-/// A picture of the plane: light at (y, z) of the landmark, averaged over each pixel, stored as a camera does.
+/// A picture of the plane: light at (y, z) of the landmark, averaged over each pixel, stored as a
+/// camera does.
 fn picture(pose: &Isometry3<f64>, light: impl Fn(f64, f64) -> f64, random: &mut Random) -> GrayImage {
     let c = camera();
     let (normal, at) = (pose.rotation * Vector3::x(), pose.translation.vector);
@@ -67,7 +68,8 @@ fn error_px(found: &Corners, pose: &Isometry3<f64>) -> f64 {
     (0..4).map(|i| (found.points()[i].coords - truth.fixed_rows::<2>(2 * i)).norm()).fold(0.0, f64::max)
 }
 
-/// A dark picture on a bright wall, with a cast shadow below and to the right whose far edge is 3 cm away.
+/// A dark picture on a bright wall, with a cast shadow below and to the right whose far edge is 3
+/// cm away.
 #[test]
 fn the_border_is_found_beside_a_shadow() {
     let mut random = Random::new(5);
@@ -132,7 +134,8 @@ fn reading(off_m: f64, cost: f64) -> Reading {
 #[test]
 fn two_borders_that_fit_about_as_well_are_unclear() {
     assert_eq!(mean(&[reading(0.0, 3.0), reading(0.02, 3.4)]), Err(BorderError::Unclear));
-    // One that is less likely by a factor of e^3 counts for little, and one at the same place agrees.
+    // One that is less likely by a factor of e^3 counts for little, and one at the same place
+    // agrees.
     let (pose, covariance) = mean(&[reading(0.0, 3.0), reading(0.02, 9.0)]).unwrap();
     assert!(pose[3] < 0.001 && covariance[(3, 3)] > 1e-5, "{pose:?} {covariance}");
     let (pose, covariance) = mean(&[reading(0.0, 3.0), reading(0.001, 3.4)]).unwrap();
@@ -140,7 +143,8 @@ fn two_borders_that_fit_about_as_well_are_unclear() {
     assert!((1.2e-6..1.3e-6).contains(&covariance[(3, 3)]), "{covariance}");
 }
 
-/// Without an edge anywhere the texture alone says where the border is, and the covariance is its own.
+/// Without an edge anywhere the texture alone says where the border is, and the covariance is its
+/// own.
 #[test]
 fn without_edges_the_texture_decides() {
     let mut random = Random::new(8);

@@ -1,4 +1,5 @@
-//! Exact views give the exact camera; accuracy with noise; consistent covariance; agreement with OpenCV; refusals.
+//! Exact views give the exact camera; accuracy with noise; consistent covariance; agreement with
+//! OpenCV; refusals.
 
 use super::*;
 use crate::{
@@ -17,7 +18,8 @@ fn camera() -> Intrinsics {
     Intrinsics::new(900.0, 900.0, 655.0, 470.0, Distortion::None).unwrap()
 }
 
-/// A view of a level camera at constant height (method 16.5: 1.2 to 3.5 m), all corners in the image.
+/// A view of a level camera at constant height (method 16.5: 1.2 to 3.5 m), all corners in the
+/// image.
 fn level_view(camera: &Intrinsics, random: &mut Random) -> (Isometry3<f64>, [Point2<f64>; 4]) {
     loop {
         let (d, psi) = (random.range(1.2, 3.5), random.range(-60.0, 60.0).to_radians());
@@ -172,7 +174,8 @@ fn ten_views_reach_the_required_accuracy() {
 
 #[test]
 fn constraints_lower_the_error_of_the_linear_solution() {
-    // Method 16.5: at 5 views C2 and C3 lower the RMS of the linear solution; unscaled they raise it.
+    // Method 16.5: at 5 views C2 and C3 lower the RMS of the linear solution; unscaled they raise
+    // it.
     let rms_of =
         |p: &CalibrateParams| rms(&errors(5, 0.5, &CalibrateParams { refine: false, ..p.clone() }, 5));
     let [c1, c12, c13, all] = constraint_sets().map(|p| rms_of(&p));
@@ -193,8 +196,9 @@ fn errors_agree_with_the_covariance() {
             sum += e.dot(&c.cholesky().unwrap().solve(&e));
             calibrated += 1.0;
         }
-        // Mean of chi2 with 3 degrees of freedom over 200 draws: 99 % within 2.57 to 3.46. Where roll and height are
-        // known much better than stated (they are exact here), the mean may be lower.
+        // Mean of chi2 with 3 degrees of freedom over 200 draws: 99 % within 2.57 to 3.46. Where
+        // roll and height are known much better than stated (they are exact here), the mean may be
+        // lower.
         let mean = sum / calibrated;
         assert!((2.2..3.6).contains(&mean) && calibrated > 150.0, "{n} {p:?}: {mean} of {calibrated}");
     }
@@ -333,8 +337,9 @@ proptest::proptest! {
 
 #[test]
 fn agrees_with_opencv() {
-    // cv2.calibrateCamera of OpenCV 5.0.0 on these corners (as f32), aspect ratio 1 and distortion held at 0, 500
-    // iterations: fx 892.09989, cx 655.31211, cy 472.91977, rms 0.18386 per coordinate.
+    // cv2.calibrateCamera of OpenCV 5.0.0 on these corners (as f32), aspect ratio 1 and distortion
+    // held at 0, 500 iterations: fx 892.09989, cx 655.31211, cy 472.91977, rms 0.18386 per
+    // coordinate.
     let (views, _) = scene(10, 21, 0.5);
     let found = calibrate(&views, IMAGE, &CalibrateParams::default()).unwrap();
     let c = found.camera;

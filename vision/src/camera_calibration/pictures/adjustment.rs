@@ -1,5 +1,6 @@
-//! Least squares over the camera and all poses: windows by where other pictures show a pixel of the reference picture,
-//! lines by their directions. A window needs no place of its own: its pixel's ray meets the plane of the reference pose.
+//! Least squares over the camera and all poses: windows by where other pictures show a pixel of the
+//! reference picture, lines by their directions. A window needs no place of its own: its pixel's
+//! ray meets the plane of the reference pose.
 
 use crate::{
     camera_calibration::camera_model::{
@@ -17,7 +18,8 @@ const LEAST_GAIN: f64 = 1e-8;
 const MAX_DAMPING: f64 = 1e10;
 /// Steps of the inverse of the lens.
 const LENS_STEPS: usize = 12;
-/// Steps of numerical derivatives: of focal length and centre by the focal length, and of all others.
+/// Steps of numerical derivatives: of focal length and centre by the focal length, and of all
+/// others.
 const PIXEL_STEP: f64 = 1e-5;
 const STEP: f64 = 1e-6;
 
@@ -26,7 +28,8 @@ const STEP: f64 = 1e-6;
 pub(crate) enum Evidence {
     /// A pixel of the reference picture is at `px` in another; `weight^T weight = covariance^-1`.
     Window { view: usize, reference_px: Point2<f64>, px: Point2<f64>, weight: Matrix2<f64> },
-    /// A line through two pixels, each known to `sigma_px` across it, is parallel to the plane's up axis or its width.
+    /// A line through two pixels, each known to `sigma_px` across it, is parallel to the plane's up
+    /// axis or its width.
     Line { view: usize, ends_px: [Point2<f64>; 2], sigma_px: f64, is_upright: bool },
     /// The principal point is at `px`, to `sigma_px`.
     Centre { px: Point2<f64>, sigma_px: f64 },
@@ -109,7 +112,8 @@ fn ray(px: &Point2<f64>, c: &[f64; CAMERA]) -> Vector3<f64> {
 }
 
 impl Adjustment {
-    /// Squared residual of an observation in variances; infinite where it is not in front of the camera.
+    /// Squared residual of an observation in variances; infinite where it is not in front of the
+    /// camera.
     pub(crate) fn chi2(&self, what: &Evidence, state: &State) -> f64 {
         let own = what.view().unwrap_or(self.reference);
         let r = what.residual(&state.camera, &state.poses[self.reference], &state.poses[own]);

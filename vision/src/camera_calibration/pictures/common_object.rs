@@ -1,8 +1,8 @@
-//! Pictures with their candidate borders in, the object that they all show out: its border in a reference picture, and
-//! homographies of its texture from there to the others.
+//! Pictures with their candidate borders in, the object that they all show out: its border in a
+//! reference picture, and homographies of its texture from there to the others.
 //!
-//! A border only says where to look: it may be the object's, a frame's or a shadow's. The homographies come from
-//! matched points.
+//! A border only says where to look: it may be the object's, a frame's or a shadow's. The
+//! homographies come from matched points.
 
 use crate::{
     camera_calibration::pictures::search_windows::search_windows,
@@ -42,8 +42,8 @@ pub(crate) struct Picture<'a> {
 }
 
 impl<'a> Picture<'a> {
-    /// Whole quads of the detector and the borders nested in them, the largest first. Quads that it hardly believes are
-    /// among them: the texture decides.
+    /// Whole quads of the detector and the borders nested in them, the largest first. Quads that it
+    /// hardly believes are among them: the texture decides.
     pub(crate) fn detected(image: &'a GrayImage) -> Self {
         let mut p = DetectParams::default();
         (p.quads.min_probability, p.quads.three_sided) = (MIN_PROBABILITY, false);
@@ -63,7 +63,8 @@ pub(crate) struct CommonObject {
     pub(crate) reference: usize,
     /// A border around the object in the reference picture, px.
     pub(crate) border_px: Corners,
-    /// For each picture: maps pixels of the reference picture to its own; `None` where the object was not found.
+    /// For each picture: maps pixels of the reference picture to its own; `None` where the object
+    /// was not found.
     pub(crate) picture_from_reference: Vec<Option<Homography>>,
 }
 
@@ -72,7 +73,8 @@ struct Candidate {
     seen: SeenPatch,
 }
 
-/// The object that most pictures show; `aspect` is about its width over its height. `None` where no two pictures have one in common.
+/// The object that most pictures show; `aspect` is about its width over its height. `None` where no
+/// two pictures have one in common.
 pub(crate) fn common_object(pictures: &[Picture<'_>], aspect: f64) -> Option<CommonObject> {
     let candidates: Vec<Vec<Candidate>> = pictures.iter().map(candidates).collect();
     let mut order: Vec<(usize, usize)> =
@@ -116,7 +118,8 @@ fn by_windows(
     best_match(own, &windows).map(|(.., map)| map)
 }
 
-/// The object in border `k` of picture `reference`, searched in the others: directly, then by way of those found.
+/// The object in border `k` of picture `reference`, searched in the others: directly, then by way
+/// of those found.
 fn around(candidates: &[Vec<Candidate>], reference: usize, k: usize) -> (CommonObject, usize) {
     let own = &candidates[reference][k];
     let mut maps: Vec<Option<Homography>> = vec![None; candidates.len()];
@@ -145,7 +148,8 @@ fn around(candidates: &[Vec<Candidate>], reference: usize, k: usize) -> (CommonO
     (CommonObject { reference, border_px: own.corners_px, picture_from_reference: maps }, matched)
 }
 
-/// The border of a picture in which most points agree: their number, the border's index, and the homography.
+/// The border of a picture in which most points agree: their number, the border's index, and the
+/// homography.
 fn best_match(from: &Candidate, among: &[Candidate]) -> Option<(usize, usize, Homography)> {
     let mut best: Option<(usize, usize, Homography)> = None;
     for turned in 0..4 {
@@ -163,8 +167,8 @@ fn best_match(from: &Candidate, among: &[Candidate]) -> Option<(usize, usize, Ho
     best
 }
 
-/// Matches of the points of `from` with those of `to`, turned by `turned` quarters: how many agree, and their homography
-/// in pixels.
+/// Matches of the points of `from` with those of `to`, turned by `turned` quarters: how many agree,
+/// and their homography in pixels.
 fn matched(from: &Candidate, to: &Candidate, turned: usize) -> Option<(usize, Homography)> {
     let points: Vec<Point> = to.seen.points.iter().map(|p| p.rotated(turned)).collect();
     let taught = &from.seen.points;

@@ -1,5 +1,5 @@
-//! A picture without the noise of single pixels: median of nine, then a binomial filter of five (standard deviation 1 px).
-//! Such noise says nothing of the place of an edge or a window.
+//! A picture without the noise of single pixels: median of nine, then a binomial filter of five
+//! (standard deviation 1 px). Such noise says nothing of the place of an edge or a window.
 
 use crate::frame::GrayImage;
 

@@ -1,8 +1,10 @@
-//! A camera from pictures of one flat, textured object with straight sides (method 16.6). In: the pictures, and the size
-//! that the object is said to have. Out: the camera with its covariance, or why there is none.
+//! A camera from pictures of one flat, textured object with straight sides (method 16.6). In: the
+//! pictures, and the size that the object is said to have. Out: the camera with its covariance, or
+//! why there is none.
 //!
-//! The texture gives the maps between the pictures, the sides give two directions at right angles. Neither the place of
-//! a side nor the object's size matters for the focal length: a shadow, a mat and a frame are parallel to the object.
+//! The texture gives the maps between the pictures, the sides give two directions at right angles.
+//! Neither the place of a side nor the object's size matters for the focal length: a shadow, a mat
+//! and a frame are parallel to the object.
 
 use crate::{
     camera_calibration::{
@@ -28,7 +30,8 @@ use nalgebra::{Matrix2, Point2, SMatrix};
 
 /// Most pictures.
 pub const MAX_PICTURES: usize = 32;
-/// Larger pictures are reduced by a whole factor: their points are no better in pixels of the object.
+/// Larger pictures are reduced by a whole factor: their points are no better in pixels of the
+/// object.
 const MAX_WORKING_SIDE_PX: usize = 1600;
 /// Fewest lines that agree along either direction, and fewest pictures that they are of.
 const MIN_LINES: usize = 4;
@@ -51,8 +54,8 @@ pub struct PictureCalibration {
     pub borders_px: Vec<Corners>,
 }
 
-/// The camera that took `images` of one object of about `size`; all have the same size. The camera's
-/// height is not used: the object's scale is only about known.
+/// The camera that took `images` of one object of about `size`; all have the same size. The
+/// camera's height is not used: the object's scale is only about known.
 pub fn calibrate_pictures(
     images: &[GrayImage],
     size: LandmarkSize,

@@ -1,5 +1,5 @@
-//! Windows and lines in, the camera that most of them fit out: robust fits from several focal lengths, each narrower than
-//! the one before, then one of all observations that agree.
+//! Windows and lines in, the camera that most of them fit out: robust fits from several focal
+//! lengths, each narrower than the one before, then one of all observations that agree.
 
 use crate::{
     camera_calibration::{
@@ -21,18 +21,20 @@ const SCALES: [[f64; 2]; 4] = [[80.0, 20.0], [20.0, 8.0], [6.0, 4.0], [3.0, 3.0]
 const LAST_SCALES: [f64; 2] = SCALES[SCALES.len() - 1];
 /// Trust of all lines in the first fit: some may be of something else.
 const FIRST_LINE_TRUST: f64 = 0.01;
-/// A radial coefficient also lowers the cost by this share of what is left: errors that neighbouring windows share may
-/// look like a lens.
+/// A radial coefficient also lowers the cost by this share of what is left: errors that
+/// neighbouring windows share may look like a lens.
 const LENS_SHARE: f64 = 0.3;
-/// Variances are larger by this: neighbouring windows overlap and are followed on two scales, so that their errors are not
-/// independent (chosen on rendered sets).
+/// Variances are larger by this: neighbouring windows overlap and are followed on two scales, so
+/// that their errors are not independent (chosen on rendered sets).
 const CORRELATED: f64 = 4.0;
-/// Lines and windows this many standard deviations off are left out of the last fit. Most windows are far better than
-/// stated; those that are not are near an edge or on another plane.
+/// Lines and windows this many standard deviations off are left out of the last fit. Most windows
+/// are far better than stated; those that are not are near an edge or on another plane.
 const OUTLIER_SIGMAS: [f64; 2] = [3.5, 1.0];
-/// The standard deviation of windows is then that of their residuals, at least this share of the stated one.
+/// The standard deviation of windows is then that of their residuals, at least this share of the
+/// stated one.
 const MIN_SCATTER: f64 = 0.3;
-/// Median of the squared residual of a line and of a window, in variances: of chi2 with 1 and 2 degrees of freedom.
+/// Median of the squared residual of a line and of a window, in variances: of chi2 with 1 and 2
+/// degrees of freedom.
 const MEDIAN_CHI2: [f64; 2] = [0.455, 1.386];
 
 const UNDETERMINED: CalibrateError = CalibrateError::Undetermined { sigma_ratio: 0.0, sigma_share: 0.0 };
@@ -58,7 +60,8 @@ pub(crate) struct RobustFit {
 /// The camera, with as many of `radial` coefficients as lower the cost by far more than chance.
 pub(crate) fn robust_fit(start: &Start<'_>, radial: usize) -> Result<RobustFit, CalibrateError> {
     let (mut problem, mut state) = start.narrowed().ok_or(UNDETERMINED)?;
-    // A lens starts from the camera without one; both are judged with the scatter that the lens leaves.
+    // A lens starts from the camera without one; both are judged with the scatter that the lens
+    // leaves.
     for coefficients in 1..=radial {
         let mut bent = Adjustment { free: free(coefficients), ..problem.clone() };
         let Some(other) = narrow(&mut bent, state.clone(), &SCALES[1..]) else { continue };
@@ -142,7 +145,8 @@ fn last_fit(mut problem: Adjustment, mut state: State) -> Option<RobustFit> {
     Some(RobustFit { problem, state, chi2, dof: given.saturating_sub(fitted), covariance })
 }
 
-/// The scale of an observation, of those of lines and of windows; what was known before is never an outlier.
+/// The scale of an observation, of those of lines and of windows; what was known before is never an
+/// outlier.
 fn scale_of(what: &Evidence, [of_lines, of_windows]: [f64; 2]) -> f64 {
     match what {
         Evidence::Line { .. } => of_lines,
@@ -172,7 +176,8 @@ fn bounded_cost(problem: &Adjustment, state: &State, scales: [f64; 2]) -> f64 {
     problem.observations.iter().map(bounded).sum()
 }
 
-/// Standard deviations such that the medians of the residuals agree with them; none becomes smaller.
+/// Standard deviations such that the medians of the residuals agree with them; none becomes
+/// smaller.
 fn rescale(problem: &mut Adjustment, state: &State) {
     let [lines, windows] = scatter(problem, state).map(|m| m.map_or(1.0, |m| m.max(1.0).sqrt()));
     for o in &mut problem.observations {

@@ -1,5 +1,5 @@
-//! Where an object may be in a picture in which no border of it was found: quads that it would fill from the front and
-//! tilted to four sides, at several places and sizes.
+//! Where an object may be in a picture in which no border of it was found: quads that it would fill
+//! from the front and tilted to four sides, at several places and sizes.
 
 use crate::geometry::corners::Corners;
 use nalgebra::{Point2, Rotation3, Vector3};

@@ -1,5 +1,6 @@
-//! A picture with a border around the object in, straight lines along each side of it out: the object's own edges, those
-//! of a frame, a mat or a shadow. All are parallel to the object's sides; none is preferred.
+//! A picture with a border around the object in, straight lines along each side of it out: the
+//! object's own edges, those of a frame, a mat or a shadow. All are parallel to the object's sides;
+//! none is preferred.
 
 use crate::{
     border::side_edges::{SideEdge, outward, side_edges},
@@ -10,7 +11,8 @@ use nalgebra::Point2;
 
 /// Lines are searched so far to both sides of the border, as a share of the object's size.
 const REACH_SHARE: f64 = 0.15;
-/// Errors that all points of a line share: its ends are known no better than this, px (chosen on rendered sets).
+/// Errors that all points of a line share: its ends are known no better than this, px (chosen on
+/// rendered sets).
 const LINE_SIGMA_PX: f64 = 0.15;
 
 /// A straight line that follows a side of the border.

@@ -1,4 +1,5 @@
-//! A textured plate before a wall, with its shadow on the wall: the focal length is right where the border is not.
+//! A textured plate before a wall, with its shadow on the wall: the focal length is right where the
+//! border is not.
 
 use super::{calibrate_pictures, from_pictures::PictureCalibration};
 use crate::{

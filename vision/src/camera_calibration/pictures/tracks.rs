@@ -1,5 +1,5 @@
-//! Pictures with homographies that are a few pixels off in, windows of the reference picture with their places in the
-//! others out, to a fraction of a pixel, and homographies that fit them.
+//! Pictures with homographies that are a few pixels off in, windows of the reference picture with
+//! their places in the others out, to a fraction of a pixel, and homographies that fit them.
 
 use crate::{
     camera_calibration::pictures::{
@@ -16,10 +16,12 @@ use nalgebra::{Matrix2, Matrix3, Point2};
 
 /// Cells along each side of the border's bounding box; each gives at most one window.
 const CELLS: usize = 16;
-/// Half the side of a window, px, for an object of [`USUAL_SIDE_PX`]; it grows with the object's root.
+/// Half the side of a window, px, for an object of [`USUAL_SIDE_PX`]; it grows with the object's
+/// root.
 const HALF_WINDOW_PX: f64 = 6.0;
 const USUAL_SIDE_PX: f64 = 250.0;
-/// Factors by which the pictures are reduced, one after the other; windows from the second on become tracks.
+/// Factors by which the pictures are reduced, one after the other; windows from the second on
+/// become tracks.
 const FACTORS: [usize; 3] = [4, 2, 1];
 const FINE_FACTOR: usize = 2;
 /// The object is at least this large on a scale, px.
@@ -32,7 +34,8 @@ const MAX_HALF_PX: usize = 14;
 const GREY_SIGMA: f64 = 3.0;
 /// Windows whose position is expected to be worse than this are not used, px.
 const MAX_SIGMA_PX: f64 = 0.12;
-/// A window is followed at most this far, px of the reference: first, and when the homography is refined.
+/// A window is followed at most this far, px of the reference: first, and when the homography is
+/// refined.
 const REACH_PX: [f64; 3] = [6.0, 3.0, 2.0];
 /// Smallest correlation of a window with its picture.
 const MIN_CORRELATION: f64 = 0.7;
@@ -53,12 +56,12 @@ pub(crate) struct Track {
     pub(crate) covariance_px2: Matrix2<f64>,
 }
 
-/// The tracks of windows that touch no edge, and for each picture the map from pixels of the reference to its own; `None`
-/// where it shows too little of the object.
+/// The tracks of windows that touch no edge, and for each picture the map from pixels of the
+/// reference to its own; `None` where it shows too little of the object.
 pub(crate) type Tracked = (Vec<Track>, Vec<Option<Homography>>);
 
-/// Follows the object's windows through all pictures, from coarse to fine: what is noise on one scale may be texture on
-/// the other, and the homographies of one are the start of the next.
+/// Follows the object's windows through all pictures, from coarse to fine: what is noise on one
+/// scale may be texture on the other, and the homographies of one are the start of the next.
 pub(crate) fn tracked(pictures: &[Picture<'_>], object: &CommonObject) -> Tracked {
     let edges = edges(&pictures[object.reference], &object.border_px);
     let mut tracks: Vec<Track> = Vec::new();
@@ -131,7 +134,8 @@ impl<'a> Scale<'a> {
         tracks
     }
 
-    /// The windows in one picture, and the homography that most of them fit; `None` where too few do.
+    /// The windows in one picture, and the homography that most of them fit; `None` where too few
+    /// do.
     fn in_picture(&self, picture: usize, start: Homography) -> Option<(Homography, Vec<Followed>)> {
         let (reference, image) = (&self.images[self.reference], &self.images[picture]);
         let (mut map, mut seen) = (start, Vec::new());
@@ -148,8 +152,8 @@ impl<'a> Scale<'a> {
     }
 }
 
-/// A point of the whole picture, and of the reduced one. Pixel centres are integers: a block's centre lies between its
-/// pixels.
+/// A point of the whole picture, and of the reduced one. Pixel centres are integers: a block's
+/// centre lies between its pixels.
 fn large(p: &Point2<f64>, factor: f64) -> Point2<f64> {
     p.map(|x| (x + 0.5) * factor - 0.5)
 }
@@ -161,8 +165,8 @@ fn small(p: &Point2<f64>, factor: f64) -> Point2<f64> {
 /// A piece of a straight line in the reference picture.
 type Edge = [Point2<f64>; 2];
 
-/// What may be a border of the object, of its frame or of a shadow: beside it two planes meet, and move against each
-/// other.
+/// What may be a border of the object, of its frame or of a shadow: beside it two planes meet, and
+/// move against each other.
 fn edges(reference: &Picture<'_>, border_px: &Corners) -> Vec<Edge> {
     let sides = |c: &Corners| {
         let p = *c.points();

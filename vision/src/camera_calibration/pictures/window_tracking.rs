@@ -1,5 +1,5 @@
-//! A window of the reference picture in, its place in another picture out: least squares of grey levels under a
-//! homography, with gain and offset (Lucas and Kanade, inverse compositional).
+//! A window of the reference picture in, its place in another picture out: least squares of grey
+//! levels under a homography, with gain and offset (Lucas and Kanade, inverse compositional).
 
 use crate::{frame::GrayImage, geometry::homography::Homography};
 use nalgebra::{Matrix2, Matrix4, Point2, Vector2, Vector4};
@@ -34,8 +34,8 @@ pub(crate) struct FollowedWindow {
 }
 
 impl Window {
-    /// The window of `2 half + 1` pixels squared about a whole pixel; `None` at the border of the image
-    /// and where it is overexposed.
+    /// The window of `2 half + 1` pixels squared about a whole pixel; `None` at the border of the
+    /// image and where it is overexposed.
     pub(crate) fn new(image: &GrayImage, at: Point2<f64>, half: usize) -> Option<Self> {
         let reach = half as f64 + 1.0;
         let (w, h) = (image.width() as f64, image.height() as f64);
@@ -55,7 +55,8 @@ impl Window {
         (!is_clipped(&all)).then_some(Self { at, half, grey: all, by_x, by_y })
     }
 
-    /// Sum of the products of the gradients: the information on its place for grey levels of variance 1.
+    /// Sum of the products of the gradients: the information on its place for grey levels of
+    /// variance 1.
     pub(crate) fn information(&self) -> Matrix2<f64> {
         let mut sum = Matrix2::zeros();
         for (x, y) in self.by_x.iter().zip(&self.by_y) {
@@ -65,7 +66,8 @@ impl Window {
         sum
     }
 
-    /// The grey levels of `image` where `map` and then `shift` (px of the reference) put the window's pixels.
+    /// The grey levels of `image` where `map` and then `shift` (px of the reference) put the
+    /// window's pixels.
     fn sampled(
         &self,
         image: &GrayImage,
@@ -94,7 +96,8 @@ impl Window {
     }
 }
 
-/// Where `image` shows the window, at most `reach_px` (px of the reference) from where `map` puts it.
+/// Where `image` shows the window, at most `reach_px` (px of the reference) from where `map` puts
+/// it.
 pub(crate) fn followed(
     window: &Window,
     image: &GrayImage,

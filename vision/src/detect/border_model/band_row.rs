@@ -1,5 +1,5 @@
-//! One row of a band: the pixels across a side, and where edges along the side run in it. In: a point and a direction.
-//! Out: steps, grey levels, peaks.
+//! One row of a band: the pixels across a side, and where edges along the side run in it. In: a
+//! point and a direction. Out: steps, grey levels, peaks.
 
 use crate::detect::{
     border_model::feature_constants::{MIN_STEP, REACH_PX},
@@ -21,7 +21,8 @@ pub(super) struct Row {
     gy: [f32; MAX_COLUMNS],
     /// Squared length of the gradient.
     square: [f32; MAX_COLUMNS],
-    /// Height of the step where the gradient points along the normal, to within about 35 degrees; -1 elsewhere.
+    /// Height of the step where the gradient points along the normal, to within about 35
+    /// degrees; -1 elsewhere.
     height: [f32; MAX_COLUMNS],
 }
 
@@ -33,8 +34,8 @@ impl Row {
         height: [-1.0; MAX_COLUMNS],
     };
 
-    /// Reads the pixels from `start` on, one a step; returns the columns in the image, from the first to before the
-    /// second.
+    /// Reads the pixels from `start` on, one a step; returns the columns in the image, from the
+    /// first to before the second.
     #[expect(
         clippy::inline_always,
         reason = "an instruction set holds only in what is inlined where it was chosen"
@@ -67,7 +68,8 @@ impl Row {
         let last = start.on(step, columns as i64 - 1);
         let cells = levels.iter_mut().zip(self.gx.iter_mut().zip(&mut self.gy));
         let mut place = start;
-        // A straight line lies in the image from one column to another, and in between if both ends do.
+        // A straight line lies in the image from one column to another, and in between if both ends
+        // do.
         if start.pixel(width, height).is_some() && last.pixel(width, height).is_some() {
             for (level, (gx, gy)) in cells {
                 let at = place.index(width);
@@ -88,7 +90,8 @@ impl Row {
         (first as i32, end as i32)
     }
 
-    /// Prefix sums of texture: how many pixels before a column have a step of more than [`MIN_STEP`].
+    /// Prefix sums of texture: how many pixels before a column have a step of more than
+    /// [`MIN_STEP`].
     #[expect(clippy::inline_always, reason = "as above")]
     #[inline(always)]
     pub(super) fn count_rough(&self, rough: &mut [u16]) {
@@ -99,7 +102,8 @@ impl Row {
         }
     }
 
-    /// The outermost of so many columns with an edge along the side of more than `least`; -1 without.
+    /// The outermost of so many columns with an edge along the side of more than `least`; -1
+    /// without.
     #[expect(clippy::inline_always, reason = "as above")]
     #[inline(always)]
     pub(super) fn outermost(&self, columns: usize, least: f32) -> i32 {
@@ -107,8 +111,8 @@ impl Row {
         edges.map(|(height, i)| if *height > least { i } else { -1 }).fold(-1, i32::max)
     }
 
-    /// Calls `peak` with the column of each local maximum of the step along the side, and how far beside the column's
-    /// middle it is, to a fraction of a pixel.
+    /// Calls `peak` with the column of each local maximum of the step along the side, and how far
+    /// beside the column's middle it is, to a fraction of a pixel.
     #[expect(clippy::inline_always, reason = "as above")]
     #[inline(always)]
     pub(super) fn peaks(&self, steps: &[f32], mut peak: impl FnMut(usize, f32)) {

@@ -1,8 +1,10 @@
-//! Snaps every side of a quad to the line beside it that is most likely its border. A shadow under a frame, the
-//! inner edge of a mat and the edge of the picture next to it all look like sides. A small network scores the
-//! features of each line. In: corners. Out: corners on the likeliest lines, with their measurements.
+//! Snaps every side of a quad to the line beside it that is most likely its border. A shadow under
+//! a frame, the inner edge of a mat and the edge of the picture next to it all look like sides. A
+//! small network scores the features of each line. In: corners. Out: corners on the likeliest
+//! lines, with their measurements.
 //!
-//! Departs from method 3.6, which refits a side on the nearest edge only. See docs/method/24-default-detector.md.
+//! Departs from method 3.6, which refits a side on the nearest edge only. See
+//! docs/method/24-default-detector.md.
 
 use crate::detect::{
     border_model::{
@@ -39,8 +41,8 @@ pub struct SnappedSides {
     pub nearest: [SideMeasurement; 4],
 }
 
-/// Moves every side of a quad, clockwise on screen, to the line beside it that looks most like the border of an
-/// object. None if no side has a line, or if the chosen lines do not meet in corners.
+/// Moves every side of a quad, clockwise on screen, to the line beside it that looks most like the
+/// border of an object. None if no side has a line, or if the chosen lines do not meet in corners.
 pub fn choose_sides(g: &Gradients, corners: &[Point2<f64>; 4], model: &Network) -> Option<SnappedSides> {
     let sides = Sides::new(g, corners);
     let known: [Vec<([f64; BAND_FEATURES], LogGreyLevels)>; 4] =
@@ -77,8 +79,8 @@ pub fn choose_sides(g: &Gradients, corners: &[Point2<f64>; 4], model: &Network) 
     Some(SnappedSides { corners_px: meet_all(&sides.ends(&chosen))?, sides: measure(&met, &chosen), nearest })
 }
 
-/// The lines beside every side with their features, the corners made with the lines nearest to the other sides:
-/// training data of the model.
+/// The lines beside every side with their features, the corners made with the lines nearest to the
+/// other sides: training data of the model.
 pub fn side_candidates(g: &Gradients, corners: &[Point2<f64>; 4]) -> [Vec<SideCandidate>; 4] {
     let sides = Sides::new(g, corners);
     let met = sides.met(&std::array::from_fn(|i| sides.nearest(i)), None);
@@ -106,7 +108,8 @@ mod tests {
 
     #[test]
     fn the_shadow_under_a_picture_is_not_its_side() {
-        // A lamp above: the wall under the picture is at six tenths, down to 20 px below it, with a penumbra of 12 px.
+        // A lamp above: the wall under the picture is at six tenths, down to 20 px below it, with a
+        // penumbra of 12 px.
         let is_in = |[left, top, right, bottom]: [f64; 4], x: f64, y: f64| {
             (left..right).contains(&x) && (top..bottom).contains(&y)
         };
@@ -126,7 +129,8 @@ mod tests {
         let g = Gradients { image: &image, gx: map.gx(), gy: map.gy() };
         let with_shadow = [[100.0, 80.0], [300.0, 80.0], [300.0, 260.0], [100.0, 260.0]].map(Point2::from);
         let chosen = choose_sides(&g, &with_shadow, QuadParams::default().side_network()).unwrap();
-        // Pixels belong to the picture from 100 to 299, so that its border is half a pixel further out.
+        // Pixels belong to the picture from 100 to 299, so that its border is half a pixel further
+        // out.
         for (found, [u, v]) in chosen.corners_px.iter().zip(PICTURE) {
             let wanted = Point2::new(u - 0.5, v - 0.5);
             assert!((found - wanted).norm() < 0.5, "{:?}", chosen.corners_px);

@@ -1,15 +1,18 @@
-//! The numbers that define what a line beside a side, and a quad, are measured by. Weights were fitted to measurements
-//! made with these numbers: with others they mean nothing. So a digest of all of them belongs to every network, and a
-//! network with another digest is refused (`Network::check`; for the weights of the program, when it is compiled).
+//! The numbers that define what a line beside a side, and a quad, are measured by. Weights were
+//! fitted to measurements made with these numbers: with others they mean nothing. So a digest of
+//! all of them belongs to every network, and a network with another digest is refused
+//! (`Network::check`; for the weights of the program, when it is compiled).
 
 use crate::detect::edge_support::gradients::MIN_COS;
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error as _};
 use std::fmt;
 
-/// Raised when the same numbers give other measurements: the order, the meaning or the computation of one changed.
+/// Raised when the same numbers give other measurements: the order, the meaning or the computation
+/// of one changed.
 const VERSION: f64 = 1.0;
 
-/// A length in pixels that grows with the quad: a share of its extent across the side, and the least, px.
+/// A length in pixels that grows with the quad: a share of its extent across the side, and the
+/// least, px.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Length {
     /// Share of the extent.
@@ -90,7 +93,8 @@ pub(crate) const LINES_SCALE: f64 = 5.0;
 pub(crate) const GREY_OFFSET: f64 = 8.0;
 /// Added to step heights before the logarithm is taken, grey levels.
 pub(crate) const STEP_OFFSET: f64 = 2.0;
-/// Blur: half the width of the strip on the line, and from where to where the strips beside it reach.
+/// Blur: half the width of the strip on the line, and from where to where the strips beside it
+/// reach.
 pub(crate) const BLUR_PX: [f64; 3] = [0.6, 1.6, 2.6];
 /// Added to both mean steps of the blur, grey levels.
 pub(crate) const BLUR_OFFSET: f64 = 1.0;
@@ -98,13 +102,14 @@ pub(crate) const BLUR_OFFSET: f64 = 1.0;
 pub(crate) const MIN_SHADOW_PX: f64 = 4.0;
 /// The wall beside a shadow: from here to there, outside the line.
 pub(crate) const SHADOW_WALL_PX: (f64, f64) = (1.5, 8.0);
-/// A shadow is this much darker than the wall, as a ratio of grey levels, and the difference from it that counts as 0.
+/// A shadow is this much darker than the wall, as a ratio of grey levels, and the difference from
+/// it that counts as 0.
 pub(crate) const SHADOW_RATIO: (f64, f64) = (0.6, 0.35);
 
 // Corners that a line makes with the neighbouring sides.
 
-/// From where to where along a neighbouring side its usual step is measured, as shares: of the side before, and of the
-/// side after.
+/// From where to where along a neighbouring side its usual step is measured, as shares: of the side
+/// before, and of the side after.
 pub(crate) const USUAL_SHARES: [[f64; 2]; 2] = [[0.2, 0.75], [0.25, 0.8]];
 /// Samples of a side's usual step.
 pub(crate) const USUAL_SAMPLES: usize = 24;

@@ -4,9 +4,9 @@
 use super::feature_constants::{CLIP_DEVIATIONS, FeatureDigest};
 use serde::{Deserialize, Serialize};
 
-/// The weights. With `n` features and `h` hidden units: `output = bias + linear . x + hidden_out .
-/// tanh(hidden_bias + hidden_in x)`, with `x` the features scaled by `mean` and `deviation` and clipped to 4
-/// deviations.
+/// The weights. With `n` features and `h` hidden units:
+/// `output = bias + linear . x + hidden_out . tanh(hidden_bias + hidden_in x)`, with `x` the
+/// features scaled by `mean` and `deviation` and clipped to 4 deviations.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Network {
@@ -88,7 +88,8 @@ impl Network {
         if self.bias.is_finite() { Ok(()) } else { Err(NetworkError::Range("bias")) }
     }
 
-    /// The output for some features. Only the first `min(features, weights)` are used where the lengths differ.
+    /// The output for some features. Only the first `min(features, weights)` are used where the
+    /// lengths differ.
     pub fn output(&self, measurements: &[f64]) -> f64 {
         let scaled: Vec<f64> = measurements
             .iter()

@@ -1,5 +1,5 @@
-//! The weights of the networks of the default detector. Not for editing: this command writes the file, byte for byte
-//! on one machine, and `cargo fmt` puts it in form:
+//! The weights of the networks of the default detector. Not for editing: this command writes the
+//! file, byte for byte on one machine, and `cargo fmt` puts it in form:
 //!
 //! ```text
 //! waymark-lab train detector photoreal/01 photoreal/02 photoreal/03 photoreal/04 photoreal/05 photoreal/06 \
@@ -8,22 +8,27 @@
 //!   vision/src/detect/border_model/network_weights.rs
 //! ```
 //!
-//! Commit: 0fcdd578695f8be15714cc2cae1a10559200cbce.
-//! Set `01`: SHA-256 161fe990bbc86a846140a83ac98e8f53bb904782694b5cea07aa8d842d606a88 (`data/digest.py`).
-//! Set `02`: SHA-256 9fa006e64f73ab7dce87296631366d26a8a436f87880598ace1ebacdc99a7bcb (`data/digest.py`).
-//! Set `03`: SHA-256 3a98b0c9fed0aa01ecbb12032b395b9751b10880f6a9e33bbe937094bef127ff (`data/digest.py`).
-//! Set `04`: SHA-256 187c293146000d129f232926423350830d010e5baf6a3bad38096e2c416649c6 (`data/digest.py`).
-//! Set `05`: SHA-256 14d37cdc1e906c6deaa5c217681499946695c6b9f1a3823f9041eea14d4cdfca (`data/digest.py`).
-//! Set `06`: SHA-256 6eff9068365f00a31c13f0061b58fc47bc516c91f2a9c7b3cd3fe3a5572b3ac3 (`data/digest.py`).
-//! Set `07`: SHA-256 645f6ccf2d1c9e2778f284bacf72613c01ca60c41a2eb9677e0c7e98e4c74c86 (`data/digest.py`).
-//! Set `08`: SHA-256 e6190a35fb56a06724d73c3d77f9da721e1d42751972cea8cbad1e5cb159bc0f (`data/digest.py`).
-//! Set `09`: SHA-256 9e8c6548c7326261014ca7f4c5d3d2b7d650cf369d1aef1242e65790cf17c9c1 (`data/digest.py`).
-//! Set `10`: SHA-256 8888355a172b8b9d16ba5b39b2017a9d2046c5b3d3c91448e171c13606290f66 (`data/digest.py`).
-//! Set `11`: SHA-256 c8a25d327e10e6de80eb4aad3139d717dc36c6c06a12297fd684db2eb99e78c8 (`data/digest.py`).
-//! Set `12`: SHA-256 886d1e5c389822d54003906577da351e877f60b15c45efdf70932b0f74929390 (`data/digest.py`).
-//! Set `13`: SHA-256 564f61b26481bfc012b8197a24986f66cb8be4dc3817b2dadafae4162c445e30 (`data/digest.py`).
-//! Set `14`: SHA-256 c1363b537ddd8c5a84b803c1bdbf58d3dae306997c694c6dfcab862223ec6f81 (`data/digest.py`).
-//! Set `db`: SHA-256 052aff3cdffaf45bba46c094920edde8d3e14a02d4ad89a83d96bd98cdaa0241 (`data/digest.py`).
+//! Commit: 0fcdd578695f8be15714cc2cae1a10559200cbce. Set `01`: SHA-256
+//! 161fe990bbc86a846140a83ac98e8f53bb904782694b5cea07aa8d842d606a88 (`data/digest.py`). Set `02`:
+//! SHA-256 9fa006e64f73ab7dce87296631366d26a8a436f87880598ace1ebacdc99a7bcb (`data/digest.py`). Set
+//! `03`: SHA-256 3a98b0c9fed0aa01ecbb12032b395b9751b10880f6a9e33bbe937094bef127ff
+//! (`data/digest.py`). Set `04`: SHA-256
+//! 187c293146000d129f232926423350830d010e5baf6a3bad38096e2c416649c6 (`data/digest.py`). Set `05`:
+//! SHA-256 14d37cdc1e906c6deaa5c217681499946695c6b9f1a3823f9041eea14d4cdfca (`data/digest.py`). Set
+//! `06`: SHA-256 6eff9068365f00a31c13f0061b58fc47bc516c91f2a9c7b3cd3fe3a5572b3ac3
+//! (`data/digest.py`). Set `07`: SHA-256
+//! 645f6ccf2d1c9e2778f284bacf72613c01ca60c41a2eb9677e0c7e98e4c74c86 (`data/digest.py`). Set `08`:
+//! SHA-256 e6190a35fb56a06724d73c3d77f9da721e1d42751972cea8cbad1e5cb159bc0f (`data/digest.py`). Set
+//! `09`: SHA-256 9e8c6548c7326261014ca7f4c5d3d2b7d650cf369d1aef1242e65790cf17c9c1
+//! (`data/digest.py`). Set `10`: SHA-256
+//! 8888355a172b8b9d16ba5b39b2017a9d2046c5b3d3c91448e171c13606290f66 (`data/digest.py`). Set `11`:
+//! SHA-256 c8a25d327e10e6de80eb4aad3139d717dc36c6c06a12297fd684db2eb99e78c8 (`data/digest.py`). Set
+//! `12`: SHA-256 886d1e5c389822d54003906577da351e877f60b15c45efdf70932b0f74929390
+//! (`data/digest.py`). Set `13`: SHA-256
+//! 564f61b26481bfc012b8197a24986f66cb8be4dc3817b2dadafae4162c445e30 (`data/digest.py`). Set `14`:
+//! SHA-256 c1363b537ddd8c5a84b803c1bdbf58d3dae306997c694c6dfcab862223ec6f81 (`data/digest.py`). Set
+//! `db`: SHA-256 052aff3cdffaf45bba46c094920edde8d3e14a02d4ad89a83d96bd98cdaa0241
+//! (`data/digest.py`).
 #![allow(clippy::approx_constant, reason = "weights that happen to be near one")]
 
 use super::{feature_constants::FeatureDigest, network::Network};

@@ -1,9 +1,9 @@
-//! The probability that a quad is the border of a flat object, not lines that happen to meet: joints of tiles, a wall
-//! between two corners, strokes inside a picture. In: the features of its four sides. Out: a probability.
-//! The weights were fitted on labelled photographs and renderings.
+//! The probability that a quad is the border of a flat object, not lines that happen to meet:
+//! joints of tiles, a wall between two corners, strokes inside a picture. In: the features of its
+//! four sides. Out: a probability. The weights were fitted on labelled photographs and renderings.
 //!
-//! Departs from method 3.6, whose score (similarity times support) measures edge support, not whether the quad is
-//! an object.
+//! Departs from method 3.6, whose score (similarity times support) measures edge support, not
+//! whether the quad is an object.
 
 use crate::detect::border_model::{
     network::Network,
@@ -11,16 +11,17 @@ use crate::detect::border_model::{
 };
 use nalgebra::Point2;
 
-/// Number of features: mean, smallest and largest of each feature of a side, and ten of the quad as a whole.
+/// Number of features: mean, smallest and largest of each feature of a side, and ten of the quad as
+/// a whole.
 pub const QUAD_FEATURES: usize = 3 * SIDE_FEATURES + WHOLE_FEATURES;
 /// Features of the quad as a whole.
 const WHOLE_FEATURES: usize = 10;
 
-/// The features of a quad in an image of some width and height: mean, smallest and largest of each feature of a
-/// side; its support score; log of its mean side in pixels; how much the sides differ in the tone of the wall, just
-/// outside and just inside; how similar their steps are, 0 to 1; sine of the sharpest corner; of opposite sides the
-/// log of the length ratio, of the pair that differs less and of the other; how far corners lie outside the image,
-/// in mean sides.
+/// The features of a quad in an image of some width and height: mean, smallest and largest of each
+/// feature of a side; its support score; log of its mean side in pixels; how much the sides differ
+/// in the tone of the wall, just outside and just inside; how similar their steps are, 0 to 1; sine
+/// of the sharpest corner; of opposite sides the log of the length ratio, of the pair that differs
+/// less and of the other; how far corners lie outside the image, in mean sides.
 pub fn quad_features(
     sides: &[SideMeasurement; 4],
     corners_px: &[Point2<f64>; 4],

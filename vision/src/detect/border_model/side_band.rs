@@ -1,5 +1,6 @@
-//! The image band around a proposed side, resampled, with the lines in it that edges support. In: two points. Out:
-//! statistics along each line. `side_lines` finds the lines, `choose_sides` picks the border.
+//! The image band around a proposed side, resampled, with the lines in it that edges support. In:
+//! two points. Out: statistics along each line. `side_lines` finds the lines, `choose_sides` picks
+//! the border.
 
 use crate::detect::{
     border_model::{
@@ -18,7 +19,8 @@ use nalgebra::{Point2, Vector2};
 /// A number for each row; unused rows are 0.
 type Rows = [i32; MAX_BAND_SAMPLES];
 
-/// The image around a side, a row for each sample along it, a column for each pixel across, from inside outwards.
+/// The image around a side, a row for each sample along it, a column for each pixel across, from
+/// inside outwards.
 #[derive(Debug, Clone)]
 pub struct Band {
     from: Point2<f64>,
@@ -34,17 +36,20 @@ pub struct Band {
     /// Derivative along the normal; 0 outside the image.
     step: Vec<f32>,
     level: Vec<u8>,
-    /// Prefix sums: how many pixels of the row before a column are textured; one column more than the band has.
+    /// Prefix sums: how many pixels of the row before a column are textured; one column more than
+    /// the band has.
     rough: Vec<u16>,
-    /// Outermost column of each row with an edge along the side of at least each of [`STEPS_OUTSIDE`]; -1 without.
+    /// Outermost column of each row with an edge along the side of at least each of
+    /// [`STEPS_OUTSIDE`]; -1 without.
     outermost: [Rows; 2],
     /// The lines, by descending support when found.
     pub lines: Vec<SideLine>,
 }
 
 impl Band {
-    /// Resamples the band of the side from `from` to `to`, of a quad walked clockwise on screen that reaches
-    /// `extent_px` across the side, and finds its lines. None for a side shorter than 4 px.
+    /// Resamples the band of the side from `from` to `to`, of a quad walked clockwise on screen
+    /// that reaches `extent_px` across the side, and finds its lines. None for a side shorter than
+    /// 4 px.
     pub fn new(g: &Gradients, from: &Point2<f64>, to: &Point2<f64>, extent_px: f64) -> Option<Self> {
         let length_px = (to - from).norm();
         if !(length_px >= MIN_SIDE_PX && length_px.is_finite() && extent_px.is_finite()) {
@@ -180,7 +185,8 @@ impl AlongLine<'_> {
         )
     }
 
-    /// Calls `row` with the grey levels of each row of a strip in the image; returns the number of pixels.
+    /// Calls `row` with the grey levels of each row of a strip in the image; returns the number of
+    /// pixels.
     #[inline]
     pub fn levels(&self, range_px: (f64, f64), row: impl FnMut(&[u8])) -> usize {
         self.each(&self.band.level, range_px, row)
@@ -203,8 +209,8 @@ impl AlongLine<'_> {
         in_image
     }
 
-    /// Share of the samples with an edge along the side further out than `beyond_px`, for both thresholds of
-    /// `STEPS_OUTSIDE`.
+    /// Share of the samples with an edge along the side further out than `beyond_px`, for both
+    /// thresholds of `STEPS_OUTSIDE`.
     pub fn edges_outside(&self, beyond_px: f64) -> [f64; 2] {
         let from = columns(beyond_px) + (1 << BITS) - 1;
         self.band.outermost.each_ref().map(|outermost| {
@@ -245,7 +251,8 @@ mod tests {
             let near = |l: &&SideLine| (l.offset_px - wanted).abs() < 0.3;
             *band.lines.iter().find(near).unwrap_or_else(|| panic!("{wanted}: {:?}", band.lines))
         };
-        // Out of the quad is up here; the middle of the frame's upper side is at 82.2, of the inner one's at 94.2.
+        // Out of the quad is up here; the middle of the frame's upper side is at 82.2, of the inner
+        // one's at 94.2.
         let (side, inside, outside) = (offset(0.8), offset(-11.2), offset(21.8));
         assert!(side.support > 0.95 && side.sign > 0.99 && inside.sign < -0.99 && outside.sign < -0.99);
         assert!((side.slope_px + 4.0).abs() < 0.3, "{side:?}");
@@ -267,7 +274,8 @@ mod tests {
 
     #[test]
     fn strips_contain_the_rows_between_two_offsets() {
-        // Grey levels equal the row of the image; the side runs along row 50, the outside of the quad is up.
+        // Grey levels equal the row of the image; the side runs along row 50, the outside of the
+        // quad is up.
         let image = GrayImage::from_fn(300, 200, |_, v| v as u8);
         let band = band(&image, [50.0, 50.0], [250.0, 50.0], 80.0).unwrap();
         let line = SideLine { offset_px: 0.25, slope_px: 0.0, support: 1.0, sign: 1.0, step: 1.0 };

@@ -1,5 +1,5 @@
-//! The lines beside the sides of a quad in, 28 features of each out: of the band beside the line, and of the two
-//! corners that it makes with the neighbouring sides.
+//! The lines beside the sides of a quad in, 28 features of each out: of the band beside the line,
+//! and of the two corners that it makes with the neighbouring sides.
 
 use crate::detect::{
     border_model::{
@@ -25,7 +25,8 @@ pub const SIDE_FEATURES: usize = BAND_FEATURES + CORNER_FEATURES;
 /// Features of the line of a side.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct SideMeasurement {
-    /// Of the band beside the line, then of its two corners: see `Sides::band_features` and `Sides::corner_features`.
+    /// Of the band beside the line, then of its two corners: see `Sides::band_features` and
+    /// `Sides::corner_features`.
     pub features: [f64; SIDE_FEATURES],
     /// Tones, compared between the sides only.
     pub tones: LogGreyLevels,
@@ -40,8 +41,8 @@ pub struct LogGreyLevels {
     pub outside: f64,
     /// Just inside.
     pub inside: f64,
-    /// Log of the step in grey levels, 2 added, positive where it is brighter outside; times the agreement of its
-    /// signs.
+    /// Log of the step in grey levels, 2 added, positive where it is brighter outside; times the
+    /// agreement of its signs.
     pub step: f64,
 }
 
@@ -108,8 +109,8 @@ impl<'a> Sides<'a> {
         })
     }
 
-    /// What each side meets when these lines are chosen. `earlier`: what they met before, and the sides whose line is
-    /// another since.
+    /// What each side meets when these lines are chosen. `earlier`: what they met before, and the
+    /// sides whose line is another since.
     pub(crate) fn met(
         &self,
         chosen: &[Option<usize>; 4],
@@ -132,11 +133,12 @@ impl<'a> Sides<'a> {
         })
     }
 
-    /// 0 support, 1 agreement of the signs of its steps, 2 log of the step; roughness of the strips beside it: 3 just
-    /// outside, 4 further outside, 5 and 6 the same inside; log ratio of grey just outside to the wall further out, 7
-    /// signed and 8 absolute, 9 and 10 the same of just inside; 11 log of blur; 12 weight of the heaviest line
-    /// further out and 13 further in, 14 largest support further out, 15 number of lines further out; share of
-    /// samples with an edge further out, 16 weak and 17 stronger; 18 how much the strip to the next line inside looks
+    /// 0 support, 1 agreement of the signs of its steps, 2 log of the step; roughness of the strips
+    /// beside it: 3 just outside, 4 further outside, 5 and 6 the same inside; log ratio of grey
+    /// just outside to the wall further out, 7 signed and 8 absolute, 9 and 10 the same of just
+    /// inside; 11 log of blur; 12 weight of the heaviest line further out and 13 further in, 14
+    /// largest support further out, 15 number of lines further out; share of samples with an edge
+    /// further out, 16 weak and 17 stronger; 18 how much the strip to the next line inside looks
     /// like a shadow on the wall, 19 the strip from the next line outside.
     pub(crate) fn band_features(&self, side: usize, line: usize) -> ([f64; BAND_FEATURES], LogGreyLevels) {
         let Some(band) = &self.bands[side] else { return ([0.0; BAND_FEATURES], LogGreyLevels::default()) };
@@ -190,10 +192,11 @@ impl<'a> Sides<'a> {
         (features, tones)
     }
 
-    /// Steps of the two neighbouring sides at the corners with a line, as a share of their steps along their own
-    /// length: at the border of an object they exist just before the corner and not just after. Of the two: 0
-    /// smallest and 1 mean step inwards, 2 smallest support inwards, 3 largest step outwards, 4 largest and 5 mean
-    /// support outwards, 6 largest difference of the inward step from the side's own, 7 mean step outwards.
+    /// Steps of the two neighbouring sides at the corners with a line, as a share of their steps
+    /// along their own length: at the border of an object they exist just before the corner and not
+    /// just after. Of the two: 0 smallest and 1 mean step inwards, 2 smallest support inwards, 3
+    /// largest step outwards, 4 largest and 5 mean support outwards, 6 largest difference of the
+    /// inward step from the side's own, 7 mean step outwards.
     pub(crate) fn corner_features(
         &self,
         side: usize,
@@ -205,7 +208,8 @@ impl<'a> Sides<'a> {
         let at_corner = |neighbour: &Option<Neighbour>, before: bool| {
             let Neighbour { ends, along, usual } = (*neighbour)?;
             let corner = meet(&own, &ends)?;
-            // Along the neighbour away from the corner, into the quad, in the direction of its side.
+            // Along the neighbour away from the corner, into the quad, in the direction of its
+            // side.
             let between = |a: f64, b: f64| {
                 let (p, q) = if before { (-b, -a) } else { (a, b) };
                 step_along(
@@ -254,7 +258,8 @@ fn roughness(along: &AlongLine, range_px: (f64, f64)) -> f64 {
 fn level(along: &AlongLine, range_px: (f64, f64)) -> Option<f64> {
     /// Grey levels that are passed over together.
     const TOGETHER: usize = 16;
-    // Two counts of each level: a pixel is mostly as grey as the one before it, and would wait for its count.
+    // Two counts of each level: a pixel is mostly as grey as the one before it, and would wait for
+    // its count.
     let mut counts = [[0_u16; 256]; 2];
     let in_image = along.levels(range_px, |levels| {
         for (i, level) in levels.iter().enumerate() {
@@ -296,8 +301,8 @@ fn blur(along: &AlongLine) -> f64 {
     ((beside + BLUR_OFFSET) / (mean((-on, on)) + BLUR_OFFSET)).ln()
 }
 
-/// How much the strip of some width inside a line looks like a shadow on the wall outside: uniform, at about 0.6 of
-/// its grey level.
+/// How much the strip of some width inside a line looks like a shadow on the wall outside: uniform,
+/// at about 0.6 of its grey level.
 fn shadow(along: &AlongLine, width_px: f64) -> f64 {
     if width_px < MIN_SHADOW_PX {
         return 0.0;
@@ -311,8 +316,8 @@ fn shadow(along: &AlongLine, width_px: f64) -> f64 {
     (1.0 - roughness(along, between)) * (1.0 - (ratio - usual).abs() / spread).max(0.0)
 }
 
-/// Mean signed step across the line from `p` to `q`, the strongest within a pixel that follows it, and the share of
-/// samples that have one. Samples outside the image count 0.
+/// Mean signed step across the line from `p` to `q`, the strongest within a pixel that follows it,
+/// and the share of samples that have one. Samples outside the image count 0.
 fn step_along(g: &Gradients, p: &Point2<f64>, q: &Point2<f64>, samples: usize) -> (f64, f64) {
     let Some(along) = (q - p).try_normalize(1e-6) else { return (0.0, 0.0) };
     let across = Vector2::new(along.y, -along.x);

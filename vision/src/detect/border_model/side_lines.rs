@@ -1,4 +1,5 @@
-//! The straight lines among the edge points of a band. In: points. Out: lines, the best supported first.
+//! The straight lines among the edge points of a band. In: points. Out: lines, the best supported
+//! first.
 
 use super::feature_constants::{
     FIT_REACH_PX, MAX_LINES, MIN_LINE_POINTS, MIN_SUPPORT, NEAR_LINE_PX, SAME_LINE_PX, SLOPE_STEP, SLOPES,
@@ -8,7 +9,8 @@ use super::feature_constants::{
 /// Slopes tried in all.
 const ALL_SLOPES: usize = 2 * SLOPES + 1;
 
-/// A line beside a side: its offset from the side, out of the quad for positive ones, at the middle of the side.
+/// A line beside a side: its offset from the side, out of the quad for positive ones, at the middle
+/// of the side.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SideLine {
     /// Offset at the middle of the side.
@@ -33,7 +35,8 @@ pub(crate) struct Peak {
     pub(crate) step: f32,
 }
 
-/// The edge points of a band. Their positions are in lists of their own, too, so that distances are compared together.
+/// The edge points of a band. Their positions are in lists of their own, too, so that distances are
+/// compared together.
 #[derive(Debug)]
 pub(crate) struct Peaks {
     all: Vec<Peak>,
@@ -80,8 +83,8 @@ struct Votes {
     offsets: usize,
 }
 
-/// Lines by Hough transform over offset and slope, each refitted. `first_px` is the offset of the first of the
-/// `columns`.
+/// Lines by Hough transform over offset and slope, each refitted. `first_px` is the offset of the
+/// first of the `columns`.
 #[expect(
     clippy::inline_always,
     reason = "an instruction set holds only in what is inlined where it was chosen"
@@ -121,7 +124,8 @@ pub(crate) fn find(
     lines
 }
 
-/// One vote of each peak for every slope, at the offset that goes with it. Two bins lie before `first_px`.
+/// One vote of each peak for every slope, at the offset that goes with it. Two bins lie before
+/// `first_px`.
 #[inline(always)]
 fn vote(peaks: &[Peak], first_px: f32, bins: usize, unit: f32) -> Votes {
     /// Fractional bits of a bin in fixed point.
@@ -145,8 +149,9 @@ fn vote(peaks: &[Peak], first_px: f32, bins: usize, unit: f32) -> Votes {
     Votes { rows: votes, offsets: bins }
 }
 
-/// For every offset the most votes of any slope, those of the neighbouring offsets with them, and the slope: lines of
-/// neighbouring slopes are one. Ties go to the slope nearest to 0, then to the lesser.
+/// For every offset the most votes of any slope, those of the neighbouring offsets with them, and
+/// the slope: lines of neighbouring slopes are one. Ties go to the slope nearest to 0, then to the
+/// lesser.
 #[inline(always)]
 fn best_slopes(votes: &Votes) -> Vec<(u32, u32)> {
     /// A slope's place in the order of ties is below this.
@@ -180,7 +185,8 @@ fn best_slopes(votes: &Votes) -> Vec<(u32, u32)> {
 struct Near {
     /// Its row, as a bit.
     row: u64,
-    /// What it adds to the sums of a fit: one; position, offset, square, product; sign and height of its step.
+    /// What it adds to the sums of a fit: one; position, offset, square, product; sign and height
+    /// of its step.
     adds: [f64; SUMS],
 }
 

@@ -1,6 +1,6 @@
-//! Coarse edge support of a quad proposal: the share of each side that an edge follows, and whether all four have
-//! the same step. In: corners and gradient planes. Out: a number that ranks proposals. `side_support` measures
-//! exactly.
+//! Coarse edge support of a quad proposal: the share of each side that an edge follows, and whether
+//! all four have the same step. In: corners and gradient planes. Out: a number that ranks
+//! proposals. `side_support` measures exactly.
 
 use crate::detect::edge_support::{
     fixed_point::Fixed,
@@ -19,12 +19,13 @@ const MIXED_POLARITY: f64 = 0.4;
 /// Edge support and polarity of a side.
 struct SidePolarity {
     support: f64,
-    /// Mean sign of the steps over all samples in the image, -1 to 1; positive where it is brighter outside.
+    /// Mean sign of the steps over all samples in the image, -1 to 1; positive where it is brighter
+    /// outside.
     sign: f64,
 }
 
-/// Support of the worst side times the agreement of the four sides' polarities, both 0 to 1; none if a side has less
-/// support than `least`. `first` is the side to begin with.
+/// Support of the worst side times the agreement of the four sides' polarities, both 0 to 1; none
+/// if a side has less support than `least`. `first` is the side to begin with.
 pub fn fit_of(
     g: &Gradients,
     corners_px: &[Point2<f64>; 4],

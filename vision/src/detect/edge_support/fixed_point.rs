@@ -1,5 +1,5 @@
-//! Points of an image in fixed point, for loops over thousands of pixels along lines: advancing is an addition, the
-//! pixel of a point a shift. In: coordinates. Out: indices of pixels.
+//! Points of an image in fixed point, for loops over thousands of pixels along lines: advancing is
+//! an addition, the pixel of a point a shift. In: coordinates. Out: indices of pixels.
 
 use nalgebra::{Point2, Vector2};
 

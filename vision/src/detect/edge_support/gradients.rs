@@ -64,16 +64,16 @@ impl Gradients<'_> {
         [self.gx[i], self.gy[i]]
     }
 
-    /// The step across a line with this normal at the nearest pixel, 0 where the gradient does not point along the
-    /// normal to within about 35 degrees; none outside the image.
+    /// The step across a line with this normal at the nearest pixel, 0 where the gradient does not
+    /// point along the normal to within about 35 degrees; none outside the image.
     #[inline]
     pub(crate) fn step_following(&self, p: Fixed, normal: [f32; 2]) -> Option<f32> {
         let (step, square) = across(self.nearest(p)?, normal);
         Some(if step * step >= MIN_COS * MIN_COS * square { step } else { 0.0 })
     }
 
-    /// Whether the gradient at the nearest pixel is a step of at least `min_step` across a line with this normal, to
-    /// within about 35 degrees; none outside the image.
+    /// Whether the gradient at the nearest pixel is a step of at least `min_step` across a line
+    /// with this normal, to within about 35 degrees; none outside the image.
     #[inline]
     pub(crate) fn follows(&self, p: Fixed, normal: [f32; 2], min_step: f32) -> Option<bool> {
         let (step, square) = across(self.nearest(p)?, normal);

@@ -1,5 +1,5 @@
-//! The straight line through edge points along a side, to a fraction of a pixel (method 3.6). In: points, which
-//! `side_support` finds. Out: a line with its variance.
+//! The straight line through edge points along a side, to a fraction of a pixel (method 3.6). In:
+//! points, which `side_support` finds. Out: a line with its variance.
 
 use nalgebra::{Point2, Vector2};
 
@@ -17,8 +17,8 @@ pub(crate) struct EdgePoint {
 /// A line `normal . x = rho_px` with the variance of its offset.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FittedLine {
-    /// Unit normal: to the left of the walk from the first to the second point as seen on screen, hence out of a
-    /// polygon that is walked clockwise.
+    /// Unit normal: to the left of the walk from the first to the second point as seen on screen,
+    /// hence out of a polygon that is walked clockwise.
     pub normal: Vector2<f64>,
     /// Signed distance from the origin.
     pub rho_px: f64,

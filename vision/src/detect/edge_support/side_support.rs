@@ -1,5 +1,5 @@
-//! Edge support of a side: the share of it that an edge supports, and where that edge runs, to a fraction of a pixel
-//! (method 3.6). In: two points. Out: a line with its variance.
+//! Edge support of a side: the share of it that an edge supports, and where that edge runs, to a
+//! fraction of a pixel (method 3.6). In: two points. Out: a line with its variance.
 
 use crate::detect::edge_support::{
     fixed_point::Fixed,
@@ -23,7 +23,8 @@ pub struct EdgeProbeParams {
     pub min_step: f64,
     /// Most samples along a side; [`MAX_SAMPLES`] for the best line.
     pub samples: usize,
-    /// Interpolate the gradient between pixels, for the best line, or take the nearest pixel, which is faster.
+    /// Interpolate the gradient between pixels, for the best line, or take the nearest pixel, which
+    /// is faster.
     pub between_pixels: bool,
     /// Support below which the measurement of a side stops early; 0 measures all samples.
     pub least_support: f64,
@@ -65,7 +66,8 @@ pub fn measure(g: &Gradients, from: &Point2<f64>, to: &Point2<f64>, search: Edge
 }
 
 impl SidePoints {
-    /// Collects the edge points from `from` to `to`. None as soon as `search.least_support` cannot be reached.
+    /// Collects the edge points from `from` to `to`. None as soon as `search.least_support` cannot
+    /// be reached.
     pub(crate) fn new(
         g: &Gradients,
         from: &Point2<f64>,
@@ -124,8 +126,8 @@ impl SidePoints {
     }
 }
 
-/// The numbers below `count`, each once, successive ones far apart: a bad side is recognised before all samples are
-/// taken.
+/// The numbers below `count`, each once, successive ones far apart: a bad side is recognised before
+/// all samples are taken.
 pub(crate) fn scattered(count: usize) -> impl Iterator<Item = usize> {
     // Two primes whose product is above every count: at least one does not divide it.
     let stride = if count.is_multiple_of(STRIDES[0]) { STRIDES[1] } else { STRIDES[0] };
@@ -139,7 +141,8 @@ pub(crate) fn share_along(sample: usize, count: usize) -> f64 {
     CORNER_SHARE + (1.0 - 2.0 * CORNER_SHARE) * (sample as f64 + 0.5) / count as f64
 }
 
-/// Where the edge that runs from `from` through `to` ends: the last supported point on the line beyond `to`.
+/// Where the edge that runs from `from` through `to` ends: the last supported point on the line
+/// beyond `to`.
 pub fn run_end(g: &Gradients, from: &Point2<f64>, to: &Point2<f64>, min_step: f64) -> Point2<f64> {
     /// Steps of 2 px without an edge that end the run.
     const MAX_MISSES: usize = 4;
@@ -197,8 +200,9 @@ impl Across {
         }
     }
 
-    /// Strongest edge across the side at `foot`: whether the foot lies in the image, and the edge's offset and signed
-    /// step height. The gradient must point along the normal to within about 35 degrees.
+    /// Strongest edge across the side at `foot`: whether the foot lies in the image, and the edge's
+    /// offset and signed step height. The gradient must point along the normal to within about 35
+    /// degrees.
     fn strongest(&self, g: &Gradients, foot: &Point2<f64>) -> (bool, Option<(f64, f64)>) {
         let from = -(self.reach as i64) - 1;
         let (mut gx, mut gy) = ([f32::NAN; MAX_ACROSS], [f32::NAN; MAX_ACROSS]);

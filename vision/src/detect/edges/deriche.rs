@@ -1,10 +1,12 @@
-//! Grey image in, the two gradient planes out (method 1.1): the recursive filter of Canny and Deriche.
+//! Grey image in, the two gradient planes out (method 1.1): the recursive filter of Canny and
+//! Deriche.
 //!
-//! Departs from method 1.1 in the form, not in the result: instead of a causal plus an anticausal recursion for
-//! each of smoothing and derivative, one causal recursion after one anticausal, `C = 1 / ((1 - q z^-1)^2 (1 - q
-//! z)^2)`, along rows and columns. Of it smoothing is `s1 C[n-1] + s0 C[n] + s1 C[n+1]` and the derivative `d
-//! (C[n+1] - C[n-1])`, so both gradients are 3x3 stencils of one plane: half the arithmetic, a third of the memory.
-//! Rows are filtered [`LANES`] at a time, columns all at once; no thresholds here.
+//! Departs from method 1.1 in the form, not in the result: instead of a causal plus an anticausal
+//! recursion for each of smoothing and derivative, one causal recursion after one anticausal,
+//! `C = 1 / ((1 - q z^-1)^2 (1 - q z)^2)`, along rows and columns. Of it smoothing is
+//! `s1 C[n-1] + s0 C[n] + s1 C[n+1]` and the derivative `d (C[n+1] - C[n-1])`, so both gradients
+//! are 3x3 stencils of one plane: half the arithmetic, a third of the memory. Rows are filtered
+//! [`LANES`] at a time, columns all at once; no thresholds here.
 
 #![expect(
     clippy::inline_always,
@@ -27,8 +29,8 @@ struct Deriche {
     feedback: [f32; 2],
     /// Response of one recursion to a constant 1.
     steady: f32,
-    /// Start values of the second recursion one and two samples beyond the end, for a deviation of 1 from the
-    /// steady state in the last and last but one sample of the first.
+    /// Start values of the second recursion one and two samples beyond the end, for a deviation of
+    /// 1 from the steady state in the last and last but one sample of the first.
     beyond: [[f32; 2]; 2],
     /// s1 / s0.
     side: f32,
@@ -44,7 +46,8 @@ impl Deriche {
         let k = (1.0 - q).powi(2) / (1.0 + 2.0 * a * q - r);
         let (s0, s1) = (k * (1.0 - 4.0 * a * r - r * r), k * q * ((a - 1.0) + r * (a + 1.0)));
         let d = (1.0 - q).powi(2) * (1.0 - r);
-        // The deviation goes on as q^j (e0 + j (e0 - q e1)); the second recursion weights it by (m + 1) q^m.
+        // The deviation goes on as q^j (e0 + j (e0 - q e1)); the second recursion weights it by
+        // (m + 1) q^m.
         let (sum, ramp) = ((1.0 - r).powi(-2), 2.0 * r * (1.0 - r).powi(-3));
         let beyond = |i: i32| {
             let j = f64::from(i);
@@ -64,7 +67,8 @@ impl Deriche {
         (x + p2 * self.feedback[1]) + p1 * self.feedback[0]
     }
 
-    /// Both recursions along [`LANES`] rows, scaled. `lines` becomes the columns from -1 to the width inclusive.
+    /// Both recursions along [`LANES`] rows, scaled. `lines` becomes the columns from -1 to the
+    /// width inclusive.
     #[inline(always)]
     fn along_rows<S: Simd>(&self, s: S, rows: &[&[u8]; LANES], lines: &mut Vec<Column>) {
         let width = rows[0].len();
@@ -110,8 +114,8 @@ impl Deriche {
         }
     }
 
-    /// Rows -2 and -1 of the second recursion, from the first row of the image and rows 0 and 1 of the first
-    /// recursion.
+    /// Rows -2 and -1 of the second recursion, from the first row of the image and rows 0 and 1 of
+    /// the first recursion.
     fn above(&self, first: &[f32], g: [&[f32]; 2], out: [&mut [f32]; 2]) {
         let [far, near] = out;
         for (u, x) in first.iter().enumerate() {
@@ -122,7 +126,8 @@ impl Deriche {
         }
     }
 
-    /// Gradients of one row from three rows of the filtered plane, which stand out by one column on both sides.
+    /// Gradients of one row from three rows of the filtered plane, which stand out by one column on
+    /// both sides.
     #[inline(always)]
     fn stencil<S: Simd>(&self, s: S, rows: [&[f32]; 3], [gx, gy]: Planes) {
         let n = gx.len();
@@ -185,8 +190,8 @@ pub(crate) trait GradientRows<S: Simd> {
     fn row(&mut self, s: S, v: usize, planes: [&[f32]; 2]);
 }
 
-/// Fills the planes (gx, gy) in grey levels of step height, pointing to the brighter side, from the top row down. The
-/// image is continued by its border pixels.
+/// Fills the planes (gx, gy) in grey levels of step height, pointing to the brighter side, from the
+/// top row down. The image is continued by its border pixels.
 #[inline(always)]
 pub(crate) fn gradients<S: Simd>(
     s: S,

@@ -111,8 +111,8 @@ pub(crate) fn levels() -> Vec<Level> {
     all.into_iter().flatten().chain([best]).collect()
 }
 
-/// Both recursions along one line, in f32, in the order of operations of the vectors; one more sample on both sides.
-/// `first` is the recursion that runs from the start.
+/// Both recursions along one line, in f32, in the order of operations of the vectors; one more
+/// sample on both sides. `first` is the recursion that runs from the start.
 fn plain_line(x: &[f32], f: &Deriche) -> Vec<f32> {
     let step = |x: f32, p1: f32, p2: f32| (x + p2 * f.feedback[1]) + p1 * f.feedback[0];
     let (start, end) = (x[0] * f.steady, x[x.len() - 1] * f.steady);

@@ -1,7 +1,9 @@
-//! Grey image in, edge map out (method 1.1, 1.2): gradient, non-maximum suppression, hysteresis, thinning.
+//! Grey image in, edge map out (method 1.1, 1.2): gradient, non-maximum suppression, hysteresis,
+//! thinning.
 //!
-//! The map keeps the gradient planes: later stages search along a proposed side for edges too weak for the mask.
-//! No chaining here. Filter and suppression run on the widest vectors the processor has; results do not depend on it.
+//! The map keeps the gradient planes: later stages search along a proposed side for edges too weak
+//! for the mask. No chaining here. Filter and suppression run on the widest vectors the processor
+//! has; results do not depend on it.
 
 use crate::{
     detect::edges::{
@@ -30,14 +32,16 @@ pub struct EdgeParams {
     pub low: f32,
     /// Grey levels of step height that start an edge, in an image without noise.
     pub high: f32,
-    /// Neither threshold lies below these multiples of the gradient's noise (low, high); 0 ignores the noise.
+    /// Neither threshold lies below these multiples of the gradient's noise (low, high); 0 ignores
+    /// the noise.
     pub noise_factors: [f32; 2],
 }
 
 impl Default for EdgeParams {
     fn default() -> Self {
-        // Thresholds that rise with the noise are for noisy cameras: a picture that fills the image with texture
-        // looks like noise, so they stay off. Factors of 2.5 and 6 leave almost no edge pixel to noise.
+        // Thresholds that rise with the noise are for noisy cameras: a picture that fills the image
+        // with texture looks like noise, so they stay off. Factors of 2.5 and 6 leave almost no
+        // edge pixel to noise.
         Self { alpha: 1.0, low: 6.0, high: 15.0, noise_factors: [0.0, 0.0] }
     }
 }
@@ -45,8 +49,8 @@ impl Default for EdgeParams {
 /// Mark of a pixel that becomes an edge pixel if it is connected to one.
 const WEAK: u8 = 2;
 
-/// Edge pixels with the gradient of the whole image. Planes are row-major, `width * height` long. The working
-/// memory stays with the map, for [`edges_into`].
+/// Edge pixels with the gradient of the whole image. Planes are row-major, `width * height` long.
+/// The working memory stays with the map, for [`edges_into`].
 #[derive(Debug, Clone, Default)]
 pub struct EdgeMap {
     width: usize,
@@ -93,8 +97,8 @@ impl EdgeMap {
         &self.marks
     }
 
-    /// Row-major indices of the edge pixels, ascending, thinned to lines one pixel wide. At most [`MAX_EDGE_POINTS`],
-    /// none within `BORDER_PX` of the border.
+    /// Row-major indices of the edge pixels, ascending, thinned to lines one pixel wide. At most
+    /// [`MAX_EDGE_POINTS`], none within `BORDER_PX` of the border.
     pub fn pixels(&self) -> &[u32] {
         &self.pixels
     }
@@ -105,13 +109,13 @@ impl EdgeMap {
         Vector2::new(self.gx[at], self.gy[at])
     }
 
-    /// Sub-pixel position of the edge through edge pixel `at` (row-major index, off the border): the vertex of a
-    /// parabola along the gradient, at most half a step away.
+    /// Sub-pixel position of the edge through edge pixel `at` (row-major index, off the border):
+    /// the vertex of a parabola along the gradient, at most half a step away.
     ///
-    /// Departs from method 1.2, where the parabola goes through the magnitudes m: here it goes through `1 /
-    /// sqrt(m)`. The filter answers a step by `(1 + a |x|) exp(-a |x|)`, which is more pointed than a parabola:
-    /// that pulled positions to the middle of the pixel, by up to 0.05 px, and by the same amount everywhere along
-    /// a diagonal side.
+    /// Departs from method 1.2, where the parabola goes through the magnitudes m: here it goes
+    /// through `1 / sqrt(m)`. The filter answers a step by `(1 + a |x|) exp(-a |x|)`, which is more
+    /// pointed than a parabola: that pulled positions to the middle of the pixel, by up to 0.05 px,
+    /// and by the same amount everywhere along a diagonal side.
     pub fn position_px(&self, at: usize) -> Point2<f64> {
         let (behind, ahead, step) = self.along_gradient(at);
         // Roots, and numerator and denominator times all three.
@@ -135,7 +139,8 @@ impl EdgeMap {
         self
     }
 
-    /// Magnitudes one step against and along the gradient, interpolated between neighbours, and that step.
+    /// Magnitudes one step against and along the gradient, interpolated between neighbours, and
+    /// that step.
     fn along_gradient(&self, at: usize) -> (f32, f32, Vector2<f32>) {
         let (gx, gy) = (self.gx[at], self.gy[at]);
         let (ax, ay) = (gx.abs(), gy.abs());
@@ -169,7 +174,8 @@ pub fn edges<'a>(image: impl Into<PictureRef<'a>>, p: &EdgeParams) -> EdgeMap {
     map
 }
 
-/// [`edges`], in the memory of an earlier map of any picture: about a third faster when it had the same size.
+/// [`edges`], in the memory of an earlier map of any picture: about a third faster when it had the
+/// same size.
 pub fn edges_into<'a>(image: impl Into<PictureRef<'a>>, p: &EdgeParams, map: &mut EdgeMap) {
     map.fill(Level::new(), image.into(), p, MAX_EDGE_POINTS);
 }
@@ -206,8 +212,9 @@ impl EdgeMap {
         thin(&mut self.marks, width, strength, &mut self.pixels, &mut self.stack);
     }
 
-    /// Standard deviation of each gradient component in the smoothest parts of the image: the magnitude of noise
-    /// alone has a Rayleigh distribution, whose lower quartile stands 0.7585 sigma high.
+    /// Standard deviation of each gradient component in the smoothest parts of the image: the
+    /// magnitude of noise alone has a Rayleigh distribution, whose lower quartile stands 0.7585
+    /// sigma high.
     fn noise(&self) -> f32 {
         // A prime stride meets every column.
         let mut sample: Vec<f32> =

@@ -15,8 +15,8 @@ fn normal_integral(x: f64) -> f64 {
     if x < 0.0 { tail } else { 1.0 - tail }
 }
 
-/// A straight edge of 80 levels, `shift` from the middle along `normal`, blurred like a lens does and then averaged
-/// over the pixels.
+/// A straight edge of 80 levels, `shift` from the middle along `normal`, blurred like a lens does
+/// and then averaged over the pixels.
 fn picture(normal: Vector2<f64>, shift: f64, blur_px: f64, sigma: f64, noise: &mut Noise) -> GrayImage {
     GrayImage::from_fn(SIDE_PX, SIDE_PX, |u, v| {
         let offset = |i: usize| (i as f64 + 0.5) / 4.0 - 0.5 - MIDDLE_PX;
@@ -27,11 +27,13 @@ fn picture(normal: Vector2<f64>, shift: f64, blur_px: f64, sigma: f64, noise: &m
     })
 }
 
-/// Distances of the edge points from their true line, one list a picture, over many directions and sub-pixel shifts.
+/// Distances of the edge points from their true line, one list a picture, over many directions and
+/// sub-pixel shifts.
 fn distances(blur_px: f64, sigma: f64) -> Vec<Vec<f64>> {
     let mut noise = Noise(3);
     let mut all = vec![];
-    // The main directions, where all points of a side have the same fraction of a pixel, and others.
+    // The main directions, where all points of a side have the same fraction of a pixel, and
+    // others.
     let degrees =
         (0..8).map(|i| 45.0 * f64::from(i)).chain((0..13).map(|i| f64::from(i) * 360.0 / 13.0 + 4.0));
     for angle in degrees.map(f64::to_radians) {
@@ -49,8 +51,9 @@ fn distances(blur_px: f64, sigma: f64) -> Vec<Vec<f64>> {
 
 #[test]
 fn edge_points_have_no_bias_at_any_angle_shift_blur_and_noise() {
-    // Noise in grey levels and blur in px; then, in px, the bounds of: root mean square of the points, root mean square
-    // of the mean over a side, the largest such mean, and the mean of all. Measured: about nine tenths of each.
+    // Noise in grey levels and blur in px; then, in px, the bounds of: root mean square of the
+    // points, root mean square of the mean over a side, the largest such mean, and the mean of all.
+    // Measured: about nine tenths of each.
     let cases = [
         (0.3, [0.5, 0.007, 0.0044, 0.0125, 0.001]),
         (0.3, [2.0, 0.015, 0.006, 0.0175, 0.001]),

@@ -78,7 +78,8 @@ fn contrast_scales_with_the_thresholds() {
 
 #[test]
 fn a_fading_edge_is_followed_both_ways() {
-    // Step height 40 at one end, 2 at the other: kept down to the low threshold, whichever end is up.
+    // Step height 40 at one end, 2 at the other: kept down to the low threshold, whichever end is
+    // up.
     let fading = |v: usize| 40.0 - 39.0 * v as f64 / 199.0;
     let image = |up: bool| {
         GrayImage::from_fn(40, 200, |u, v| {

@@ -1,17 +1,19 @@
-//! Edge mask in, the same mask one pixel wide out (method 1.2), and the number of branches that meet in a pixel.
+//! Edge mask in, the same mask one pixel wide out (method 1.2), and the number of branches that
+//! meet in a pixel.
 //!
-//! Both look only at the ring of eight neighbours, coded as one byte; the answers for all 256 codes are tables made
-//! at compile time.
+//! Both look only at the ring of eight neighbours, coded as one byte; the answers for all 256 codes
+//! are tables made at compile time.
 
 /// Mark of an edge pixel; all others have mark 0.
 pub(crate) const EDGE: u8 = 1;
 
-/// The ring of neighbours (du, dv), clockwise on screen from the one above. Bit i of a ring code is neighbour i.
+/// The ring of neighbours (du, dv), clockwise on screen from the one above. Bit i of a ring code is
+/// neighbour i.
 pub(crate) const RING: [(i32, i32); 8] =
     [(0, -1), (1, -1), (1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1)];
 
-/// Whether the pixel is the corner of a staircase: two neighbours side to side with it at a right angle, and all
-/// neighbours still touch each other without it.
+/// Whether the pixel is the corner of a staircase: two neighbours side to side with it at a right
+/// angle, and all neighbours still touch each other without it.
 const REMOVABLE: [bool; 256] = {
     let mut table = [false; 256];
     let mut code = 0;
@@ -28,7 +30,8 @@ const REMOVABLE: [bool; 256] = {
     table
 };
 
-/// Number of 8-connected groups among the neighbours: 1 at an end, 2 along a line, 3 and more at a junction.
+/// Number of 8-connected groups among the neighbours: 1 at an end, 2 along a line, 3 and more at a
+/// junction.
 pub(crate) const BRANCHES: [u8; 256] = {
     let mut table = [0; 256];
     let mut code = 0;
@@ -49,7 +52,8 @@ const fn branches(code: usize) -> u8 {
     while i < 8 {
         let (here, next, after) = ((code >> i) & 1, (code >> ((i + 1) % 8)) & 1, (code >> ((i + 2) % 8)) & 1);
         set += here;
-        // Along the ring, and across its corners: the neighbours above and to the right touch diagonally.
+        // Along the ring, and across its corners: the neighbours above and to the right touch
+        // diagonally.
         touches += here & next;
         touches += here & after & (1 - next) & (1 - (i as usize & 1));
         i += 1;
@@ -58,7 +62,8 @@ const fn branches(code: usize) -> u8 {
     if touches >= set { 1 } else { (set - touches) as u8 }
 }
 
-/// Ring codes of the 3x3 blocks, whose pixels count row by row from bit 0; the centre does not matter.
+/// Ring codes of the 3x3 blocks, whose pixels count row by row from bit 0; the centre does not
+/// matter.
 const RINGS: [u8; 512] = {
     let mut table = [0; 512];
     let mut block = 0;
@@ -75,8 +80,9 @@ const RINGS: [u8; 512] = {
     table
 };
 
-/// Ring code of pixel `at`: which neighbours have bit [`EDGE`] in a row-major plane. The pixel must lie off the
-/// border by two rows. For planes at rest: reading four marks at once stalls when one of them was just written.
+/// Ring code of pixel `at`: which neighbours have bit [`EDGE`] in a row-major plane. The pixel must
+/// lie off the border by two rows. For planes at rest: reading four marks at once stalls when one
+/// of them was just written.
 #[inline]
 pub(crate) fn ring_code(marks: &[u8], width: usize, at: usize) -> usize {
     // Three neighbouring marks, their bits side by side.
@@ -97,9 +103,9 @@ pub(crate) fn changing_ring_code(marks: &[u8], width: usize, at: usize) -> usize
         | (bit(below[1], 4) | bit(below[0], 5) | bit(level[0], 6) | bit(above[0], 7))
 }
 
-/// Clears staircase corners in both `marks` and `pixels` (row-major, none within two rows of the border). Of two
-/// corners that touch, the weaker is removed: the choice must not depend on the orientation of the image. `corners`
-/// is scratch.
+/// Clears staircase corners in both `marks` and `pixels` (row-major, none within two rows of the
+/// border). Of two corners that touch, the weaker is removed: the choice must not depend on the
+/// orientation of the image. `corners` is scratch.
 pub(crate) fn thin(
     marks: &mut [u8],
     width: usize,
@@ -129,7 +135,8 @@ pub(crate) fn thin(
     keep(pixels, |at| marks[at] == EDGE);
 }
 
-/// Keeps the pixels that pass. Unlike `retain`, without a branch on the outcome, which is unpredictable here.
+/// Keeps the pixels that pass. Unlike `retain`, without a branch on the outcome, which is
+/// unpredictable here.
 pub(crate) fn keep(pixels: &mut Vec<u32>, mut passes: impl FnMut(usize) -> bool) {
     let mut count = 0;
     for i in 0..pixels.len() {

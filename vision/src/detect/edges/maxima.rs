@@ -1,6 +1,6 @@
-//! Gradient rows in, the pixels out whose magnitude no neighbour along the gradient exceeds (method 1.2). Sees each
-//! row while it is in the cache; keeps the magnitudes of three rows. Thresholds for whole edges are not applied
-//! here.
+//! Gradient rows in, the pixels out whose magnitude no neighbour along the gradient exceeds (method
+//! 1.2). Sees each row while it is in the cache; keeps the magnitudes of three rows. Thresholds for
+//! whole edges are not applied here.
 
 #![expect(
     clippy::inline_always,
@@ -114,8 +114,8 @@ impl Scan<'_> {
         }
     }
 
-    /// Which pixels of one vector are maxima of at least `low`, one bit each. Magnitudes stand out by one on each
-    /// side.
+    /// Which pixels of one vector are maxima of at least `low`, one bit each. Magnitudes stand out
+    /// by one on each side.
     #[inline(always)]
     fn among<S: Simd>(&self, s: S, low: f32) -> u64 {
         let m = |row: usize, u: usize| load(s, self.magnitudes[row], u);
@@ -127,7 +127,8 @@ impl Scan<'_> {
         let [gx, gy] = self.gradient.map(|row| load(s, row, 0));
         let (ax, ay) = (gx.abs(), gy.abs());
         let (left, up, flat) = (gx.simd_lt(0.0), gy.simd_lt(0.0), ax.simd_gt(ay));
-        // The gradient leaves the pixel between a straight and a diagonal neighbour, and enters it opposite.
+        // The gradient leaves the pixel between a straight and a diagonal neighbour, and enters it
+        // opposite.
         let ((above_l, above_r), (below_l, below_r)) = ((m(0, 0), m(0, 2)), (m(2, 0), m(2, 2)));
         let (ahead_l, ahead_r) = (up.select(above_l, below_l), up.select(above_r, below_r));
         let (behind_l, behind_r) = (up.select(below_l, above_l), up.select(below_r, above_r));
@@ -142,7 +143,8 @@ impl Scan<'_> {
         let centre = centre * major;
         let behind = straight[0] * (major - minor) + diagonal[0] * minor;
         let ahead = straight[1] * (major - minor) + diagonal[1] * minor;
-        // A step between two pixels gives two equal maxima; rounding must not let both or neither win.
+        // A step between two pixels gives two equal maxima; rounding must not let both or neither
+        // win.
         let maximum = (centre * (1.0 - TIE)).simd_gt(behind) & centre.simd_ge(ahead * (1.0 - TIE));
         (maximum & strong).to_bitmask()
     }

@@ -1,4 +1,5 @@
-//! Sixteen image rows in, one vector a column out, and back: the transpositions around a filter along rows.
+//! Sixteen image rows in, one vector a column out, and back: the transpositions around a filter
+//! along rows.
 
 #![expect(
     clippy::inline_always,
@@ -19,7 +20,8 @@ pub(crate) struct Column(pub(crate) [f32; LANES]);
 #[inline(always)]
 pub(crate) fn columns<S: Simd>(s: S, rows: &[&[u8]; LANES], u: usize) -> [u8x16<S>; LANES] {
     let mut tile = rows.map(|row| u8x16::from_slice(s, &row[u..u + LANES]));
-    // Interleaving the halves turns the index of a byte, row then column, by one bit; after four rounds by half.
+    // Interleaving the halves turns the index of a byte, row then column, by one bit; after four
+    // rounds by half.
     for _ in 0..LANES.ilog2() {
         let halves = tile;
         for i in 0..LANES / 2 {

@@ -1,6 +1,6 @@
-//! The gradients of a colour picture: at each pixel those of the plane with the strongest step (method 1.1). In: red,
-//! green and blue. Out: two gradient planes, as of a grey image. Three planes are filtered side by side, and their rows
-//! combined while they are in the cache.
+//! The gradients of a colour picture: at each pixel those of the plane with the strongest step
+//! (method 1.1). In: red, green and blue. Out: two gradient planes, as of a grey image. Three
+//! planes are filtered side by side, and their rows combined while they are in the cache.
 
 #![expect(
     clippy::inline_always,
@@ -15,9 +15,9 @@ use fearless_simd::{Select, Simd, prelude::*};
 
 /// Weights of red, green and blue in the gradient of the grey image, [`crate::frame::luma`].
 const GREY: [f32; COLOUR_PLANES] = [0.299, 0.587, 0.114];
-/// Where grey falls along the gradient of the strongest plane by more than this share of it, the gradient is turned
-/// round. Equal and opposite steps of two planes, one of them green, leave grey 0.17 of their height: there the
-/// plane that happens to be the stronger must not decide.
+/// Where grey falls along the gradient of the strongest plane by more than this share of it, the
+/// gradient is turned round. Equal and opposite steps of two planes, one of them green, leave grey
+/// 0.17 of their height: there the plane that happens to be the stronger must not decide.
 const GREY_DECIDES: f32 = 1.0 / 6.0;
 
 /// Working memory, reused from picture to picture.
@@ -28,12 +28,12 @@ pub(crate) struct ColourMemory {
     rows: [[Vec<f32>; 2]; COLOUR_PLANES],
 }
 
-/// Fills the planes (gx, gy) as [`crate::detect::edges::deriche::gradients`] does. Where all three planes are equal the
-/// gradient is that of the grey image, bit for bit.
+/// Fills the planes (gx, gy) as [`crate::detect::edges::deriche::gradients`] does. Where all three
+/// planes are equal the gradient is that of the grey image, bit for bit.
 ///
-/// A gradient has one direction for all planes, and two signs. It points to the side that is brighter in grey; where
-/// that side is hardly brighter, to the one where the strongest plane rises. So it is the same all along the edge
-/// between two colours.
+/// A gradient has one direction for all planes, and two signs. It points to the side that is
+/// brighter in grey; where that side is hardly brighter, to the one where the strongest plane
+/// rises. So it is the same all along the edge between two colours.
 #[inline(always)]
 pub(crate) fn colour_gradients<S: Simd>(
     s: S,
@@ -85,7 +85,8 @@ fn strongest<S: Simd>(s: S, rows: &[[Vec<f32>; 2]; COLOUR_PLANES], [gx, gy]: Pla
     }
 }
 
-/// The strongest of the gradients of red, green and blue at one pixel, green before red before blue of equal ones.
+/// The strongest of the gradients of red, green and blue at one pixel, green before red before blue
+/// of equal ones.
 #[inline(always)]
 fn strongest_of([r, g, b]: [[f32; 2]; COLOUR_PLANES]) -> [f32; 2] {
     let square = |[x, y]: [f32; 2]| x * x + y * y;

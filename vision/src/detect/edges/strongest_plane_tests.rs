@@ -68,7 +68,8 @@ fn equal_planes_give_the_gradient_of_grey_bit_for_bit() {
 
 #[test]
 fn the_strongest_plane_gives_the_gradient() {
-    // Steps of red, green and blue, and the step expected: signed as grey, or as itself where grey hardly changes.
+    // Steps of red, green and blue, and the step expected: signed as grey, or as itself where grey
+    // hardly changes.
     let cases = [
         ([40, 10, 0], 40.0),
         ([10, 40, -5], 40.0),

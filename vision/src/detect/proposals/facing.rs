@@ -1,8 +1,9 @@
-//! Quad proposals from two segments that face each other, their ends the corners. The other two sides of a small,
-//! blurred or rounded object are too short to be segments. In: segments. Out: rough corners; `quad_proposals` checks
-//! their sides.
+//! Quad proposals from two segments that face each other, their ends the corners. The other two
+//! sides of a small, blurred or rounded object are too short to be segments. In: segments. Out:
+//! rough corners; `quad_proposals` checks their sides.
 //!
-//! Departs from method 2, where the sides of such a pair are scored by cues: here the gradient decides.
+//! Departs from method 2, where the sides of such a pair are scored by cues: here the gradient
+//! decides.
 
 use crate::detect::segments::edge_segments::EdgeSegment;
 use nalgebra::Point2;
@@ -25,11 +26,11 @@ const MIN_ACROSS_RATIO: f64 = 0.5;
 pub struct Partner {
     /// Index of the other segment.
     pub other: usize,
-    /// First end of the one, its other end, that of the other across from it, and across from the first.
+    /// First end of the one, its other end, that of the other across from it, and across from the
+    /// first.
     pub corners_px: [Point2<f64>; 4],
-    /// How far the two are from being opposite sides of a rectangle whose inside is brighter or darker all round,
-    /// from
-    /// 0.
+    /// How far the two are from being opposite sides of a rectangle whose inside is brighter or
+    /// darker all round, from 0.
     pub slack: f64,
 }
 

@@ -1,9 +1,10 @@
-//! Quad proposals, the default instead of the paper's two relaxations. Segments that meet in corners are followed
-//! round: four in a circle, or three with the fourth side searched in the gradient planes, or two that face each
-//! other. Edges must support all four sides. In: segments. Out: proposals; `suppression` decides which become quads.
+//! Quad proposals, the default instead of the paper's two relaxations. Segments that meet in
+//! corners are followed round: four in a circle, or three with the fourth side searched in the
+//! gradient planes, or two that face each other. Edges must support all four sides. In: segments.
+//! Out: proposals; `suppression` decides which become quads.
 //!
-//! Departs from method 3.3, 3.4: there a segment takes part in one pair and a pair in one quad, and one side
-//! without a segment loses the quad. Measurements: docs/method/24-default-detector.md.
+//! Departs from method 3.3, 3.4: there a segment takes part in one pair and a pair in one quad, and
+//! one side without a segment loses the quad. Measurements: docs/method/24-default-detector.md.
 
 use crate::detect::{
     edge_support::{coarse_support::fit_of, gradients::Gradients, side_support::run_end},
@@ -121,7 +122,8 @@ impl BestProposals {
         }
     }
 
-    /// Equally tight proposals keep their order, so the result does not depend on when this is called.
+    /// Equally tight proposals keep their order, so the result does not depend on when this is
+    /// called.
     fn prune(&mut self) {
         self.found.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.sides.cmp(&y.1.sides)));
         self.found.truncate(MAX_PROPOSALS);
@@ -168,7 +170,8 @@ fn corners(segments: &[EdgeSegment], order: &[usize], p: &ProposalParams) -> Cor
     table
 }
 
-/// Which end of the segment the corner belongs to and how far that end misses it; none when too far.
+/// Which end of the segment the corner belongs to and how far that end misses it; none when too
+/// far.
 fn end_at(segment: &EdgeSegment, corner: &Point2<f64>, p: &ProposalParams) -> Option<(usize, f64)> {
     let length = segment.length_px;
     let t = (corner - segment.p_px).dot(&(segment.q_px - segment.p_px)) / length;
@@ -200,8 +203,8 @@ fn chains_from(table: &CornerTable, a: usize, a_end: usize, mut found: impl FnMu
     }
 }
 
-/// Adds the quads that a fourth segment closes. Each is added once: its smallest index first, in the direction with
-/// the smaller second index.
+/// Adds the quads that a fourth segment closes. Each is added once: its smallest index first, in
+/// the direction with the smaller second index.
 fn closed(table: &CornerTable, chain: &Chain, found: &mut BestProposals) {
     let (a, b, c) = (chain.a, chain.ab.other, chain.bc.other);
     for cd in &table[c][1 - chain.bc.other_end] {
@@ -225,7 +228,8 @@ fn clockwise(mut sides: [Option<usize>; 4], mut corners_px: [Point2<f64>; 4]) ->
     QuadSeed { sides, corners_px, similarity: 1.0, fit: 0.0 }
 }
 
-/// Adds quads of three segments whose fourth side lies where the edges along the two outer ones end.
+/// Adds quads of three segments whose fourth side lies where the edges along the two outer ones
+/// end.
 fn complete(
     segments: &[EdgeSegment],
     table: &CornerTable,
@@ -257,7 +261,8 @@ fn complete(
                     found.add(looseness, seed);
                 };
                 add(from, to);
-                // One of the two may be broken off early or run on: a fourth side parallel to the second instead.
+                // One of the two may be broken off early or run on: a fourth side parallel to the
+                // second instead.
                 let side_a = chain.ab.at - from;
                 let side_c = chain.bc.at - to;
                 if side_a.norm() > 0.0 && side_c.norm() > 0.0 && base.norm() > 0.0 {

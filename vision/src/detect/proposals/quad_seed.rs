@@ -1,4 +1,5 @@
-//! A quad proposal: four sides, some of them without a segment, and their corners; tests of plausibility and overlap.
+//! A quad proposal: four sides, some of them without a segment, and their corners; tests of
+//! plausibility and overlap.
 
 use crate::{detect::segments::edge_segments::EdgeSegment, geometry::polygon};
 use nalgebra::Point2;
@@ -9,7 +10,8 @@ pub const CORNER_MARGIN_PX: f64 = 20.0;
 /// Four segments proposed as the sides of one quad.
 #[derive(Debug, Clone, PartialEq)]
 pub struct QuadSeed {
-    /// Segments in clockwise order; side i runs from corner i to corner i+1. None for a side that no segment gave.
+    /// Segments in clockwise order; side i runs from corner i to corner i+1. None for a side that
+    /// no segment gave.
     pub sides: [Option<usize>; 4],
     /// Intersections of the supporting lines, clockwise on screen.
     pub corners_px: [Point2<f64>; 4],
@@ -72,7 +74,8 @@ impl Extent {
 
 pub(crate) type Bounds = (Point2<f64>, Point2<f64>);
 
-/// Where the supporting lines of two segments meet; none when they are parallel to within about 1 degree.
+/// Where the supporting lines of two segments meet; none when they are parallel to within about 1
+/// degree.
 pub(crate) fn corner_of(a: &EdgeSegment, b: &EdgeSegment) -> Option<Point2<f64>> {
     let determinant = a.normal.perp(&b.normal);
     (determinant.abs() > 0.02).then(|| {

@@ -1,5 +1,6 @@
-//! Sub-pixel corners (method 3.6): a rough quad and the gradient planes in, corners with covariance, side support and
-//! clipping out. Also the rule for the top-left corner. Does not select quads.
+//! Sub-pixel corners (method 3.6): a rough quad and the gradient planes in, corners with
+//! covariance, side support and clipping out. Also the rule for the top-left corner. Does not
+//! select quads.
 
 use crate::{
     detect::edge_support::{
@@ -15,7 +16,8 @@ use nalgebra::{Matrix2, Point2, Vector2};
 const CLIP_PX: f64 = 2.0;
 /// Standard deviation of a side without edge points.
 const UNFITTED_SIGMA_PX: f64 = 2.0;
-/// If a second choice of the top-left corner is within this angle, recognition tries all rotations (method 4).
+/// If a second choice of the top-left corner is within this angle, recognition tries all rotations
+/// (method 4).
 pub const UPRIGHT_MARGIN_DEG: f64 = 15.0;
 
 /// A quad after refitting.
@@ -45,9 +47,9 @@ impl RefinedQuad {
     }
 }
 
-/// Refits the four sides on the edge points near them and intersects. `corners_px` is clockwise on screen. None
-/// when the result is not a convex quad, a corner moved by more than `search.reach_px` times four, or a side has
-/// less support than `search.least_support`.
+/// Refits the four sides on the edge points near them and intersects. `corners_px` is clockwise on
+/// screen. None when the result is not a convex quad, a corner moved by more than `search.reach_px`
+/// times four, or a side has less support than `search.least_support`.
 pub fn refine(g: &Gradients, corners_px: &[Point2<f64>; 4], search: EdgeProbeParams) -> Option<RefinedQuad> {
     let mut points = [const { None }; 4];
     for (i, points) in points.iter_mut().enumerate() {
@@ -102,8 +104,8 @@ fn near_border(g: &Gradients, p: &Point2<f64>) -> bool {
     p.x < CLIP_PX || p.y < CLIP_PX || p.x > width - 1.0 - CLIP_PX || p.y > height - 1.0 - CLIP_PX
 }
 
-/// Whether the second most upright choice leans at most 15 degrees more than the given, most upright one, where
-/// gravity points to `down` in the image.
+/// Whether the second most upright choice leans at most 15 degrees more than the given, most
+/// upright one, where gravity points to `down` in the image.
 pub fn upright_ambiguous(corners: &Corners, down: &Vector2<f64>) -> bool {
     let best = corners.lean_rad(down);
     (1..4).any(|shift| corners.rotated(shift).lean_rad(down) - best < UPRIGHT_MARGIN_DEG.to_radians())
@@ -155,7 +157,8 @@ mod tests {
 
     #[test]
     fn corner_covariance_agrees_with_sampling() {
-        // Two lines at 60 degrees with offsets of known variance: the corner's spread over a grid of disturbances.
+        // Two lines at 60 degrees with offsets of known variance: the corner's spread over a grid
+        // of disturbances.
         let (sa, sb) = (0.2_f64, 0.5_f64);
         let na = Vector2::new(0.0, 1.0);
         let nb = Vector2::new(60.0_f64.to_radians().sin(), 60.0_f64.to_radians().cos());

@@ -1,6 +1,6 @@
-//! Refits sides at full resolution: quads of a large image are detected at a working scale, where localisation is
-//! several times coarser. In: quads in coordinates of the full image. Out: the same quads with refined corners,
-//! none dropped.
+//! Refits sides at full resolution: quads of a large image are detected at a working scale, where
+//! localisation is several times coarser. In: quads in coordinates of the full image. Out: the same
+//! quads with refined corners, none dropped.
 
 use crate::{
     detect::{
@@ -70,8 +70,9 @@ struct Window {
 }
 
 impl Window {
-    /// The bounding box of the corners, wider by `margin` on all sides, clipped to an image of some size. It touches the image
-    /// border only where the quad is near it, so no other quad is taken for clipped.
+    /// The bounding box of the corners, wider by `margin` on all sides, clipped to an image of some
+    /// size. It touches the image border only where the quad is near it, so no other quad is taken
+    /// for clipped.
     fn around(corners: &Corners, margin: usize, (width, height): (usize, usize)) -> Self {
         let span = |at: fn(&nalgebra::Point2<f64>) -> f64, size: usize| {
             let values = corners.points().map(|c| at(&c));
@@ -102,7 +103,8 @@ impl Window {
         GrayImage::new(self.width, self.height, data).unwrap_or_else(|_| image.clone())
     }
 
-    /// The corners shifted by the window's origin: `sign` 1 to image coordinates, -1 to window coordinates.
+    /// The corners shifted by the window's origin: `sign` 1 to image coordinates, -1 to window
+    /// coordinates.
     fn moved(&self, corners: &Corners, sign: f64) -> Option<Corners> {
         let shift = Vector2::new(self.left as f64, self.top as f64) * sign;
         Corners::new(corners.points().map(|c| c + shift)).ok()

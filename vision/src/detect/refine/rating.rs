@@ -1,5 +1,5 @@
-//! Quad proposals in, the best of them refitted and scored by the edges along their sides out. They may conflict with
-//! each other; `suppression` decides which stay.
+//! Quad proposals in, the best of them refitted and scored by the edges along their sides out. They
+//! may conflict with each other; `suppression` decides which stay.
 
 use crate::detect::{
     edge_support::{gradients::Gradients, side_support::EdgeProbeParams},
@@ -35,8 +35,8 @@ impl ScoredQuad {
     }
 }
 
-/// Refits the seeds, best first, and drops those whose sides the gradient does not support. A share is reserved for
-/// small seeds: large ones on a crowded wall would take every place.
+/// Refits the seeds, best first, and drops those whose sides the gradient does not support. A share
+/// is reserved for small seeds: large ones on a crowded wall would take every place.
 pub fn score_proposals(seeds: &[QuadSeed], g: &Gradients, p: &QuadParams) -> Vec<ScoredQuad> {
     let mut order: Vec<(f64, &QuadSeed)> = seeds.iter().map(|s| (s.fit * size(&s.corners_px), s)).collect();
     order.sort_by(|a, b| b.0.total_cmp(&a.0));

@@ -10,8 +10,8 @@ use crate::detect::{
     refine::corners::refine,
 };
 
-/// Refits a chosen quad with all samples. A quad of a coarser scale may have no edges here: then it is returned
-/// unchanged.
+/// Refits a chosen quad with all samples. A quad of a coarser scale may have no edges here: then it
+/// is returned unchanged.
 pub fn refit_corners(quad: Quad, g: &Gradients, p: &QuadParams) -> Quad {
     let search = EdgeProbeParams {
         reach_px: p.refit_reach_px,

@@ -1,7 +1,7 @@
 //! Edge map in, chains of edge points out (method 1.2): tracing, then bridging of small gaps.
 //!
-//! A chain keeps one polarity: the brighter side never changes over. Corners stay inside chains; finding the straight
-//! parts is the next stage's work.
+//! A chain keeps one polarity: the brighter side never changes over. Corners stay inside chains;
+//! finding the straight parts is the next stage's work.
 
 use crate::detect::{
     edges::{
@@ -12,7 +12,8 @@ use crate::detect::{
 };
 use nalgebra::{Point2, Vector2};
 
-/// Most points of a chain; a longer edge goes on in a further chain. Bounds the work of splitting a chain.
+/// Most points of a chain; a longer edge goes on in a further chain. Bounds the work of splitting a
+/// chain.
 pub const MAX_CHAIN_POINTS: usize = 4096;
 
 /// A point of an edge.
@@ -24,7 +25,8 @@ pub struct EdgePoint {
     pub gradient: Vector2<f32>,
 }
 
-/// Edge points in the order of the edge. In a closed chain the last point is a neighbour of the first.
+/// Edge points in the order of the edge. In a closed chain the last point is a neighbour of the
+/// first.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EdgeChain {
     /// The points, at most [`MAX_CHAIN_POINTS`].
@@ -104,8 +106,8 @@ impl<'a> Tracer<'a> {
         (self.pixels, self.runs)
     }
 
-    /// Follows free pixels from `at` as long as the edge goes on, then, if it did not start at an end, from `at` the
-    /// other way. Stops at junctions, which it includes.
+    /// Follows free pixels from `at` as long as the edge goes on, then, if it did not start at an
+    /// end, from `at` the other way. Stops at junctions, which it includes.
     fn trace(&mut self, at: usize) {
         let start = self.pixels.len();
         self.pixels.push(at as u32);
@@ -132,7 +134,8 @@ impl<'a> Tracer<'a> {
         }
     }
 
-    /// Appends the pixels after `at`. `sense` is the hand on which the brighter side lies; None takes either.
+    /// Appends the pixels after `at`. `sense` is the hand on which the brighter side lies; None
+    /// takes either.
     fn follow(&mut self, mut at: usize, start: usize, mut sense: Option<f32>) {
         while self.pixels.len() - start < MAX_CHAIN_POINTS {
             let Some((next, hand)) = self.next(at, sense) else { return };
@@ -145,14 +148,17 @@ impl<'a> Tracer<'a> {
         }
     }
 
-    /// The free neighbour that lies best along the edge's tangent at `at`, and the hand of the bright side.
+    /// The free neighbour that lies best along the edge's tangent at `at`, and the hand of the
+    /// bright side.
     ///
-    /// Departs from method 1.2, which takes the least change of direction: steps between pixels have eight directions
-    /// only, the gradient has them all, and it keeps a chain from changing over to an edge of the other polarity.
+    /// Departs from method 1.2, which takes the least change of direction: steps between pixels
+    /// have eight directions only, the gradient has them all, and it keeps a chain from changing
+    /// over to an edge of the other polarity.
     fn next(&self, at: usize, sense: Option<f32>) -> Option<(usize, f32)> {
         let mut best = None;
         let mut best_cos = MIN_COS_TURN;
-        // Runs between two touching junctions would be found again and again; bridging joins what they separate.
+        // Runs between two touching junctions would be found again and again; bridging joins what
+        // they separate.
         let junction = self.branches[at] >= 3;
         let mut ring = changing_ring_code(&self.free, self.edges.width(), at);
         while ring != 0 {
@@ -174,7 +180,8 @@ impl<'a> Tracer<'a> {
         best
     }
 
-    /// Cosine between a step and the tangent that has the bright side on its right, times the step's length.
+    /// Cosine between a step and the tangent that has the bright side on its right, times the
+    /// step's length.
     fn along(&self, at: usize, du: f32, dv: f32) -> f32 {
         let (gx, gy) = (self.edges.gx()[at], self.edges.gy()[at]);
         (gy * du - gx * dv) / self.edges.magnitude(at)

@@ -11,7 +11,8 @@ fn found(image: &GrayImage, p: &ChainParams) -> Vec<EdgeChain> {
     chains(&edges(image, &EdgeParams::default()), p)
 }
 
-/// Successive points are neighbours, apart from bridged gaps, and the bright side stays on one hand.
+/// Successive points are neighbours, apart from bridged gaps, and the bright side stays on one
+/// hand.
 fn check(chain: &EdgeChain, p: &ChainParams) {
     let reach = f64::from(p.max_gap_px) * 1.5 + 3.0;
     assert!(chain.points.len() >= p.min_points && chain.points.len() <= MAX_CHAIN_POINTS);
@@ -97,8 +98,8 @@ fn shared(a: &[EdgeChain], b: &[EdgeChain], map: Map) -> f64 {
     a.iter().filter(near).count() as f64 / a.len() as f64
 }
 
-/// Lengths and kinds of the chains, to a pixel or two: which pixel of a junction or a staircase stays depends on how
-/// the image lies.
+/// Lengths and kinds of the chains, to a pixel or two: which pixel of a junction or a staircase
+/// stays depends on how the image lies.
 fn same_lengths(a: &[EdgeChain], b: &[EdgeChain]) -> bool {
     let lengths = |chains: &[EdgeChain]| {
         let mut all: Vec<_> = chains.iter().map(|c| (c.closed, c.points.len())).collect();
@@ -109,7 +110,8 @@ fn same_lengths(a: &[EdgeChain], b: &[EdgeChain]) -> bool {
         && lengths(a).iter().zip(lengths(b)).all(|(a, b)| a.0 == b.0 && a.1.abs_diff(b.1) <= 2 + a.1 / 50)
 }
 
-/// A turned rectangle with noise, a disc that closes on itself, and a third that meets the rectangle in junctions.
+/// A turned rectangle with noise, a disc that closes on itself, and a third that meets the
+/// rectangle in junctions.
 fn scene() -> GrayImage {
     let turned = polygon((90, 70), &rectangle((30.0, 34.0), (33.0, 31.0), 0.4), (170.0, 80.0), 1.5, 8);
     GrayImage::from_fn(90, 70, |u, v| {

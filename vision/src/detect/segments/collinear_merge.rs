@@ -1,5 +1,5 @@
-//! Straight fragments in, fragments of one line joined out (method 1.3): corners, junctions and clutter break sides
-//! into fragments.
+//! Straight fragments in, fragments of one line joined out (method 1.3): corners, junctions and
+//! clutter break sides into fragments.
 
 use crate::geometry::line::{LineFit, LineSums};
 use nalgebra::{Point2, Vector2};
@@ -17,7 +17,8 @@ pub struct SegmentParams {
     pub merge_angle_deg: f64,
     /// A piece ends where its chain leaves the fitted line by more than this, px.
     ///
-    /// Departs from method 1.3, where a piece ends at its splits: those fall a few points beside a rounded corner.
+    /// Departs from method 1.3, where a piece ends at its splits: those fall a few points beside a
+    /// rounded corner.
     pub end_px: f64,
     /// Pieces shorter than this take no part in joining, px.
     pub min_fragment_px: f64,
@@ -29,8 +30,8 @@ pub struct SegmentParams {
     pub join_gap_share: f64,
     /// Shortest segment, as share of the image width.
     pub min_length_share: f64,
-    /// Lower and upper bound of the shortest segment, px: small images keep what noise cannot make, large ones keep
-    /// the sides of small quads.
+    /// Lower and upper bound of the shortest segment, px: small images keep what noise cannot make,
+    /// large ones keep the sides of small quads.
     ///
     /// Departs from method 1.4, which has the share of the width alone.
     pub min_length_range_px: [f64; 2],
@@ -158,14 +159,16 @@ pub(crate) fn join(fragments: Vec<Fragment>, p: &SegmentParams) -> Vec<Fragment>
     round.fragments
 }
 
-/// Fragments between two rounds. `fresh` are those that are new since the last one: two old ones have been tried.
+/// Fragments between two rounds. `fresh` are those that are new since the last one: two old ones
+/// have been tried.
 struct Round {
     fragments: Vec<Fragment>,
     fresh: Vec<bool>,
 }
 
 impl Round {
-    /// Every fragment takes, at each end, the nearest fitting fragment that is not longer than itself.
+    /// Every fragment takes, at each end, the nearest fitting fragment that is not longer than
+    /// itself.
     fn next(self, gates: &Gates) -> Self {
         let lengths: Vec<f64> = self.fragments.iter().map(Fragment::length_px).collect();
         let mut order: Vec<usize> = (0..lengths.len()).collect();
@@ -253,8 +256,8 @@ impl Grid {
         Self { columns, rows, first, items }
     }
 
-    /// The longest of those `left` in the cell of `near` or one beside it that can be joined to `whole`, and both as
-    /// one; of equals the first.
+    /// The longest of those `left` in the cell of `near` or one beside it that can be joined to
+    /// `whole`, and both as one; of equals the first.
     fn best(
         &self,
         near: Point2<f64>,

@@ -1,7 +1,7 @@
 //! Chains in, straight segments out (method 1.3, 1.4): split, fit, join, drop the short ones.
 //!
-//! Each segment knows its bright side, contrast and the variances of its line. Nothing is dropped here for its
-//! direction or surroundings.
+//! Each segment knows its bright side, contrast and the variances of its line. Nothing is dropped
+//! here for its direction or surroundings.
 
 use crate::detect::{
     edges::{edge_map::EdgeMap, maxima::BORDER_PX},
@@ -21,7 +21,8 @@ pub const CLIP_MARGIN_PX: f64 = BORDER_PX as f64 + 2.0;
 pub struct EdgeSegment {
     /// One end.
     pub p_px: Point2<f64>,
-    /// The other end. Walking from `p_px` to `q_px`, the brighter side lies to the right on screen (u right, v down).
+    /// The other end. Walking from `p_px` to `q_px`, the brighter side lies to the right on screen
+    /// (u right, v down).
     pub q_px: Point2<f64>,
     /// Distance between the ends.
     pub length_px: f64,

@@ -1,7 +1,9 @@
-//! Runs of edge pixels in, runs joined over small gaps and straight through junctions out (method 1.2).
+//! Runs of edge pixels in, runs joined over small gaps and straight through junctions out (method
+//! 1.2).
 //!
-//! Departs from method 1.2, where chains stop at junctions: a side that another edge touches would break into
-//! pieces. The two runs of a junction that agree in tangent and polarity are joined, the others end there.
+//! Departs from method 1.2, where chains stop at junctions: a side that another edge touches would
+//! break into pieces. The two runs of a junction that agree in tangent and polarity are joined, the
+//! others end there.
 
 use crate::detect::edges::edge_map::EdgeMap;
 use nalgebra::Vector2;
@@ -47,7 +49,8 @@ struct End {
     gradient: Vector2<f32>,
 }
 
-/// Hands every joined run to `emit`: pixel indices in order, and whether it is closed. Closest ends are joined first.
+/// Hands every joined run to `emit`: pixel indices in order, and whether it is closed. Closest ends
+/// are joined first.
 pub(crate) fn bridged(
     edges: &EdgeMap,
     p: &ChainParams,
@@ -97,7 +100,8 @@ fn links(edges: &EdgeMap, p: &ChainParams, pixels: &[u32], runs: &[PixelRun]) ->
     let reach = p.max_gap_px.min(MAX_GAP_PX) as i32 + 1;
     let min_cos = p.max_bend_deg.to_radians().cos();
     let mut candidates = Vec::new();
-    // Where the neighbours start, for every row of the neighbourhood: the ends are in order, so it only moves on.
+    // Where the neighbours start, for every row of the neighbourhood: the ends are in order, so it
+    // only moves on.
     let mut firsts = [0; MAX_GAP_PX as usize + 2];
     for (i, a) in ends.iter().enumerate() {
         for (dv, first) in (0..=reach).zip(&mut firsts) {

@@ -1,5 +1,6 @@
-//! The sub-pixel points of one chain in, its straight pieces out (method 1.3): recursive splitting, then merging of
-//! neighbours that are one line after all. Pieces are index ranges; lines are fitted by the caller, from running sums.
+//! The sub-pixel points of one chain in, its straight pieces out (method 1.3): recursive splitting,
+//! then merging of neighbours that are one line after all. Pieces are index ranges; lines are
+//! fitted by the caller, from running sums.
 
 use crate::geometry::line::{Line, LineSums};
 use nalgebra::Point2;
@@ -27,7 +28,8 @@ pub(crate) struct Polyline {
     y: Vec<f64>,
     /// `sums[i]` is over the first i of these points.
     sums: Vec<LineSums>,
-    /// Point i here is point `(i + turn) % n` of the chain: a closed one is turned to start at a corner.
+    /// Point i here is point `(i + turn) % n` of the chain: a closed one is turned to start at a
+    /// corner.
     pub(crate) turn: usize,
     chain_points: usize,
     closed: bool,
@@ -116,7 +118,8 @@ impl Polyline {
         }
     }
 
-    /// Moves the ends of every piece to where the chain leaves its line by more than `tolerance_px`.
+    /// Moves the ends of every piece to where the chain leaves its line by more than
+    /// `tolerance_px`.
     pub(crate) fn grow(&mut self, tolerance_px: f64) {
         let mut grown = std::mem::take(&mut self.grown);
         grown.clear();
@@ -127,7 +130,8 @@ impl Polyline {
         self.grown = grown;
     }
 
-    /// Whether a longer neighbour grew over most of grown piece `i`, which would be a second one on the same points.
+    /// Whether a longer neighbour grew over most of grown piece `i`, which would be a second one on
+    /// the same points.
     pub(crate) fn swallowed(&self, i: usize, piece: &Range<usize>) -> bool {
         let count = self.grown.len();
         let beside = [(i + 1) % count, (i + count - 1) % count];
@@ -146,8 +150,9 @@ impl Polyline {
         end.min(b.len()).saturating_sub(start) + end.min(n + b.len()).saturating_sub(n.max(start))
     }
 
-    /// Moves both ends of a piece to where the chain leaves `line` by more than `tolerance_px`: splits fall a few
-    /// points beside rounded corners. The result may exceed the buffer when the chain is closed, see [`Self::point`].
+    /// Moves both ends of a piece to where the chain leaves `line` by more than `tolerance_px`:
+    /// splits fall a few points beside rounded corners. The result may exceed the buffer when the
+    /// chain is closed, see [`Self::point`].
     pub(crate) fn ends_on(&self, piece: &Range<usize>, line: &Line, tolerance_px: f64) -> Range<usize> {
         let n = self.chain_points;
         let on = |i: usize| line.distance(&self.point(i)).abs() <= tolerance_px;
@@ -232,8 +237,8 @@ impl Polyline {
         }
     }
 
-    /// Inner point with the largest distance to the chord of `range`, if that exceeds the tolerance; the first of
-    /// equals.
+    /// Inner point with the largest distance to the chord of `range`, if that exceeds the
+    /// tolerance; the first of equals.
     fn corner(&self, range: &Range<usize>, tolerance_px: f64) -> Option<usize> {
         if range.len() < 3 {
             return None;

@@ -1,8 +1,9 @@
-//! Blanks: quads inside of which the wall goes on as outside, such as the panels of a wainscot, whose mouldings have
-//! four good sides. In: classified quads and the picture. Out: the same, blanks with the least score that is asked.
+//! Blanks: quads inside of which the wall goes on as outside, such as the panels of a wainscot,
+//! whose mouldings have four good sides. In: classified quads and the picture. Out: the same,
+//! blanks with the least score that is asked.
 //!
-//! A moulding, a groove or a shadow has an edge, but the same light, colour and texture on both sides. An object
-//! differs from the wall in one of them, or shows something.
+//! A moulding, a groove or a shadow has an edge, but the same light, colour and texture on both
+//! sides. An object differs from the wall in one of them, or shows something.
 
 use crate::{
     detect::{params::QuadParams, suppression::non_maximum::ClassifiedQuad},
@@ -11,7 +12,8 @@ use crate::{
 };
 use nalgebra::{Matrix3, Point2, Vector3};
 
-/// Strips beside a side lie this far from it: a share of the quad's mean side within two bounds, px. Mouldings are narrower.
+/// Strips beside a side lie this far from it: a share of the quad's mean side within two bounds,
+/// px. Mouldings are narrower.
 const STRIP_SHARE: f64 = 0.08;
 const STRIP_PX: [f64; 2] = [3.0, 12.0];
 /// Width of a strip, px.
@@ -26,11 +28,12 @@ const MIN_INSIDE: usize = 64;
 const MAX_INSET: f64 = 0.3;
 /// Grey levels that are added before ratios: dark pixels are mostly noise.
 const GREY_OFFSET: f64 = 8.0;
-/// Log of the ratio of inside to outside in any plane below which a side separates nothing: light differs so much on
-/// both sides of a moulding. Chosen on photoreal worlds 1 to 14 and 101 to 120 and the corridor of seed 1, as are the
-/// two others.
+/// Log of the ratio of inside to outside in any plane below which a side separates nothing: light
+/// differs so much on both sides of a moulding. Chosen on photoreal worlds 1 to 14 and 101 to 120
+/// and the corridor of seed 1, as are the two others.
 const MAX_LOG_RATIO: f64 = 0.12;
-/// The same of the median of all sides, with their signs: an object is brighter or darker than the wall on all.
+/// The same of the median of all sides, with their signs: an object is brighter or darker than the
+/// wall on all.
 const MAX_MEDIAN_LOG_RATIO: f64 = 0.04;
 /// Fewest sides with both strips in the picture.
 const MIN_SIDES: usize = 3;
@@ -110,8 +113,8 @@ fn log_ratio(plane: &GrayImage, [outside, inside]: &[Vec<Point2<f64>>; 2]) -> Op
     Some((level(inside)? / level(outside)?).ln())
 }
 
-/// How far the inside departs from a slope of light, as a share of its mean, in the plane that departs most; none
-/// where too little is in the picture.
+/// How far the inside departs from a slope of light, as a share of its mean, in the plane that
+/// departs most; none where too little is in the picture.
 fn texture(corners: &Corners, strip_px: f64, image: PictureRef) -> Option<f64> {
     let image_from_unit = Homography::square_to_quad(1, corners).ok()?;
     let length = |i: usize| (corners.points()[(i + 1) % 4] - corners.points()[i]).norm();
@@ -182,7 +185,8 @@ mod tests {
         Corners::try_from(QUAD).unwrap()
     }
 
-    /// A wall whose light falls off to the right, with `inside` of its quad's pixels changed; a dark line is the border.
+    /// A wall whose light falls off to the right, with `inside` of its quad's pixels changed; a
+    /// dark line is the border.
     fn wall(inside: impl Fn(usize, usize, [u8; 3]) -> [u8; 3]) -> Picture {
         let homography = Homography::square_to_quad(1, &corners()).unwrap().inverse().unwrap();
         Picture::from_fn(220, 170, |u, v| {

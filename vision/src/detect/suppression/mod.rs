@@ -1,4 +1,5 @@
-//! Non-maximum suppression and nested borders: overlapping quads in, the final quads out (method 3.4, 3.6).
+//! Non-maximum suppression and nested borders: overlapping quads in, the final quads out (method
+//! 3.4, 3.6).
 
 pub mod non_maximum;
 pub mod blank;

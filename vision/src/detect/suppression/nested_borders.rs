@@ -1,6 +1,6 @@
-//! The canonical border of an object (method 3.6). Frames, mats and canvases give nested near-equal quads, and an
-//! icon must not flip between them. In: quads. Out: of each group the outermost that edges support well; the others
-//! are alternates.
+//! The canonical border of an object (method 3.6). Frames, mats and canvases give nested near-equal
+//! quads, and an icon must not flip between them. In: quads. Out: of each group the outermost that
+//! edges support well; the others are alternates.
 
 use crate::{
     detect::{proposals::quad_seed::overlap_exceeds, quad::Quad},
@@ -10,7 +10,8 @@ use crate::{
 /// Most alternates kept for a quad, the outermost first.
 pub const MAX_ALTERNATES: usize = 8;
 
-/// Groups `quads` and merges each group into one. Output order: by descending score, then by corners.
+/// Groups `quads` and merges each group into one. Output order: by descending score, then by
+/// corners.
 pub fn canonical(mut quads: Vec<Quad>, nested_iou: f64, min_support: f64, tolerance_px: f64) -> Vec<Quad> {
     quads.sort_by(|a, b| b.corners_px.area_px2().total_cmp(&a.corners_px.area_px2()).then(by_corners(a, b)));
     let mut groups: Vec<Vec<Quad>> = Vec::new();
@@ -32,7 +33,8 @@ pub fn canonical(mut quads: Vec<Quad>, nested_iou: f64, min_support: f64, tolera
     chosen
 }
 
-/// The outermost well supported member; without one, the best supported. The rest become its alternates.
+/// The outermost well supported member; without one, the best supported. The rest become its
+/// alternates.
 fn merge(group: Vec<Quad>, min_support: f64) -> Quad {
     let worst_side = |q: &Quad| q.side_support.iter().copied().fold(1.0, f64::min);
     let pick = group.iter().position(|q| worst_side(q) >= min_support).unwrap_or_else(|| {

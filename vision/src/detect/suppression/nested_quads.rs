@@ -1,6 +1,6 @@
-//! Quads inside other quads (method 3.6): the content of a picture or a text box on it is no landmark, a poster on a
-//! door may be one. In: chosen quads. Out: the same with inner quads as alternates of the outer one, which
-//! recognition tries as well.
+//! Quads inside other quads (method 3.6): the content of a picture or a text box on it is no
+//! landmark, a poster on a door may be one. In: chosen quads. Out: the same with inner quads as
+//! alternates of the outer one, which recognition tries as well.
 
 use crate::{
     detect::{
@@ -10,17 +10,19 @@ use crate::{
     geometry::polygon::{self, Relation},
 };
 
-/// Most alternates of a quad including inner quads: the number of further borders that recognition tries. Inner
-/// quads beyond it stay quads.
+/// Most alternates of a quad including inner quads: the number of further borders that recognition
+/// tries. Inner quads beyond it stay quads.
 pub const MAX_WITH_NESTED: usize = 5;
-/// Two disjoint quads inside that score at least this share of the outer one make it a container: a window round
-/// its panes, a wall panel round its pictures.
+/// Two disjoint quads inside that score at least this share of the outer one make it a container: a
+/// window round its panes, a wall panel round its pictures.
 const CONTENT_SCORE_SHARE: f64 = 0.65;
-/// A quad may score this much less than an inner one and still absorb it: probabilities near 1 differ by chance.
+/// A quad may score this much less than an inner one and still absorb it: probabilities near 1
+/// differ by chance.
 const SCORE_SLACK: f64 = 0.1;
 
-/// Makes every quad inside a better one an alternate of it, outermost first. A quad that scores clearly less than
-/// the one inside absorbs nothing, nor does a container. Output order: by descending score, then by corners.
+/// Makes every quad inside a better one an alternate of it, outermost first. A quad that scores
+/// clearly less than the one inside absorbs nothing, nor does a container. Output order: by
+/// descending score, then by corners.
 pub fn absorb(mut quads: Vec<Quad>, tolerance_px: f64) -> Vec<Quad> {
     quads.sort_by(|a, b| b.corners_px.area_px2().total_cmp(&a.corners_px.area_px2()).then(by_corners(a, b)));
     let mut result: Vec<Quad> = Vec::new();

@@ -1,5 +1,6 @@
-//! Non-maximum suppression. In: scored quads that may conflict. Out: quads with their sides on borders, each more
-//! likely an object than those it conflicts with. Nested quads may both stay; quads that cross may not.
+//! Non-maximum suppression. In: scored quads that may conflict. Out: quads with their sides on
+//! borders, each more likely an object than those it conflicts with. Nested quads may both stay;
+//! quads that cross may not.
 
 use crate::{
     detect::{
@@ -23,8 +24,8 @@ use nalgebra::Point2;
 /// Most rated quads that are compared with each other, those of most weight first.
 pub const MAX_RATED: usize = 160;
 
-/// How the sides of two quads lie that are named from the corners that fit best: for each side of `a` the side of
-/// `b` that it faces, and whether both lie on one line.
+/// How the sides of two quads lie that are named from the corners that fit best: for each side of
+/// `a` the side of `b` that it faces, and whether both lie on one line.
 struct Facing {
     shared: [bool; 4],
 }
@@ -51,8 +52,8 @@ const SHARED_SIDE_PX: f64 = 4.0;
 
 /// Keeps the quads that conflict with no better one: that cross none and share an edge with none.
 ///
-/// Departs from method 3.4: its table of compatible quads is kept (disjoint and nested may stay, crossing may
-/// not), but quads are taken greedily by rank instead of by relaxation over pairs.
+/// Departs from method 3.4: its table of compatible quads is kept (disjoint and nested may stay,
+/// crossing may not), but quads are taken greedily by rank instead of by relaxation over pairs.
 pub fn suppress_overlaps(rated: Vec<ScoredQuad>, p: &QuadParams) -> Vec<Quad> {
     let mut result: Vec<Quad> = Vec::new();
     for quad in different(rated, p) {
@@ -81,8 +82,8 @@ fn different(mut rated: Vec<ScoredQuad>, p: &QuadParams) -> Vec<Quad> {
     different
 }
 
-/// Whether two quads conflict: they cross, or one edge would belong to both. Two borders of one object differ on
-/// all four sides.
+/// Whether two quads conflict: they cross, or one edge would belong to both. Two borders of one
+/// object differ on all four sides.
 fn conflict(a: &[Point2<f64>; 4], b: &[Point2<f64>; 4]) -> bool {
     match polygon::relation(a, b, SHARED_SIDE_PX) {
         Relation::Disjoint => false,
@@ -100,9 +101,10 @@ pub struct ClassifiedQuad {
     pub features: [f64; QUAD_FEATURES],
 }
 
-/// Moves the sides of the rated quads, by rank, to the lines that look most like borders, and classifies them as
-/// objects. A quad that conflicts with one of at least `sure_probability` is skipped. All classified quads are
-/// returned, at most [`MAX_CLASSIFIED`]. The previous border of a quad stays among its alternates.
+/// Moves the sides of the rated quads, by rank, to the lines that look most like borders, and
+/// classifies them as objects. A quad that conflicts with one of at least `sure_probability` is
+/// skipped. All classified quads are returned, at most [`MAX_CLASSIFIED`]. The previous border of a
+/// quad stays among its alternates.
 pub fn snap_sides(rated: Vec<ScoredQuad>, g: &Gradients, p: &QuadParams) -> Vec<ClassifiedQuad> {
     let border_model = p.side_network();
     let classifier = p.thing_network();
@@ -135,8 +137,9 @@ pub fn snap_sides(rated: Vec<ScoredQuad>, g: &Gradients, p: &QuadParams) -> Vec<
     classified
 }
 
-/// Non-maximum suppression by probability; above `sure_probability` by rank. Exception: a quad replaces the quads
-/// that it conflicts with if all of them are parts of it (a window and its panes) and none is clearly better.
+/// Non-maximum suppression by probability; above `sure_probability` by rank. Exception: a quad
+/// replaces the quads that it conflicts with if all of them are parts of it (a window and its
+/// panes) and none is clearly better.
 pub fn suppress_non_maxima(mut classified: Vec<ClassifiedQuad>, p: &QuadParams) -> Vec<Quad> {
     let mut result: Vec<Quad> = Vec::new();
     let likely = |s: &ClassifiedQuad| s.quad.score.min(p.sure_probability);
@@ -164,8 +167,8 @@ fn conflict_or_same(a: &[Point2<f64>; 4], b: &[Point2<f64>; 4]) -> bool {
     overlap_exceeds(a, b, SAME_IOU) || conflict(a, b)
 }
 
-/// Whether `part` is cut from `whole` by a line across, as a pane from its window: three sides are the same, and the
-/// whole is much larger.
+/// Whether `part` is cut from `whole` by a line across, as a pane from its window: three sides are
+/// the same, and the whole is much larger.
 fn is_part(part: &[Point2<f64>; 4], whole: &[Point2<f64>; 4]) -> bool {
     polygon::area(part) < MAX_PART * polygon::area(whole)
         && polygon::relation(whole, part, SHARED_SIDE_PX) == Relation::Contains
@@ -174,7 +177,8 @@ fn is_part(part: &[Point2<f64>; 4], whole: &[Point2<f64>; 4]) -> bool {
 
 /// A part may be this much likelier than its whole: probabilities near 1 differ by chance.
 const PART_SLACK: f64 = 0.02;
-/// Its worst side may have this much more support: one that runs over a gap between two panes is no side.
+/// Its worst side may have this much more support: one that runs over a gap between two panes is no
+/// side.
 const SUPPORT_SLACK: f64 = 0.06;
 /// Largest area of a part as a share of the whole; above it they are the same object.
 const MAX_PART: f64 = 0.6;
@@ -186,7 +190,8 @@ const SAME_IOU: f64 = 0.8;
 /// A quad whose sides moved is still the same object if both overlap by this much.
 const MOVED_IOU: f64 = 0.4;
 
-/// The quad with its sides where they look most like a border; none if that is not a well supported quad.
+/// The quad with its sides where they look most like a border; none if that is not a well supported
+/// quad.
 fn moved(quad: &Quad, chosen: &SnappedSides, g: &Gradients, p: &QuadParams) -> Option<Quad> {
     let before = quad.corners_px.points();
     let search = rating_search(p, p.refit_reach_px);
@@ -273,7 +278,8 @@ mod tests {
         let found = result(classified_quad(WINDOW, 0.98, 0.95));
         assert_eq!(found.len(), 1);
         assert!(found[0].corners_px.area_px2() > 13_900.0, "{found:?}");
-        // Not when it is less likely, when a side runs over a gap, or when it reaches further than the panes.
+        // Not when it is less likely, when a side runs over a gap, or when it reaches further than
+        // the panes.
         for whole in [
             classified_quad(WINDOW, 0.9, 1.0),
             classified_quad(WINDOW, 0.98, 0.85),

@@ -1,5 +1,5 @@
-//! No panic, no work beyond the stated bounds and no disagreement between threads, whatever the image. Work is
-//! counted by the outputs of each stage, not timed.
+//! No panic, no work beyond the stated bounds and no disagreement between threads, whatever the
+//! image. Work is counted by the outputs of each stage, not timed.
 
 use crate::{
     detect::{

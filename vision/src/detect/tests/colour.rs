@@ -14,7 +14,8 @@ use nalgebra::Point2;
 /// Grey levels of the wall and of the quads.
 const GREY: f64 = 120.0;
 
-/// A quad before a wall of the same grey level, with noise, each plane of its own; red and blue differ by this much.
+/// A quad before a wall of the same grey level, with noise, each plane of its own; red and blue
+/// differ by this much.
 fn isoluminant(
     (width, height): (usize, usize),
     corners: [[f64; 2]; 4],

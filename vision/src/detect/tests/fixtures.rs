@@ -3,7 +3,8 @@
 use crate::{detect::segments::edge_segments::EdgeSegment, frame::GrayImage};
 use nalgebra::{Point2, Vector2};
 
-/// A segment between two points, as an ideal extractor would give it. The brighter side is right of p to q.
+/// A segment between two points, as an ideal extractor would give it. The brighter side is right of
+/// p to q.
 pub(crate) fn segment(p: [f64; 2], q: [f64; 2]) -> EdgeSegment {
     let (p_px, q_px) = (Point2::from(p), Point2::from(q));
     let along = (q_px - p_px).normalize();
@@ -36,7 +37,8 @@ pub(crate) fn sides(corners: [[f64; 2]; 4], gap_px: f64) -> Vec<EdgeSegment> {
         .collect()
 }
 
-/// Renders clockwise convex polygons over a background, later ones on top, with 4 x 4 samples a pixel.
+/// Renders clockwise convex polygons over a background, later ones on top, with 4 x 4 samples a
+/// pixel.
 pub(crate) fn render(
     width: usize,
     height: usize,

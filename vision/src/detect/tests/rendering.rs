@@ -1,4 +1,5 @@
-//! Test images with known truth: area-sampled convex polygons, noise from a seed, and the symmetries of an image.
+//! Test images with known truth: area-sampled convex polygons, noise from a seed, and the
+//! symmetries of an image.
 
 use crate::frame::GrayImage;
 use nalgebra::Point2;
@@ -6,8 +7,8 @@ use nalgebra::Point2;
 /// Sub-samples along each axis of a pixel.
 const SUB: usize = 8;
 
-/// A convex polygon of level `inside` on `outside`, corners in either turn, averaged over each pixel's area, with
-/// Gaussian noise of `sigma` from `seed`.
+/// A convex polygon of level `inside` on `outside`, corners in either turn, averaged over each
+/// pixel's area, with Gaussian noise of `sigma` from `seed`.
 pub(crate) fn polygon(
     (width, height): (usize, usize),
     corners: &[Point2<f64>],

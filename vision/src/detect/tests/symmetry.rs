@@ -1,9 +1,9 @@
-//! `detect` on an image that was mirrored, turned, shifted, inverted, dimmed or enlarged finds the same quads,
-//! moved likewise, with both groupings.
+//! `detect` on an image that was mirrored, turned, shifted, inverted, dimmed or enlarged finds the
+//! same quads, moved likewise, with both groupings.
 //!
-//! The result is not exact to the last bit: the recursive filter runs forth and back in single precision, chains
-//! start at another end, the darker of two equal edge pixels wins, and blocks of the coarser scale do not move with
-//! the image. The tolerances below cover these effects.
+//! The result is not exact to the last bit: the recursive filter runs forth and back in single
+//! precision, chains start at another end, the darker of two equal edge pixels wins, and blocks of
+//! the coarser scale do not move with the image. The tolerances below cover these effects.
 
 use crate::{
     detect::{
@@ -22,8 +22,8 @@ use nalgebra::Point2;
 
 const SIZE: (usize, usize) = (640, 480);
 
-/// Six objects on a wall, slanted and turned at random, half of them with a mat, some cut by the image border; a
-/// little noise.
+/// Six objects on a wall, slanted and turned at random, half of them with a mat, some cut by the
+/// image border; a little noise.
 fn scene(seed: u64, scale: usize) -> GrayImage {
     let mut random = Noise(seed);
     let mut between = |low: f64, high: f64| low + (high - low) * random.uniform();
@@ -65,7 +65,8 @@ fn both() -> [DetectParams; 2] {
     [DetectParams::default(), paper]
 }
 
-/// Largest distance of a corner from that of the nearest quad of the same kind, under the best naming.
+/// Largest distance of a corner from that of the nearest quad of the same kind, under the best
+/// naming.
 fn farthest(quads: &[Quad], others: &[Quad], map: impl Fn(&Point2<f64>) -> Point2<f64>) -> f64 {
     let gap = |q: &Quad, o: &Quad| {
         let moved = q.corners_px.points().map(|c| map(&c));
@@ -147,8 +148,8 @@ fn enlarged() {
             };
             let (small, large) = (full(&scene(seed, 1)), full(&scene(seed, 2)));
             assert!(small.len() >= 5);
-            // Thresholds are in pixels and the noise is finer, so the larger image may show more; what the smaller
-            // one shows it has, to a third of a pixel of the smaller one.
+            // Thresholds are in pixels and the noise is finer, so the larger image may show more;
+            // what the smaller one shows it has, to a third of a pixel of the smaller one.
             let worst = farthest(&small, &large, |c| c.map(|x| 2.0 * (x + 0.5) - 0.5));
             assert!(worst < 0.6, "{:?} seed {seed}: {worst}", p.quads.grouping);
         }

@@ -9,7 +9,8 @@ fn camera(focal_px: f64) -> Intrinsics {
     Intrinsics::new(focal_px, focal_px, 1499.5, 1999.5, Distortion::None).unwrap()
 }
 
-/// A view from `yaw` and `pitch` degrees beside the normal, 1.6 m away; corners off by up to `off_px`.
+/// A view from `yaw` and `pitch` degrees beside the normal, 1.6 m away; corners off by up to
+/// `off_px`.
 fn view(size: [f64; 2], [yaw, pitch]: [f64; 2], (focal_px, off_px, seed): (f64, f64, u64)) -> AspectView {
     let mut random = Random::new(seed);
     let turn = Rotation3::from_euler_angles(pitch.to_radians(), yaw.to_radians(), 0.0);

@@ -50,7 +50,8 @@ fn icons(model: &LandmarkModel) -> Vec<IconFeatures> {
     model.features(&Params::default().recognise)
 }
 
-/// End to end at N = 50: every landmark is trained from one picture, then new views are compared with all.
+/// End to end at N = 50: every landmark is trained from one picture, then new views are compared
+/// with all.
 #[test]
 fn fifty_landmarks_accept_their_own_views_and_no_others() {
     let p = Params::default();
@@ -96,7 +97,8 @@ fn tau_of_the_likeness_is_limited_by_the_nearest_negative() {
     let alone = lesson(3, 20, &[]);
     assert!((alone.likeness.tau - p.learn.likeness_cap).abs() < 1e-12);
     assert_eq!((alone.likeness.limited_by, alone.likeness.negatives), (LimitedBy::AbsoluteCap, 0));
-    // A dissimilar negative leaves tau as it is; a look-alike (the landmark under a stain) lowers it.
+    // A dissimilar negative leaves tau as it is; a look-alike (the landmark under a stain) lowers
+    // it.
     let distractor = icons(&lesson(4, 20, &[])).remove(0);
     let far = add_negatives(&alone, &[distractor], &p);
     assert!((far.likeness.tau - p.learn.likeness_cap).abs() < 1e-12 && far.likeness.negatives == 1);
@@ -255,7 +257,8 @@ fn tau_stays_below_the_farthest_stored_negative() {
         },
         ..Params::default()
     };
-    // With almost free false positives tau would be 0.5; the negatives that were only counted keep it lower.
+    // With almost free false positives tau would be 0.5; the negatives that were only counted keep
+    // it lower.
     let held = fitted(&evidence, 0.5, &cheap).unwrap();
     assert!(held.tau <= f64::from(evidence.nearest_others[63]), "{}", held.tau);
     assert_eq!(held.limited_by, LimitedBy::AbsoluteCap);

@@ -1,6 +1,6 @@
-//! The two relaxations of the method with their constraint tables (method 3.3, 3.4). In: candidate pairs, then
-//! matched pairs. Out: matched pairs, then quad proposals. `labelling` is the solver; `three_sided` makes sets of
-//! three sides.
+//! The two relaxations of the method with their constraint tables (method 3.3, 3.4). In: candidate
+//! pairs, then matched pairs. Out: matched pairs, then quad proposals. `labelling` is the solver;
+//! `three_sided` makes sets of three sides.
 
 use crate::{
     detect::{
@@ -27,8 +27,8 @@ struct Match {
     bias: f64,
 }
 
-/// Relaxes and returns the matches that both sides chose. `compatible` is called once for every two matches without
-/// a common item.
+/// Relaxes and returns the matches that both sides chose. `compatible` is called once for every two
+/// matches without a common item.
 fn solve(
     items: usize,
     matches: &[Match],
@@ -65,7 +65,8 @@ fn solve(
     matches.iter().enumerate().filter(|(_, m)| is_mutual(m)).map(|(i, _)| i).collect()
 }
 
-/// Pass 1: the pairs of opposite sides that survive uniqueness and convexity, as indices into `pairs`, ascending.
+/// Pass 1: the pairs of opposite sides that survive uniqueness and convexity, as indices into
+/// `pairs`, ascending.
 pub fn match_pairs(
     segments: &[EdgeSegment],
     pairs: &[SegmentPair],
@@ -130,8 +131,8 @@ pub fn match_quads(
 /// Smallest s^2 of a candidate quad.
 const MIN_FIT: f64 = 0.5;
 
-/// The quad of two pairs: none unless strictly convex, inside the image up to a margin, with sides of 15 px and a
-/// fair fit.
+/// The quad of two pairs: none unless strictly convex, inside the image up to a margin, with sides
+/// of 15 px and a fair fit.
 fn quad_seed(
     segments: &[EdgeSegment],
     a: &SegmentPair,

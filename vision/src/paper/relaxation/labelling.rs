@@ -1,8 +1,10 @@
-//! Relaxation labelling by projected gradient (method 3.1, 3.2): rows of candidate labels in, one label or none per
-//! row out. Knows nothing about segments; both passes build a [`Problem`] and hand it over.
+//! Relaxation labelling by projected gradient (method 3.1, 3.2): rows of candidate labels in, one
+//! label or none per row out. Knows nothing about segments; both passes build a [`Problem`] and
+//! hand it over.
 //!
-//! Maximises `G(x) = x'Qx + b'x` over the product of the rows' simplices. The method's pseudo code prints the descent
-//! form; its prose, and this file, maximise (register A3). `b = 0` gives the paper's G.
+//! Maximises `G(x) = x'Qx + b'x` over the product of the rows' simplices. The method's pseudo code
+//! prints the descent form; its prose, and this file, maximise (register A3). `b = 0` gives the
+//! paper's G.
 
 use serde::{Deserialize, Serialize};
 
@@ -69,7 +71,8 @@ pub struct Label {
     pub bias: f64,
 }
 
-/// A quadratic labelling problem. Every row has its candidates and, last, the null label (b = 0, Q = 0).
+/// A quadratic labelling problem. Every row has its candidates and, last, the null label (b = 0,
+/// Q = 0).
 #[derive(Debug, Clone, Default)]
 pub struct Problem {
     /// First variable of each row, and the number of variables at the end.
@@ -94,8 +97,9 @@ pub struct Solution {
 }
 
 impl Problem {
-    /// Rows with their labels, in order; a row without labels puts all mass on the null label. Labels beyond
-    /// [`MAX_ROW_CANDIDATES`] are left out, so give the best first. Starts as Eq. (1) says.
+    /// Rows with their labels, in order; a row without labels puts all mass on the null label.
+    /// Labels beyond [`MAX_ROW_CANDIDATES`] are left out, so give the best first. Starts as Eq. (1)
+    /// says.
     pub fn new(rows: &[Vec<Label>]) -> Self {
         let mut problem = Self { row_start: vec![0], ..Self::default() };
         for (row, labels) in rows.iter().enumerate() {
@@ -123,8 +127,8 @@ impl Problem {
         self.row(row).find(|i| self.items[*i] == Some(item))
     }
 
-    /// Sets the symmetric entry `Q_ab = Q_ba`. Entries inside one row are ignored: there Q is zero by definition.
-    /// Call once per pair.
+    /// Sets the symmetric entry `Q_ab = Q_ba`. Entries inside one row are ignored: there Q is zero
+    /// by definition. Call once per pair.
     pub fn link(&mut self, a: usize, b: usize, weight: f64) {
         if self.row_of[a] != self.row_of[b] {
             self.links[a].push((b as u32, weight));
@@ -168,7 +172,8 @@ impl Problem {
     }
 }
 
-/// Climbs from `x` to a stationary point and rounds it to one label per row. G never falls on the way.
+/// Climbs from `x` to a stationary point and rounds it to one label per row. G never falls on the
+/// way.
 pub fn relax(problem: &Problem, mut x: Vec<f64>, p: &RelaxationParams) -> Solution {
     let mut history = vec![problem.value(&x)];
     for _ in 0..p.max_iterations {
@@ -191,8 +196,8 @@ pub fn relax(problem: &Problem, mut x: Vec<f64>, p: &RelaxationParams) -> Soluti
     round(problem, &x, history)
 }
 
-/// Sets each row to its best vertex until nothing changes. With no interaction inside a row G is linear in it, so
-/// this cannot lower G once all rows are vertices.
+/// Sets each row to its best vertex until nothing changes. With no interaction inside a row G is
+/// linear in it, so this cannot lower G once all rows are vertices.
 fn round(problem: &Problem, x: &[f64], history: Vec<f64>) -> Solution {
     /// G rises at each change, so sweeps end; rounding errors could fake a cycle.
     const MAX_SWEEPS: usize = 100;

@@ -1,5 +1,5 @@
-//! The grouping of the paper: pairs by similarity, two relaxations, sets of three sides (method 2 to 3.5). Not the
-//! default.
+//! The grouping of the paper: pairs by similarity, two relaxations, sets of three sides (method 2
+//! to 3.5). Not the default.
 
 pub(crate) mod profiles;
 pub mod labelling;

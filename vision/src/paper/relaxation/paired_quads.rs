@@ -1,4 +1,5 @@
-//! Quads of the paper's grouping (method 3.4 to 3.6): matched pairs in, quads with refitted corners out, best first.
+//! Quads of the paper's grouping (method 3.4 to 3.6): matched pairs in, quads with refitted corners
+//! out, best first.
 
 use crate::{
     detect::{
@@ -16,7 +17,8 @@ use crate::{
     paper::relaxation::{grouping::match_quads, similarity::SegmentPair, three_sided::three_sided},
 };
 
-/// Quads from the matched pairs of pass 1: pass 2, three-sided sets, refitted corners, canonical border. Best first.
+/// Quads from the matched pairs of pass 1: pass 2, three-sided sets, refitted corners, canonical
+/// border. Best first.
 pub fn quads(segments: &[EdgeSegment], pairs: &[SegmentPair], g: &Gradients, p: &DetectParams) -> Vec<Quad> {
     let size = (g.width(), g.height());
     let full = match_quads(segments, pairs, size, &p.relaxation);
@@ -35,8 +37,8 @@ pub fn quads(segments: &[EdgeSegment], pairs: &[SegmentPair], g: &Gradients, p: 
     canonical(found, p.quads.nested_iou, p.quads.min_side_support, p.relaxation.pair_tolerance_px)
 }
 
-/// Refits a seed on the gradient planes. The score is the similarity of its pairs times the support of its worst
-/// side (method 3.6); of three sides, the worst of those that were seen.
+/// Refits a seed on the gradient planes. The score is the similarity of its pairs times the support
+/// of its worst side (method 3.6); of three sides, the worst of those that were seen.
 fn quad(seed: &QuadSeed, kind: QuadKind, g: &Gradients, p: &QuadParams) -> Option<Quad> {
     let search = EdgeProbeParams {
         reach_px: p.refit_reach_px,

@@ -1,5 +1,6 @@
-//! Grey profiles across segments and their correlation, cue c6 of method 2: outside a quad the background is uniform,
-//! and just inside two opposite borders the texture is similar. Profiles are sampled on demand and cached.
+//! Grey profiles across segments and their correlation, cue c6 of method 2: outside a quad the
+//! background is uniform, and just inside two opposite borders the texture is similar. Profiles are
+//! sampled on demand and cached.
 
 use crate::{detect::segments::edge_segments::EdgeSegment, frame::GrayImage};
 use nalgebra::{Point2, Vector2};
@@ -26,7 +27,8 @@ impl<'a> Profiles<'a> {
         Self { segments, image, cached: vec![Vec::new(); segments.len()] }
     }
 
-    /// ZNCC of the profiles of `k` and `l`, both read from outside to inside, -1 to 1; 0 when one is flat.
+    /// ZNCC of the profiles of `k` and `l`, both read from outside to inside, -1 to 1; 0 when one
+    /// is flat.
     pub(crate) fn correlation(&mut self, k: usize, l: usize, half_width_px: usize) -> f64 {
         let half_width = half_width_px.clamp(1, MAX_HALF_WIDTH_PX);
         let a = self.inward(k, l, half_width);
@@ -55,11 +57,12 @@ impl<'a> Profiles<'a> {
     }
 }
 
-/// Mean grey levels at offsets -half..=half along the segment's normal, over the central 80 % of its length.
+/// Mean grey levels at offsets -half..=half along the segment's normal, over the central 80 % of
+/// its length.
 ///
-/// Departs from method 2: sampled on the raw image and smoothed along the profile, not on a smoothed image; averaging
-/// over the lines already smooths the other direction, and the image need not be filtered a second time. The number
-/// of lines is capped, as neighbours hardly differ.
+/// Departs from method 2: sampled on the raw image and smoothed along the profile, not on a
+/// smoothed image; averaging over the lines already smooths the other direction, and the image need
+/// not be filtered a second time. The number of lines is capped, as neighbours hardly differ.
 fn sample(image: &GrayImage, segment: &EdgeSegment, half_width: usize) -> Vec<f64> {
     // One more sample on both sides for the smoothing kernel.
     let reach = half_width as f64 + 2.0;

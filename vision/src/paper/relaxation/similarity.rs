@@ -1,6 +1,6 @@
-//! Segments in, scored candidate pairs of opposite sides out (method 2). Cheap gates come first and keep the set
-//! sparse; the third-segment search and the grey profiles run on the remaining pairs only. The decision is that of
-//! the relaxation.
+//! Segments in, scored candidate pairs of opposite sides out (method 2). Cheap gates come first and
+//! keep the set sparse; the third-segment search and the grey profiles run on the remaining pairs
+//! only. The decision is that of the relaxation.
 
 use crate::{
     detect::{proposals::quad_seed::corner_of, segments::edge_segments::EdgeSegment},
@@ -13,13 +13,14 @@ use serde::{Deserialize, Serialize};
 
 /// Most segments paired, the longest first.
 pub const MAX_PAIRED_SEGMENTS: usize = 500;
-/// Most pairs whose third segment is searched. Photographs stay below; stripes, all equally similar, do not.
+/// Most pairs whose third segment is searched. Photographs stay below; stripes, all equally
+/// similar, do not.
 pub const MAX_ROUGH_PAIRS: usize = 20_000;
 /// Most pairs handed on, the best first.
 pub const MAX_PAIRS: usize = 1200;
 
-/// Cues and gates of method 2. Weights are for c1 to c6: length ratio, angle, squareness, overlap, third segment,
-/// profiles.
+/// Cues and gates of method 2. Weights are for c1 to c6: length ratio, angle, squareness, overlap,
+/// third segment, profiles.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SimilarityParams {
@@ -51,8 +52,8 @@ pub struct SimilarityParams {
 
 /// Weights by `waymark-lab train similarity` on photographs of paintings and rendered corridors.
 ///
-/// Departs from method 2, which asks for this fit: lengths and the third side discriminate opposite sides of a
-/// quad, profiles hardly. Figures: docs/results/README.md.
+/// Departs from method 2, which asks for this fit: lengths and the third side discriminate opposite
+/// sides of a quad, profiles hardly. Figures: docs/results/README.md.
 const FITTED_WEIGHTS: [f64; 6] = [0.41, 0.0, 0.17, 0.03, 0.32, 0.07];
 
 impl Default for SimilarityParams {
@@ -102,10 +103,12 @@ struct Rough {
     bound: f64,
 }
 
-/// Candidate pairs, best first; ties by index. At most [`MAX_PAIRS`], at most `p.max_candidates` a segment.
+/// Candidate pairs, best first; ties by index. At most [`MAX_PAIRS`], at most `p.max_candidates` a
+/// segment.
 pub fn pairs(segments: &[EdgeSegment], image: &GrayImage, p: &SimilarityParams) -> Vec<SegmentPair> {
     let rough = shortlist(rough_pairs(segments, p));
-    // Bounds the profiles of a segment's weak candidates: three times as many are scored as may be kept.
+    // Bounds the profiles of a segment's weak candidates: three times as many are scored as may be
+    // kept.
     let per_segment = p.max_candidates.min(MAX_ROW_CANDIDATES);
     let mut scored = vec![0_usize; segments.len()];
     let mut profiles = Profiles::new(segments, image);
@@ -163,8 +166,8 @@ fn rough_pair(segments: &[EdgeSegment], k: usize, l: usize, p: &SimilarityParams
     (bound > p.min_score).then_some(Rough { k, l, quad_px, cues, distance_px, bound })
 }
 
-/// The cues c1 to c4, the 4-gon and the mean distance of two segments; none when distance, overlap or convexity
-/// refuse.
+/// The cues c1 to c4, the 4-gon and the mean distance of two segments; none when distance, overlap
+/// or convexity refuse.
 fn shape(
     a: &EdgeSegment,
     b: &EdgeSegment,
@@ -191,7 +194,8 @@ fn shape(
     Some((cues, quad_px, 0.5 * h))
 }
 
-/// Adds the two expensive cues; none when no third segment closes the pair or the similarity stays too low.
+/// Adds the two expensive cues; none when no third segment closes the pair or the similarity stays
+/// too low.
 fn score(
     r: &Rough,
     segments: &[EdgeSegment],
@@ -218,7 +222,8 @@ fn score(
     (score > p.min_score).then_some(SegmentPair { k: r.k, l: r.l, score, cues, quad_px: r.quad_px, closing })
 }
 
-/// Similarity of two segments by shape alone, cues c1 to c4, 0 to 1; none when a cheap gate of method 2 refuses.
+/// Similarity of two segments by shape alone, cues c1 to c4, 0 to 1; none when a cheap gate of
+/// method 2 refuses.
 pub(crate) fn shape_similarity(a: &EdgeSegment, b: &EdgeSegment, p: &SimilarityParams) -> Option<f64> {
     if a.normal.dot(&b.normal).abs() < p.max_angle_deg.to_radians().cos() {
         return None;
@@ -241,7 +246,8 @@ pub(crate) fn closing_cue(
     (-(0.5 * (nearest(from) + nearest(to)) / reach).powi(2)).exp()
 }
 
-/// Weighted mean of the cues. The length of a clipped segment means little, so its cue has half its weight.
+/// Weighted mean of the cues. The length of a clipped segment means little, so its cue has half its
+/// weight.
 fn weigh(cues: &[f64; 6], clipped: bool, p: &SimilarityParams) -> f64 {
     let mut weights = p.weights;
     if clipped {
@@ -283,7 +289,8 @@ fn overlap_rate(a: &EdgeSegment, b: &EdgeSegment) -> f64 {
     if shorter > 0.0 { (common / shorter).clamp(0.0, 1.0) } else { 0.0 }
 }
 
-/// The 4-gon made by two segments, clockwise on screen, the first two vertices on `a`; none unless strictly convex.
+/// The 4-gon made by two segments, clockwise on screen, the first two vertices on `a`; none unless
+/// strictly convex.
 fn quad_of(a: &EdgeSegment, b: &EdgeSegment) -> Option<[Point2<f64>; 4]> {
     let [b0, b1] = along(b, &(a.q_px - a.p_px));
     let mut quad = [a.p_px, a.q_px, b1, b0];
@@ -293,8 +300,8 @@ fn quad_of(a: &EdgeSegment, b: &EdgeSegment) -> Option<[Point2<f64>; 4]> {
     polygon::is_convex(&quad).then_some(quad)
 }
 
-/// The segment that best closes the pair beyond its corners 1-2 (`end` 0) or 3-0 (`end` 1), with its c5. It must
-/// follow the chord, end near the chord's ends and leave the open chain convex.
+/// The segment that best closes the pair beyond its corners 1-2 (`end` 0) or 3-0 (`end` 1), with
+/// its c5. It must follow the chord, end near the chord's ends and leave the open chain convex.
 fn best_closing(
     r: &Rough,
     end: usize,
@@ -327,8 +334,8 @@ fn best_closing(
     best
 }
 
-/// Whether the far end of one side, its corner with the closing segment, the other corner and the other far end turn
-/// one way.
+/// Whether the far end of one side, its corner with the closing segment, the other corner and the
+/// other far end turn one way.
 fn chain_is_convex(r: &Rough, end: usize, closing: &EdgeSegment, segments: &[EdgeSegment]) -> bool {
     // Side `end` 0 runs k then closing then l, clockwise; side 1 runs l then closing then k.
     let (first, second, start, stop) = if end == 0 {

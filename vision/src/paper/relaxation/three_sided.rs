@@ -1,5 +1,5 @@
-//! Sets of three sides of the paper's grouping (method 3.5): pairs that pass 2 left over, closed by a segment that
-//! pass 1 left over. Doors and occluded posters. They stay three-sided.
+//! Sets of three sides of the paper's grouping (method 3.5): pairs that pass 2 left over, closed by
+//! a segment that pass 1 left over. Doors and occluded posters. They stay three-sided.
 
 use crate::{
     detect::{
@@ -9,8 +9,8 @@ use crate::{
     paper::relaxation::similarity::SegmentPair,
 };
 
-/// Three-sided seeds, best first: greedy, every segment used once. `left` are the pairs without a quad, `taken` says
-/// which segments belong to a matched pair or a quad already.
+/// Three-sided seeds, best first: greedy, every segment used once. `left` are the pairs without a
+/// quad, `taken` says which segments belong to a matched pair or a quad already.
 pub fn three_sided(
     segments: &[EdgeSegment],
     left: &[SegmentPair],

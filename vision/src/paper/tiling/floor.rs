@@ -1,6 +1,7 @@
-//! Where a segment lies on the floor, if it lies there. With a calibrated camera in metres; without, up to an affine
-//! map: below a level horizon `x / (v - h), 1 / (v - h)` keeps parallels parallel and even spacing even, whatever the
-//! camera. The row h of the horizon is one on which the image's lines meet.
+//! Where a segment lies on the floor, if it lies there. With a calibrated camera in metres;
+//! without, up to an affine map: below a level horizon `x / (v - h), 1 / (v - h)` keeps parallels
+//! parallel and even spacing even, whatever the camera. The row h of the horizon is one on which
+//! the image's lines meet.
 
 use crate::{
     detect::segments::edge_segments::EdgeSegment,
@@ -22,8 +23,8 @@ pub(crate) struct FloorLine {
 }
 
 impl FloorLine {
-    /// Distance of the line's middle across a direction. The direction is the family's: a short line's own would
-    /// throw its offset far off.
+    /// Distance of the line's middle across a direction. The direction is the family's: a short
+    /// line's own would throw its offset far off.
     pub(crate) fn offset_along(&self, direction_rad: f64) -> f64 {
         let (sin, cos) = direction_rad.sin_cos();
         cos * self.middle.y - sin * self.middle.x
@@ -44,9 +45,11 @@ const HORIZON_ROWS: usize = 141;
 /// Most rows that are examined, and their smallest distance in rows.
 const MAX_HORIZONS: usize = 8;
 const HORIZON_GAP_ROWS: usize = 5;
-/// Bins of the accumulator of meeting points along a row, one image width each way beside the image included.
+/// Bins of the accumulator of meeting points along a row, one image width each way beside the image
+/// included.
 const MEETING_BINS: usize = 120;
-/// Lines closer to the level meet a row too far away, those closer to the plumb are edges of walls. Degrees.
+/// Lines closer to the level meet a row too far away, those closer to the plumb are edges of walls.
+/// Degrees.
 const MEETING_RANGE_DEG: [f64; 2] = [4.0, 80.0];
 
 impl Floor {
@@ -141,7 +144,8 @@ impl Floor {
     }
 }
 
-/// The camera of the same image at another scale. Pixel centres are integers, so the corner of the image stays.
+/// The camera of the same image at another scale. Pixel centres are integers, so the corner of the
+/// image stays.
 fn scaled(camera: &Intrinsics, scale: f64) -> Intrinsics {
     let centre = |c: f64| (c + 0.5) * scale - 0.5;
     Intrinsics {
@@ -154,10 +158,10 @@ fn scaled(camera: &Intrinsics, scale: f64) -> Intrinsics {
     }
 }
 
-/// Rows on which the lines of the image meet well, the best first: everything level in the world vanishes on the
-/// horizon, walls' edges and frames as well as the floor's. Accumulates, on each row, where the lines cross it; rows
-/// go by the sum of squares, the upper of equals first. Where pieces of a pattern touch lines meet as well, so there
-/// is more than one candidate.
+/// Rows on which the lines of the image meet well, the best first: everything level in the world
+/// vanishes on the horizon, walls' edges and frames as well as the floor's. Accumulates, on each
+/// row, where the lines cross it; rows go by the sum of squares, the upper of equals first. Where
+/// pieces of a pattern touch lines meet as well, so there is more than one candidate.
 fn horizons(segments: &[EdgeSegment], width: f64, height: f64) -> Vec<f64> {
     let slanted = |s: &&EdgeSegment| {
         let lean = s.normal.x.abs().atan2(s.normal.y.abs()).to_degrees();

@@ -1,6 +1,7 @@
-//! Removes the segments of a regularly patterned floor (method 1.5). Joints of tiles make corners and parallels,
-//! hence quads that are no landmarks. They are evenly spaced on the floor; direction alone does not tell, since
-//! posters and floors share vanishing points. In: segments, not the image. Out: segments that stay and those removed.
+//! Removes the segments of a regularly patterned floor (method 1.5). Joints of tiles make corners
+//! and parallels, hence quads that are no landmarks. They are evenly spaced on the floor; direction
+//! alone does not tell, since posters and floors share vanishing points. In: segments, not the
+//! image. Out: segments that stay and those removed.
 
 use crate::{
     detect::segments::edge_segments::EdgeSegment,
@@ -25,7 +26,8 @@ const MIN_FAMILY_GAP_DEG: f64 = 30.0;
 /// Bins of the accumulator of directions.
 const BIN_DEG: f64 = 2.0;
 
-/// Sets the lines of regular patterns on the floor apart. Leaves everything in `kept` when `p.remove` is off.
+/// Sets the lines of regular patterns on the floor apart. Leaves everything in `kept` when
+/// `p.remove` is off.
 pub fn remove_floor_tiling(
     segments: Vec<EdgeSegment>,
     image_size: (usize, usize),
@@ -40,8 +42,8 @@ pub fn remove_floor_tiling(
     untiled
 }
 
-/// Of the floors that the image may show the one with most of a pattern, the first of equals: of each segment, whether
-/// it is part of that. Empty without any.
+/// Of the floors that the image may show the one with most of a pattern, the first of equals: of
+/// each segment, whether it is part of that. Empty without any.
 fn patterned_floor(segments: &[EdgeSegment], image_size: (usize, usize), p: &TilingParams) -> Vec<bool> {
     let (mut best, mut most) = (Vec::new(), 0);
     for floor in Floor::possible(segments, image_size, p) {
@@ -67,8 +69,8 @@ fn patterned(floor: &Floor, segments: &[EdgeSegment], p: &TilingParams) -> Vec<b
     is_tiling
 }
 
-/// Directions of the two families, [0, pi). On a floor of known scale they are at right angles; otherwise the second
-/// is the strongest one well apart from the first.
+/// Directions of the two families, [0, pi). On a floor of known scale they are at right angles;
+/// otherwise the second is the strongest one well apart from the first.
 fn families(lines: &[FloorLine], square: bool) -> Vec<f64> {
     if square {
         let first = peak(lines, 90, |_| true);
@@ -87,8 +89,8 @@ fn families(lines: &[FloorLine], square: bool) -> Vec<f64> {
     std::iter::once(first).chain(second).map(f64::to_radians).collect()
 }
 
-/// Middle of the fullest bin of the accumulator of directions, degrees below `turn_deg`: lengths add up, neighbouring
-/// bins count by half. The first of equals.
+/// Middle of the fullest bin of the accumulator of directions, degrees below `turn_deg`: lengths
+/// add up, neighbouring bins count by half. The first of equals.
 fn peak(lines: &[FloorLine], turn_deg: usize, allowed: impl Fn(f64) -> bool) -> Option<f64> {
     let bins = (turn_deg as f64 / BIN_DEG) as usize;
     let mut weights = vec![0.0; bins];
@@ -106,8 +108,8 @@ fn peak(lines: &[FloorLine], turn_deg: usize, allowed: impl Fn(f64) -> bool) -> 
     best.map(middle)
 }
 
-/// Indices of the evenly spaced lines along a direction that is known to within a bin of the accumulator; empty unless
-/// there are enough.
+/// Indices of the evenly spaced lines along a direction that is known to within a bin of the
+/// accumulator; empty unless there are enough.
 fn evenly_spaced(lines: &[FloorLine], direction_rad: f64, p: &TilingParams) -> Vec<usize> {
     let off = |line: &FloorLine, from: f64| {
         let turn = (line.direction_rad - from).rem_euclid(std::f64::consts::PI);

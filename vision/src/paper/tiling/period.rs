@@ -1,4 +1,5 @@
-//! Offsets of parallel lines in, the distance at which they repeat out (method 1.5, period accumulator).
+//! Offsets of parallel lines in, the distance at which they repeat out (method 1.5, period
+//! accumulator).
 
 use crate::paper::tiling::tiling_params::TilingParams;
 use std::f64::consts::TAU;
@@ -9,8 +10,8 @@ const MAX_PERIODS: usize = 2000;
 const OVERSAMPLING: f64 = 6.0;
 /// Largest expected number of patterns by chance among as many lines anywhere.
 ///
-/// Departs from method 1.5, which asks for concentration and five lines alone: five random lines often repeat at
-/// one of the many periods tried.
+/// Departs from method 1.5, which asks for concentration and five lines alone: five random lines
+/// often repeat at one of the many periods tried.
 const MAX_CHANCE: f64 = 0.05;
 
 /// The periods that are tried for some offsets: even in 1 / period.
@@ -62,10 +63,12 @@ pub(crate) struct Lattice {
 }
 
 impl Lattice {
-    /// The largest period at which the offsets (with weights) repeat: fractions of a period repeat as well.
+    /// The largest period at which the offsets (with weights) repeat: fractions of a period repeat
+    /// as well.
     ///
-    /// Departs from method 1.5, which steps the period by 5 mm: that jumps over the narrow peaks of small tiles on a
-    /// wide floor. Steps here are even in 1 / period and as fine as the spread of the lines asks for.
+    /// Departs from method 1.5, which steps the period by 5 mm: that jumps over the narrow peaks of
+    /// small tiles on a wide floor. Steps here are even in 1 / period and as fine as the spread of
+    /// the lines asks for.
     pub(crate) fn find(offsets: &[(f64, f64)], p: &TilingParams) -> Option<Self> {
         let trials = Trials::new(offsets, p)?;
         let Trials { range: [first, last], count, low, enough } = trials;
@@ -98,7 +101,8 @@ impl Lattice {
     }
 }
 
-/// `R = |sum w exp(2 pi i rho / T)| / sum w`, 0 to 1, and the argument of that sum, at a frequency 1 / T.
+/// `R = |sum w exp(2 pi i rho / T)| / sum w`, 0 to 1, and the argument of that sum, at a frequency
+/// 1 / T.
 fn concentration(offsets: &[(f64, f64)], origin: f64, frequency: f64) -> (f64, f64) {
     let (mut re, mut im, mut total) = (0.0, 0.0, 0.0);
     for (offset, weight) in offsets {
@@ -110,8 +114,8 @@ fn concentration(offsets: &[(f64, f64)], origin: f64, frequency: f64) -> (f64, f
     (re.hypot(im) / f64::max(total, f64::MIN_POSITIVE), im.atan2(re))
 }
 
-/// How many lines of equal weight say as much as these; those closer than `same` count as one, as the two edges of a
-/// joint or pieces of one line.
+/// How many lines of equal weight say as much as these; those closer than `same` count as one, as
+/// the two edges of a joint or pieces of one line.
 fn effective(offsets: &[(f64, f64)], same: f64) -> f64 {
     let mut sorted = offsets.to_vec();
     sorted.sort_by(|a, b| a.0.total_cmp(&b.0));

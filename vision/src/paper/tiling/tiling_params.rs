@@ -3,20 +3,22 @@
 use crate::frame::Intrinsics;
 use serde::{Deserialize, Serialize};
 
-/// Which segments count as tiling. Lengths on the floor are metres with a [`FloorView`], otherwise heights of the
-/// camera above the floor.
+/// Which segments count as tiling. Lengths on the floor are metres with a [`FloorView`], otherwise
+/// heights of the camera above the floor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct TilingParams {
     /// Whether tiling is removed.
     pub remove: bool,
-    /// Where the floor is. Without it the horizon is estimated from the image, with a typical focal length.
+    /// Where the floor is. Without it the horizon is estimated from the image, with a typical focal
+    /// length.
     pub floor: Option<FloorView>,
     /// An end at most this far below the horizon is not on the floor, as far as can be told.
     pub horizon_gap_px: f64,
     /// Farther segments on the floor are not removed.
     pub max_distance: f64,
-    /// Segments this close to the direction of gravity are not removed: sides of posters and doors. Degrees.
+    /// Segments this close to the direction of gravity are not removed: sides of posters and doors.
+    /// Degrees.
     pub gravity_deg: f64,
     /// Lines of a family differ from its direction by at most this, degrees.
     pub family_deg: f64,
@@ -53,7 +55,8 @@ impl Default for TilingParams {
 pub struct FloorView {
     /// The camera.
     pub intrinsics: Intrinsics,
-    /// Width of the images that the intrinsics are for; others are taken for the same images at another scale.
+    /// Width of the images that the intrinsics are for; others are taken for the same images at
+    /// another scale.
     pub width_px: usize,
     /// Height of the camera's centre above the floor, metres.
     pub height_m: f64,

@@ -1,5 +1,5 @@
-//! A part of a wall painting is the landmark: no edge is at its border. It is found by its texture, marked as such,
-//! and has a pose.
+//! A part of a wall painting is the landmark: no edge is at its border. It is found by its texture,
+//! marked as such, and has a pose.
 
 use super::*;
 

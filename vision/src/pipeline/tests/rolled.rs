@@ -27,7 +27,8 @@ fn seen_rolled(picture: &GrayImage, roll_rad: f64) -> (GrayImage, Quad) {
     (image, Quad { corners_px: Corners::from_unordered(corners).unwrap(), ..scene(1).1 })
 }
 
-/// A poster that looks the same upside down, or nearly: `differing` rows of its lower half are another poster's.
+/// A poster that looks the same upside down, or nearly: `differing` rows of its lower half are
+/// another poster's.
 fn symmetric(differing: usize) -> GrayImage {
     let (half, other) = (poster(1), poster(3));
     GrayImage::from_fn(300, 400, |u, v| match v {

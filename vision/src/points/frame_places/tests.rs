@@ -4,7 +4,8 @@ use crate::{
     recognise::fixture::{poster, whole},
 };
 
-/// The taught points of a poster as a frame would show them, the landmark at `corner_px` with the size `size_px`.
+/// The taught points of a poster as a frame would show them, the landmark at `corner_px` with the
+/// size `size_px`.
 fn shown(taught: &[TaughtPoint], corner_px: [f32; 2], size_px: [f32; 2]) -> Vec<FramePoint> {
     let of = |t: &TaughtPoint| {
         let p = t.point();

@@ -64,7 +64,8 @@ fn places_of_a_turned_rolled_and_reduced_frame_are_those_of_the_image() {
     }
 }
 
-/// Of two discs, one below the other in the image, each is found, and the second is where the roll says.
+/// Of two discs, one below the other in the image, each is found, and the second is where the roll
+/// says.
 #[test]
 fn a_rolled_frame_is_turned_back() {
     let (roll_rad, at, below) = (0.5_f64, Point2::new(200.0, 90.0), Point2::new(200.0, 150.0));

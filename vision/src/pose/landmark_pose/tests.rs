@@ -18,7 +18,8 @@ fn camera() -> Intrinsics {
     Intrinsics::new(700.0, 700.0, 320.0, 240.0, Distortion::None).unwrap()
 }
 
-/// A level camera at `d_m` from the landmark's centre in plan, at azimuth `psi_deg`, 0.3 m below it, panned at it.
+/// A level camera at `d_m` from the landmark's centre in plan, at azimuth `psi_deg`, 0.3 m below
+/// it, panned at it.
 fn view(d_m: f64, psi_deg: f64) -> Isometry3<f64> {
     let psi = psi_deg.to_radians();
     let centre = Vector3::new(d_m * psi.cos(), d_m * psi.sin(), -0.3);
@@ -147,7 +148,8 @@ fn errors_agree_with_the_table_of_method_13_3() {
 
 #[test]
 fn covariance_is_consistent_in_twelve_cells_and_every_flip_is_flagged() {
-    // Distance x obliquity x noise, 200 runs each; mean NEES of 6 degrees of freedom within its bands.
+    // Distance x obliquity x noise, 200 runs each; mean NEES of 6 degrees of freedom within its
+    // bands.
     let mut random = Random::new(4);
     let (mut outside, mut flips, mut flagged) = (0, 0, 0);
     for sigma_px in [0.3, 0.8] {

@@ -14,13 +14,14 @@ pub(crate) const LEVELS: usize = 3;
 pub struct AlignParams {
     /// No corner moves further than this share of the icon's side, along either axis.
     pub max_shift: f64,
-    /// Both pictures are smoothed by these, one after the other, in icon pixels. At the first only the four sides
-    /// move, each along its normal; then all corners.
+    /// Both pictures are smoothed by these, one after the other, in icon pixels. At the first only
+    /// the four sides move, each along its normal; then all corners.
     pub sigmas: [f64; LEVELS],
     /// Gauss-Newton steps at each smoothing, at most [`MAX_STEPS`].
     pub steps: usize,
-    /// Mean squared correlation of the buckets below which a picture is rejected after each smoothing. Accepted
-    /// quads of real photographs stay above 0.42 and 0.56; an occluder lowers it by its share.
+    /// Mean squared correlation of the buckets below which a picture is rejected after each
+    /// smoothing. Accepted quads of real photographs stay above 0.42 and 0.56; an occluder lowers
+    /// it by its share.
     pub min_alike: [f64; LEVELS],
 }
 

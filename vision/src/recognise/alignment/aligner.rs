@@ -1,9 +1,11 @@
-//! Template alignment: moves the corners of a quad until its picture agrees with a learnt icon. A true match fits
-//! far better afterwards, a false one hardly does; the corners get more accurate for the pose. Beyond the method
-//! (its sections 4 and 6.3 name it as an option). `decision` applies the thresholds.
+//! Template alignment: moves the corners of a quad until its picture agrees with a learnt icon. A
+//! true match fits far better afterwards, a false one hardly does; the corners get more accurate
+//! for the pose. Beyond the method (its sections 4 and 6.3 name it as an option). `decision`
+//! applies the thresholds.
 //!
-//! Three levels, coarse to fine. The first rejects most candidates cheaply: sides only, at a third of the icon's
-//! resolution. The second moves all corners; the third gives the last tenths of a pixel.
+//! Three levels, coarse to fine. The first rejects most candidates cheaply: sides only, at a third
+//! of the icon's resolution. The second moves all corners; the third gives the last tenths of a
+//! pixel.
 
 use crate::{
     detect::quad::BORDER_SIGMA_PX,
@@ -25,8 +27,8 @@ use fearless_simd::{Level, dispatch};
 use nalgebra::{Matrix2, Point2, Vector2};
 use std::cell::OnceCell;
 
-/// Pixels along the icon's border that are not compared: smoothing mixes in the wall outside, which differs from
-/// that of training.
+/// Pixels along the icon's border that are not compared: smoothing mixes in the wall outside, which
+/// differs from that of training.
 const SECOND_BORDER_PX: usize = 2;
 /// The same of the coarse level, in its pixels.
 const COARSE_BORDER_PX: usize = 1;
@@ -58,7 +60,8 @@ pub struct Template<'a> {
 }
 
 impl<'a> Template<'a> {
-    /// A template of the icon and its [`coarse()`](crate::recognise::alignment::surroundings::coarse) level.
+    /// A template of the icon and its
+    /// [`coarse()`](crate::recognise::alignment::surroundings::coarse) level.
     pub fn new(icon: &'a Icon, coarse: &'a [f32]) -> Self {
         Self { icon, coarse, second: OnceCell::new(), last: OnceCell::new() }
     }
@@ -109,7 +112,8 @@ impl<'a> Aligner<'a> {
         Self { on, p }
     }
 
-    /// Aligns the picture with `template`. `None` when it does not match or does not determine the corners.
+    /// Aligns the picture with `template`. `None` when it does not match or does not determine the
+    /// corners.
     pub fn align(&self, around: &Surroundings<'_>, template: &Template<'_>) -> Option<Alignment> {
         self.align_fine(around, template, &self.align_coarse(around, template)?)
     }
@@ -180,9 +184,9 @@ impl<'a> Aligner<'a> {
         })
     }
 
-    /// The last level smooths after cutting, as the template was: the wall around does not mix in, so the border of
-    /// the icon is compared, too. The gradients are those of the picture: those of the template bias the step where
-    /// one of the two is blurred more.
+    /// The last level smooths after cutting, as the template was: the wall around does not mix in,
+    /// so the border of the icon is compared, too. The gradients are those of the picture: those of
+    /// the template bias the step where one of the two is blurred more.
     fn last(
         &self,
         around: &Surroundings<'_>,

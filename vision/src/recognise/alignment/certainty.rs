@@ -1,9 +1,9 @@
-//! Covariance of aligned corners, from the normal equations of the last step and the scatter of the buckets'
-//! gradients.
+//! Covariance of aligned corners, from the normal equations of the last step and the scatter of the
+//! buckets' gradients.
 //!
-//! Errors of neighbouring pixels of a smoothed picture are correlated, so residuals of pixels would understate the
-//! covariance. Buckets are nearly independent: the spread of their gradients gives the scale, the normal equations
-//! give the shape.
+//! Errors of neighbouring pixels of a smoothed picture are correlated, so residuals of pixels would
+//! understate the covariance. Buckets are nearly independent: the spread of their gradients gives
+//! the scale, the normal equations give the shape.
 
 use nalgebra::{Const, DimMin, Matrix2, SMatrix, SVector};
 
@@ -14,9 +14,9 @@ const LEAST_FREE: f64 = 1.0;
 /// Fewest buckets beyond the corners' coordinates.
 const MIN_SPARE: usize = 2;
 
-/// The covariances of four corners, in squared icon pixels, from the normal equations and the gradient of each bucket
-/// (at the end, where gradients add up to about nothing). `None` with too few buckets, or where sides were moved
-/// only.
+/// The covariances of four corners, in squared icon pixels, from the normal equations and the
+/// gradient of each bucket (at the end, where gradients add up to about nothing). `None` with too
+/// few buckets, or where sides were moved only.
 pub(crate) fn corner_covariances<const D: usize>(
     buckets: &[(SMatrix<f64, D, D>, SVector<f64, D>)],
 ) -> Option<[Matrix2<f64>; 4]>
@@ -46,7 +46,8 @@ mod tests {
     use super::*;
     use crate::recognise::fixture::Dice;
 
-    /// Gradients of 25 buckets with the same normal equations each, as if each had been disturbed by itself.
+    /// Gradients of 25 buckets with the same normal equations each, as if each had been disturbed
+    /// by itself.
     fn gradients(each: &SMatrix<f64, 8, 8>, noise: f64, dice: &mut Dice) -> Vec<SVector<f64, 8>> {
         let root = each.cholesky().unwrap().l();
         let mut normal = || 2.0_f64.sqrt() * (0..6).map(|_| dice.roll() - 0.5).sum::<f64>();

@@ -1,5 +1,5 @@
-//! The target of an alignment, bucket by bucket: a template's grey levels of mean 0 and norm 1, and their
-//! derivatives by the corners. `settle` moves the corners.
+//! The target of an alignment, bucket by bucket: a template's grey levels of mean 0 and norm 1, and
+//! their derivatives by the corners. `settle` moves the corners.
 
 #![expect(
     clippy::inline_always,
@@ -12,7 +12,8 @@ use crate::recognise::{
 };
 use nalgebra::{SMatrix, SVector};
 
-/// A template on a lattice, with `D` ways to move: 4 for the sides, 8 for the coordinates of the corners.
+/// A template on a lattice, with `D` ways to move: 4 for the sides, 8 for the coordinates of the
+/// corners.
 #[derive(Debug, Clone)]
 pub(crate) struct Cost<const D: usize> {
     /// Grey levels, zeros for padding and for flat buckets.
@@ -42,7 +43,8 @@ pub(crate) struct Levels {
 }
 
 impl Levels {
-    /// Of the smoothed icon `smooth`. A bucket with a standard deviation below `min_deviation` is flat and ignored.
+    /// Of the smoothed icon `smooth`. A bucket with a standard deviation below `min_deviation` is
+    /// flat and ignored.
     #[inline(always)]
     pub(crate) fn new(lattice: &SamplingGrid, smooth: &[f32], min_deviation: f32) -> Self {
         let mut values: Vec<f32> = lattice.at.iter().map(|at| smooth[*at as usize]).collect();
@@ -56,9 +58,10 @@ impl Levels {
     }
 }
 
-/// Derivatives of points by the corners: left, right, top, bottom side along their normals, or x and y of TL, TR,
-/// BR, BL. The derivative of the homography, exact at the square itself. In: slopes along x and along y of
-/// [`LANES`] pixels at `s` and `t` of the way across and down. Out: their change with each way to move.
+/// Derivatives of points by the corners: left, right, top, bottom side along their normals, or x
+/// and y of TL, TR, BR, BL. The derivative of the homography, exact at the square itself. In:
+/// slopes along x and along y of [`LANES`] pixels at `s` and `t` of the way across and down. Out:
+/// their change with each way to move.
 #[inline(always)]
 fn moved<const D: usize>([gx, gy]: [[f32; LANES]; 2], s: [f32; LANES], t: [f32; LANES]) -> [[f32; LANES]; D] {
     let mut ways = [[0.0; LANES]; D];
@@ -82,15 +85,16 @@ fn moved<const D: usize>([gx, gy]: [[f32; LANES]; 2], s: [f32; LANES], t: [f32; 
 }
 
 impl<const D: usize> Cost<D> {
-    /// Of the smoothed icon `smooth`. A bucket with a standard deviation below `min_deviation` is flat and ignored.
+    /// Of the smoothed icon `smooth`. A bucket with a standard deviation below `min_deviation` is
+    /// flat and ignored.
     #[inline(always)]
     pub(crate) fn new(lattice: &SamplingGrid, smooth: &[f32], min_deviation: f32) -> Self {
         let levels = Levels::new(lattice, smooth, min_deviation);
         Self::with_slopes(lattice, &levels, &levels, smooth)
     }
 
-    /// `levels` with the gradients of `smooth`, the picture at its present position, instead of the template's:
-    /// those bias the step where one of the two is blurred more.
+    /// `levels` with the gradients of `smooth`, the picture at its present position, instead of the
+    /// template's: those bias the step where one of the two is blurred more.
     #[inline(always)]
     pub(crate) fn with_slopes_of(lattice: &SamplingGrid, levels: &Levels, smooth: &[f32]) -> Self {
         Self::with_slopes(lattice, levels, &Levels::new(lattice, smooth, 0.0), smooth)
@@ -167,8 +171,8 @@ impl<const D: usize> Bucket<D> {
     }
 }
 
-/// To mean 0 and norm 1, padding to 0; what the norm was. All zeros and `None` when the standard deviation is below
-/// `min_deviation` or there is none.
+/// To mean 0 and norm 1, padding to 0; what the norm was. All zeros and `None` when the standard
+/// deviation is below `min_deviation` or there is none.
 #[inline(always)]
 fn normalise(values: &mut [f32], real: &[f32], count: usize, min_deviation: f32) -> Option<f32> {
     let n = count as f32;

@@ -1,5 +1,5 @@
-//! Iterative alignment of a quad's corners: damped least squares over normalised buckets, each weighted by its
-//! correlation, so that covered parts have little influence.
+//! Iterative alignment of a quad's corners: damped least squares over normalised buckets, each
+//! weighted by its correlation, so that covered parts have little influence.
 
 #![expect(
     clippy::inline_always,
@@ -13,7 +13,8 @@ use crate::recognise::alignment::{
 };
 use nalgebra::{Const, DimMin, Matrix2, Point2, SMatrix, SVector, Vector2};
 
-/// A rejected step is not retried with more damping if it was shorter than this many times [`Limits::settled_px`].
+/// A rejected step is not retried with more damping if it was shorter than this many times
+/// [`Limits::settled_px`].
 const HARDLY_WRONG: f64 = 5.0;
 /// Share of the mean diagonal element that is added to each.
 const LEAST_DAMPING: f64 = 1e-3;
@@ -26,25 +27,27 @@ pub(crate) struct LmResult {
     pub(crate) corners: [Point2<f64>; 4],
     /// Mean squared correlation of the buckets.
     pub(crate) likeness: f64,
-    /// Covariances of the corners, in squared pixels of the icon, where all eight coordinates moved.
+    /// Covariances of the corners, in squared pixels of the icon, where all eight coordinates
+    /// moved.
     pub(crate) covariances: Option<[Matrix2<f64>; 4]>,
 }
 
 /// Limits of the displacement and the number of steps.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Limits {
-    /// Largest displacement from the corner of the square, in pixels of the icon, along either axis.
+    /// Largest displacement from the corner of the square, in pixels of the icon, along either
+    /// axis.
     pub(crate) shift_px: f64,
     pub(crate) steps: usize,
     /// A step of less than this, in pixels of the icon, is the last.
     pub(crate) settled_px: f64,
 }
 
-/// Moves the corners of the icon, beginning at `start`; `sample` reads the picture at the grid's points under a map.
-/// `None` when the buckets do not determine the corners.
+/// Moves the corners of the icon, beginning at `start`; `sample` reads the picture at the grid's
+/// points under a map. `None` when the buckets do not determine the corners.
 ///
-/// Levenberg-Marquardt: a rejected step is retried with more damping. Inverse compositional (Baker and Matthews
-/// 2004): the derivatives of the cost are computed once, not at every step.
+/// Levenberg-Marquardt: a rejected step is retried with more damping. Inverse compositional (Baker
+/// and Matthews 2004): the derivatives of the cost are computed once, not at every step.
 #[inline(always)]
 pub(crate) fn minimise<const D: usize>(
     cost: &Cost<D>,
@@ -112,7 +115,8 @@ struct Equations<const D: usize> {
     right: SVector<f64, D>,
     /// Contribution of each bucket.
     terms: Vec<BucketTerm<D>>,
-    /// The objective, weighted correlation: a partly covered bucket has far less weight than an uncovered one.
+    /// The objective, weighted correlation: a partly covered bucket has far less weight than an
+    /// uncovered one.
     objective: f64,
     /// Squared correlations of the buckets, added up.
     likeness: f64,

@@ -1,4 +1,5 @@
-//! The pixels at which icons are compared, bucket by bucket, and sampling of a picture there under a homography.
+//! The pixels at which icons are compared, bucket by bucket, and sampling of a picture there under
+//! a homography.
 
 #![expect(
     clippy::inline_always,
@@ -23,7 +24,8 @@ pub(crate) enum Pattern {
     Half,
 }
 
-/// The pixels of all buckets, one bucket after the other, each padded to a multiple of [`LANES`] with its last pixel.
+/// The pixels of all buckets, one bucket after the other, each padded to a multiple of [`LANES`]
+/// with its last pixel.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct SamplingGrid {
     /// Side of the icon.
@@ -36,7 +38,8 @@ pub(crate) struct SamplingGrid {
     pub(crate) y: Vec<f32>,
     /// Index into the icon.
     pub(crate) at: Vec<u32>,
-    /// The same of the pixels to the left, right, above and below, on the border the pixel itself...
+    /// The same of the pixels to the left, right, above and below, on the border the pixel
+    /// itself...
     pub(crate) beside: [Vec<u32>; 4],
     /// ... and what their difference along x and along y is multiplied by to be a slope.
     pub(crate) per_px: [Vec<f32>; 2],
@@ -55,7 +58,8 @@ pub(crate) struct GridBucket {
 }
 
 impl SamplingGrid {
-    /// Of an icon of `size`, cut into `per_side` x `per_side` buckets, without `border` pixels all around.
+    /// Of an icon of `size`, cut into `per_side` x `per_side` buckets, without `border` pixels all
+    /// around.
     pub(crate) fn new(size: usize, per_side: usize, border: usize, pattern: Pattern) -> Self {
         let step = if pattern == Pattern::Fourth { 2 } else { 1 };
         let per_side = per_side.min(size / (step * MIN_POINTS_ALONG)).max(1);
@@ -132,8 +136,8 @@ pub(crate) fn square(size: usize) -> [Point2<f64>; 4] {
 }
 
 impl SquareMap {
-    /// From the square of an icon of `size` to `quad`, by Heckbert's closed form. `None` where the horizon would
-    /// cross it.
+    /// From the square of an icon of `size` to `quad`, by Heckbert's closed form. `None` where the
+    /// horizon would cross it.
     pub(crate) fn new(size: usize, quad: &[Point2<f64>; 4]) -> Option<Self> {
         let [tl, tr, br, bl] = quad;
         let sum = tl - tr + (br - bl);

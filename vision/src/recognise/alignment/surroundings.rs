@@ -1,5 +1,6 @@
-//! The surroundings of a quad, rectified, in which its corners may move: at a third of the icon's resolution for
-//! the coarse level, at full resolution for the fine ones, each computed on first use.
+//! The surroundings of a quad, rectified, in which its corners may move: at a third of the icon's
+//! resolution for the coarse level, at full resolution for the fine ones, each computed on first
+//! use.
 
 use crate::{
     frame::GrayImage,
@@ -67,7 +68,8 @@ pub struct Surroundings<'a> {
 }
 
 impl<'a> Surroundings<'a> {
-    /// Of `icon`, cut from `image` along `corners_px`. `None` when the quad is too close to the horizon.
+    /// Of `icon`, cut from `image` along `corners_px`. `None` when the quad is too close to the
+    /// horizon.
     pub fn new(image: &'a GrayImage, corners_px: &Corners, icon: &'a Icon, p: &AlignParams) -> Option<Self> {
         let image_from_icon = Homography::square_to_quad(icon.size, corners_px).ok()?;
         let all = Self::with(image_from_icon, icon, Around::Image(image), p)?;
@@ -131,7 +133,8 @@ impl<'a> Surroundings<'a> {
         PaddedIcon { pixels, ..full }
     }
 
-    /// `inner` of `size` with `margin` pixels around, from the image or, without a map into one, from its own border.
+    /// `inner` of `size` with `margin` pixels around, from the image or, without a map into one,
+    /// from its own border.
     fn framed(&self, inner: &[f32], size: usize, margin: usize, map: Option<&Homography>) -> Vec<f32> {
         let width = size + 2 * margin;
         let inside = |i: usize| i.saturating_sub(margin).min(size - 1);

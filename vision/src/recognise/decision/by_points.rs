@@ -1,10 +1,11 @@
-//! The decision by points: landmarks with point evidence in, the verdict out, or `None` where no landmark has
-//! enough evidence and the icons decide. Corners are those of the homography, refined by alignment with the learnt
-//! icon.
+//! The decision by points: landmarks with point evidence in, the verdict out, or `None` where no
+//! landmark has enough evidence and the icons decide. Corners are those of the homography, refined
+//! by alignment with the learnt icon.
 //!
-//! The number of false alarms is computed for unrelated pictures. Against look-alikes three more conditions hold:
-//! every other landmark with point evidence must be contradicted; where a landmark of the map lowered the likeness
-//! threshold, the likeness must pass that threshold; and a picture that is unlike the icon needs more evidence.
+//! The number of false alarms is computed for unrelated pictures. Against look-alikes three more
+//! conditions hold: every other landmark with point evidence must be contradicted; where a landmark
+//! of the map lowered the likeness threshold, the likeness must pass that threshold; and a picture
+//! that is unlike the icon needs more evidence.
 
 use crate::{
     detect::quad::Quad,
@@ -95,8 +96,8 @@ pub(crate) fn by_points(
     })
 }
 
-/// Largest standard deviation of a corner as a share of the landmark's size: beyond it the visible part does not
-/// determine the corners, and the landmark is not identified.
+/// Largest standard deviation of a corner as a share of the landmark's size: beyond it the visible
+/// part does not determine the corners, and the landmark is not identified.
 const MAX_CORNER_SIGMA_SHARE: f64 = 0.1;
 
 /// Whether the points determine the landmark's corners.
@@ -105,8 +106,8 @@ pub(crate) fn is_well_known(evidence: &PointEvidence) -> bool {
     evidence.corner_covariance_px2.iter().all(|c| c.symmetric_eigenvalues().max() <= limit_px2)
 }
 
-/// The refusal of `best` (landmark `model`, aligned with its icon) among `landmarks`, given the point evidence for
-/// `others`.
+/// The refusal of `best` (landmark `model`, aligned with its icon) among `landmarks`, given the
+/// point evidence for `others`.
 fn refusal<'a>(
     best: &LandmarkPoints,
     mut others: impl Iterator<Item = &'a LandmarkPoints>,
@@ -117,8 +118,8 @@ fn refusal<'a>(
     if is_doubtful(&best.evidence, alignment) {
         return Some(MatchRefusal::Disagreement);
     }
-    // The ratio of the exponents depends on the number of taught points, not on presence: a look-alike taught with
-    // fewer points agrees wherever it has any.
+    // The ratio of the exponents depends on the number of taught points, not on presence: a
+    // look-alike taught with fewer points agrees wherever it has any.
     let alarms = |evidence: &PointEvidence| log10_false_alarms(evidence, landmarks);
     let is_rival = |evidence: &PointEvidence| {
         let accepted = alarms(evidence) <= LOG10_EPSILON;
@@ -142,14 +143,14 @@ fn refusal<'a>(
     (has_look_alike(model, p) && !is_within_threshold).then_some(MatchRefusal::Similarity)
 }
 
-/// Whether a look-alike in the map lowered tau of the likeness below its cap: points alone may not separate the
-/// two.
+/// Whether a look-alike in the map lowered tau of the likeness below its cap: points alone may not
+/// separate the two.
 fn has_look_alike(model: &LandmarkModel, p: &Params) -> bool {
     model.likeness.tau < p.learn.threshold.nearest_share * p.learn.likeness_cap
 }
 
-/// Whether a connected part of the landmark mismatches: by its icon where aligned, as the icon covers every part;
-/// otherwise by its points.
+/// Whether a connected part of the landmark mismatches: by its icon where aligned, as the icon
+/// covers every part; otherwise by its points.
 pub(crate) fn is_doubtful(evidence: &PointEvidence, alignment: &IconAlignment) -> bool {
     alignment.has_mismatch.unwrap_or_else(|| evidence.agreement.largest_disagreement() >= DOUBTFUL_PARTS)
 }
@@ -159,8 +160,8 @@ fn is_contradicted(evidence: &PointEvidence) -> bool {
     is_doubtful(evidence, &IconAlignment::NONE)
 }
 
-/// The border of `quad` nearest to the landmark's: 0 for its corners, i for alternate i - 1; and its corners, the
-/// landmark's top-left first.
+/// The border of `quad` nearest to the landmark's: 0 for its corners, i for alternate i - 1; and
+/// its corners, the landmark's top-left first.
 fn nearest_border(quad: &Quad, evidence: &PointEvidence) -> (usize, Corners) {
     let turned =
         std::iter::once(&quad.corners_px).chain(&quad.alternates).map(|c| c.rotated(evidence.turned));
@@ -169,8 +170,8 @@ fn nearest_border(quad: &Quad, evidence: &PointEvidence) -> (usize, Corners) {
     nearest.unwrap_or((0, quad.corners_px.rotated(evidence.turned)))
 }
 
-/// Probability that the identity is right. The exponent is discounted, because the computed false-alarm rate holds
-/// only under the chance model.
+/// Probability that the identity is right. The exponent is discounted, because the computed
+/// false-alarm rate holds only under the chance model.
 fn confidence(log10_false_alarms: f64) -> f64 {
     const DISCOUNT: f64 = 0.35;
     1.0 - 10.0_f64.powf(DISCOUNT * log10_false_alarms.min(0.0))

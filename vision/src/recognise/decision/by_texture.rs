@@ -1,7 +1,9 @@
-//! A frame in whose quads landmarks may be missing in, landmarks that its texture shows without a border out.
+//! A frame in whose quads landmarks may be missing in, landmarks that its texture shows without a
+//! border out.
 //!
-//! The points of the frame vote for places of landmarks. The corners of a place are a quad like a detected one: the
-//! rules of points decide on it unchanged, with a price for the places that were searched.
+//! The points of the frame vote for places of landmarks. The corners of a place are a quad like a
+//! detected one: the rules of points decide on it unchanged, with a price for the places that were
+//! searched.
 
 use crate::{
     detect::quad::{Quad, QuadKind},
@@ -24,13 +26,14 @@ use std::f64::consts::FRAC_PI_2;
 
 /// Most places of a frame that are compared with the map, the best supported first.
 pub(crate) const MAX_PLACES: usize = 3;
-/// log10 of the different places, sizes and shapes of a landmark in a frame: a detected quad is at one of them.
+/// log10 of the different places, sizes and shapes of a landmark in a frame: a detected quad is at
+/// one of them.
 const LOG10_PLACES: f64 = 4.0;
 /// Overlap above which two landmarks cannot both be there.
 const SAME_PLACE_IOU: f64 = 0.3;
 
-/// Quads of landmarks that the texture of `image` shows beside those `named` already, with their verdicts, all unique.
-/// At most [`MAX_PLACES`].
+/// Quads of landmarks that the texture of `image` shows beside those `named` already, with their
+/// verdicts, all unique. At most [`MAX_PLACES`].
 pub(crate) fn by_texture(
     image: &GrayImage,
     named: &[(LandmarkId, Corners)],
@@ -70,7 +73,8 @@ pub(crate) fn by_texture(
     found
 }
 
-/// By how much the picture is rolled beyond whole quarters, radians, clockwise on screen, and which quarters to try.
+/// By how much the picture is rolled beyond whole quarters, radians, clockwise on screen, and which
+/// quarters to try.
 fn roll(image: &GrayImage, up: Option<&Up>, camera: Option<&Intrinsics>) -> (f64, std::ops::Range<usize>) {
     let centre = Point2::new(0.5 * image.width() as f64 - 0.5, 0.5 * image.height() as f64 - 0.5);
     let Some(down) = up.and_then(|up| up.down_at(&centre, camera)) else { return (0.0, 0..4) };
@@ -95,12 +99,12 @@ fn quad(frame: &FramePoints, place: &Place, turn: usize) -> Option<Quad> {
     })
 }
 
-/// Times that the rules are asked for a place: at its corners, and at those that the points gave then. Only there is a
-/// slanted landmark described as it was taught.
+/// Times that the rules are asked for a place: at its corners, and at those that the points gave
+/// then. Only there is a slanted landmark described as it was taught.
 const ROUNDS: usize = 2;
 
-/// The quad with the corners and covariances of its landmark, where the map's rules name exactly the one that the
-/// place was found by, in every round.
+/// The quad with the corners and covariances of its landmark, where the map's rules name exactly
+/// the one that the place was found by, in every round.
 fn identified(
     image: &GrayImage,
     mut quad: Quad,

@@ -9,9 +9,9 @@ use crate::recognise::{
     distance_kind::DistanceKind,
 };
 
-/// Probability that the identity of candidate `best` is right: a logistic model over [`measures`], fitted to
-/// labelled answers (`waymark-lab train confidence`), one per deciding distance. It never rises with any measure.
-/// Calibration: docs/EVALUATION.md. 0 without such a candidate.
+/// Probability that the identity of candidate `best` is right: a logistic model over [`measures`],
+/// fitted to labelled answers (`waymark-lab train confidence`), one per deciding distance. It never
+/// rises with any measure. Calibration: docs/EVALUATION.md. 0 without such a candidate.
 pub fn confidence(candidates: &[MatchCandidate], best: usize, landmarks: usize, kind: DistanceKind) -> f64 {
     let weights = match kind {
         DistanceKind::Both => &confidence_weights::BOTH,

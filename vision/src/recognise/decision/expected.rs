@@ -1,8 +1,9 @@
 //! Verification of one landmark at its expected corners, without a detected quad.
 //!
-//! In: an image, the landmark's model, its expected corners. Out: [`ExpectedLandmark`]: its corners with covariance
-//! and its evidence, or `None`. Points verify it also where the image border cuts it or a part is hidden; without
-//! point evidence the picture is aligned with its icon, and the landmark must be entirely visible.
+//! In: an image, the landmark's model, its expected corners. Out: [`ExpectedLandmark`]: its corners
+//! with covariance and its evidence, or `None`. Points verify it also where the image border cuts
+//! it or a part is hidden; without point evidence the picture is aligned with its icon, and the
+//! landmark must be entirely visible.
 
 use crate::{
     detect::quad::{Quad, QuadKind},
@@ -26,8 +27,8 @@ use nalgebra::{Matrix2, Point2};
 
 /// log10 of the largest expected number of false alarms for one landmark at one place.
 pub const LOG10_EPSILON_EXPECTED: f64 = -4.0;
-/// Evidence of a landmark that passes every gate of its icon, nats: fewer than one in a thousand quads of
-/// distractors pass (`docs/EVALUATION.md`).
+/// Evidence of a landmark that passes every gate of its icon, nats: fewer than one in a thousand
+/// quads of distractors pass (`docs/EVALUATION.md`).
 pub const ACCEPTED_NATS: f64 = 6.9;
 
 /// A landmark found where it was expected.

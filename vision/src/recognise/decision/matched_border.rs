@@ -8,7 +8,8 @@ use crate::{
 };
 use nalgebra::Matrix2;
 
-/// Where the landmark's texture puts its border: by points, by alignment, or, where neither was needed, as detected.
+/// Where the landmark's texture puts its border: by points, by alignment, or, where neither was
+/// needed, as detected.
 pub fn texture_border(quad: &Quad, verdict: &RecognitionResult, p: &Params) -> Option<SeenBorder> {
     if let Some(evidence) = &verdict.points {
         return Some(evidence.border());
@@ -18,9 +19,9 @@ pub fn texture_border(quad: &Quad, verdict: &RecognitionResult, p: &Params) -> O
     Some(SeenBorder { corners_px, covariance_px2, found_by: FoundBy::Alignment })
 }
 
-/// The landmark's border: as detected, or, where another border of the same object was taught than the one
-/// detected, as aligned. An alternate border has no covariances of its own: those of the quad are used, both follow
-/// from similar edges.
+/// The landmark's border: as detected, or, where another border of the same object was taught than
+/// the one detected, as aligned. An alternate border has no covariances of its own: those of the
+/// quad are used, both follow from similar edges.
 pub fn matched_border(quad: &Quad, verdict: &RecognitionResult, p: &Params) -> Option<SeenBorder> {
     if quad.kind == QuadKind::Texture {
         return verdict.points.as_ref().map(|evidence| evidence.border());

@@ -11,9 +11,9 @@ const HAUSDORFF_UNIT: f64 = 10.0;
 /// Number of measures.
 pub const MEASURES: usize = 7;
 
-/// Measures of candidate `best`, each the worse the larger, all within 0 to 2: D/tau and its square, the share of
-/// it in the next best's and its square, C^r, H^r, and the number of landmarks. `None` if there is no such
-/// candidate.
+/// Measures of candidate `best`, each the worse the larger, all within 0 to 2: D/tau and its
+/// square, the share of it in the next best's and its square, C^r, H^r, and the number of
+/// landmarks. `None` if there is no such candidate.
 pub fn measures(candidates: &[MatchCandidate], best: usize, landmarks: usize) -> Option<[f64; MEASURES]> {
     let answer = candidates.get(best)?;
     let others = candidates.iter().enumerate().filter(|(i, _)| *i != best);

@@ -17,7 +17,8 @@ pub enum MatchRefusal {
     Mismatch,
     /// Similar, but hardly beyond the frame.
     LowContent,
-    /// Accepted by its own thresholds, but another landmark, or the same one turned, is too close behind.
+    /// Accepted by its own thresholds, but another landmark, or the same one turned, is too close
+    /// behind.
     Margin,
     /// The point evidence has too many expected false alarms.
     Points,
@@ -25,7 +26,8 @@ pub enum MatchRefusal {
     Disagreement,
     /// Its points agree, but do not determine its corners.
     Corners,
-    /// Only its icon agrees, where points decide: not enough to identify it without the robot's pose.
+    /// Only its icon agrees, where points decide: not enough to identify it without the robot's
+    /// pose.
     Plain,
 }
 
@@ -49,7 +51,8 @@ pub struct MatchCandidate {
 pub enum Evidence {
     /// Points, by their expected false alarms.
     Points {
-        /// Likeness of the picture to the learnt icon after alignment, -1 to 1; `None` where it was not aligned.
+        /// Likeness of the picture to the learnt icon after alignment, -1 to 1; `None` where it was
+        /// not aligned.
         likeness: Option<f64>,
     },
     /// Icons.
@@ -59,16 +62,17 @@ pub enum Evidence {
 /// Distances between the icon of a quad and those of a landmark.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct IconEvidence {
-    /// C^r in [0, 2] (method 6.1): to the nearest exemplar, or, where the likeness refuses already, at the detected
-    /// corners to the exemplar nearest by its signature.
+    /// C^r in [0, 2] (method 6.1): to the nearest exemplar, or, where the likeness refuses already,
+    /// at the detected corners to the exemplar nearest by its signature.
     pub correlation: f64,
-    /// H^r in icon pixels times descriptor distance (method 6.2); infinite with too few points, and where another
-    /// gate refuses first.
+    /// H^r in icon pixels times descriptor distance (method 6.2); infinite with too few points, and
+    /// where another gate refuses first.
     pub hausdorff: f64,
-    /// Likeness of the picture to the learnt icon after alignment, -1 to 1; 0 where the coarse level rejected it
-    /// and nothing was accepted; `None` where the map's distances decide alone.
+    /// Likeness of the picture to the learnt icon after alignment, -1 to 1; 0 where the coarse
+    /// level rejected it and nothing was accepted; `None` where the map's distances decide alone.
     pub likeness: Option<f64>,
-    /// The deciding distance of the map's [`DistanceKind`](crate::recognise::distance_kind::DistanceKind).
+    /// The deciding distance of the map's
+    /// [`DistanceKind`](crate::recognise::distance_kind::DistanceKind).
     pub distance: f64,
     /// The deciding threshold.
     pub tau: f64,
@@ -98,12 +102,14 @@ pub struct RecognitionResult {
     pub entropy_norm: f64,
     /// Probability that the identity is right, 0 to 1 (`confidence.rs`); 0 unless `Unique`.
     pub confidence: f64,
-    /// Which of the four corner rotations matched: corner `rotation` of the quad is the landmark's top-left.
+    /// Which of the four corner rotations matched: corner `rotation` of the quad is the landmark's
+    /// top-left.
     pub rotation: usize,
     /// Which border matched: 0 for the quad's corners, i for alternate i - 1.
     pub border: usize,
-    /// The landmark's corners after alignment, its top-left first; `None` when it was accepted at the detected
-    /// corners. They differ from the quad's where another border of the same object was taught.
+    /// The landmark's corners after alignment, its top-left first; `None` when it was accepted at
+    /// the detected corners. They differ from the quad's where another border of the same object
+    /// was taught.
     pub aligned_px: Option<Corners>,
     /// Landmarks compared (N).
     pub landmarks: usize,

@@ -1,6 +1,6 @@
-//! A quad and the landmarks of a map in, the verdict out (method 10). Retrieval of the nearest landmarks,
-//! verification by template alignment, then thresholds, margin, probabilities and confidence. `Unknown` when in
-//! doubt.
+//! A quad and the landmarks of a map in, the verdict out (method 10). Retrieval of the nearest
+//! landmarks, verification by template alignment, then thresholds, margin, probabilities and
+//! confidence. `Unknown` when in doubt.
 
 use crate::{
     detect::quad::Quad,
@@ -118,8 +118,8 @@ fn decide(
     (verdict.rotation, verdict.border) = (readings[near.reading].rotation, readings[near.reading].border);
     verdict.aligned_px = found[best].moved;
     let margin = margin(found, best, kind);
-    // Departs from method 10, which asks for a margin only where two or more are accepted: a runner-up just above its
-    // own threshold is as much reason for doubt as one just below.
+    // Departs from method 10, which asks for a margin only where two or more are accepted: a
+    // runner-up just above its own threshold is as much reason for doubt as one just below.
     let refusal = if margin >= p.margin {
         Some(MatchRefusal::Margin)
     } else {
@@ -137,8 +137,8 @@ fn decide(
     verdict
 }
 
-/// The ratio of `best` over that of the nearest other landmark. 0 when there is no other landmark, 1 when the others
-/// have no distance to compare with.
+/// The ratio of `best` over that of the nearest other landmark. 0 when there is no other landmark,
+/// 1 when the others have no distance to compare with.
 fn margin(found: &[VerifiedLandmark], best: usize, kind: DistanceKind) -> f64 {
     if found.len() < 2 {
         return 0.0;

@@ -1,5 +1,5 @@
-//! Two icons in, bucketed correlation C^r out (method 6.1). Buckets are normalised once for each icon, so that a
-//! comparison is 25 dot products at the default parameters.
+//! Two icons in, bucketed correlation C^r out (method 6.1). Buckets are normalised once for each
+//! icon, so that a comparison is 25 dot products at the default parameters.
 
 use crate::{icon::Icon, recognise::features::separable::LANES};
 use serde::{Deserialize, Serialize};
@@ -36,7 +36,8 @@ impl CorrelationParams {
     }
 }
 
-/// The buckets of an icon, row by row, each of zero mean and norm 1 (all zeros when it is flat), one after the other.
+/// The buckets of an icon, row by row, each of zero mean and norm 1 (all zeros when it is flat),
+/// one after the other.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Buckets {
     per_side: usize,
@@ -124,8 +125,9 @@ pub(crate) fn ranked(correlations: &mut [f32], rank: usize) -> f64 {
     (1.0 - f64::from(*kth)).clamp(0.0, 2.0)
 }
 
-/// C^r when it is at most `limit`, else `None`; `None` also for icons cut differently. Counts buckets instead of
-/// ranking them, and stops as soon as the rest cannot reach the rank: unrelated icons cost half the dot products.
+/// C^r when it is at most `limit`, else `None`; `None` also for icons cut differently. Counts
+/// buckets instead of ranking them, and stops as soon as the rest cannot reach the rank: unrelated
+/// icons cost half the dot products.
 pub(crate) fn correlation_within(a: &Buckets, b: &Buckets, rank: usize, limit: f64) -> Option<f64> {
     if a.per_side != b.per_side || a.stride != b.stride {
         return None;
@@ -145,8 +147,8 @@ pub(crate) fn correlation_within(a: &Buckets, b: &Buckets, rank: usize, limit: f
     Some(ranked(&mut all[..total], rank)).filter(|d| *d <= limit)
 }
 
-/// C^r of two icons by their buckets, in [0, 2]: 0 for the same picture under any gain and offset. Icons of
-/// different sizes or bucket numbers have the largest distance: 2.
+/// C^r of two icons by their buckets, in [0, 2]: 0 for the same picture under any gain and offset.
+/// Icons of different sizes or bucket numbers have the largest distance: 2.
 pub fn correlation(a: &Buckets, b: &Buckets, p: &CorrelationParams) -> f64 {
     bucket_correlations(a, b).map_or(2.0, |mut all| ranked(&mut all, p.rank()))
 }

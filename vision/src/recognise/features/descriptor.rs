@@ -1,5 +1,6 @@
-//! Harris points in, described points out (method 5): seven steered derivatives divided by the gradient, invariant to
-//! rotation and to I -> a I + b, whitened by its covariance between views of one point.
+//! Harris points in, described points out (method 5): seven steered derivatives divided by the
+//! gradient, invariant to rotation and to I -> a I + b, whitened by its covariance between views of
+//! one point.
 
 use crate::{icon::Icon, recognise::features::harris::HarrisPoint};
 use serde::{Deserialize, Serialize};
@@ -8,7 +9,8 @@ use serde::{Deserialize, Serialize};
 pub const DIMENSION: usize = 7;
 /// A described point: `L_uu, L_uw, L_ww, L_uuu, L_uuw, L_uww, L_www` over `L_u`, whitened.
 pub type Descriptor = [f32; DIMENSION];
-/// Standard deviations of the raw components between views of one point, measured on synthetic posters (method 5).
+/// Standard deviations of the raw components between views of one point, measured on synthetic
+/// posters (method 5).
 const COLD_START: [f64; DIMENSION] = [0.29, 0.21, 0.30, 0.26, 0.12, 0.13, 0.25];
 /// Largest kernel radius in icon pixels, whatever the parameters say.
 const MAX_RADIUS: i32 = 32;
@@ -23,7 +25,8 @@ pub struct DescriptorParams {
     pub regularisation: f64,
     /// Raw components are clipped to this magnitude.
     pub clip: f64,
-    /// W, row by row: whitened = W raw. The default divides each component by its standard deviation over views.
+    /// W, row by row: whitened = W raw. The default divides each component by its standard
+    /// deviation over views.
     pub whitening: [[f64; DIMENSION]; DIMENSION],
 }
 
@@ -66,8 +69,8 @@ impl TryFrom<UncheckedPoints> for PointSet {
 }
 
 impl PointSet {
-    /// Checks that the three lists have one length, at most [`crate::recognise::features::harris::MAX_POINTS`], and
-    /// are finite.
+    /// Checks that the three lists have one length, at most
+    /// [`crate::recognise::features::harris::MAX_POINTS`], and are finite.
     pub fn new(
         xy_px: Vec<[f32; 2]>,
         descriptors: Vec<Descriptor>,
@@ -117,7 +120,8 @@ impl PointSet {
         &self.responses
     }
 
-    /// The points of `Icon::rotated(shift)` of an icon of side `size`. Descriptors do not change under rotation.
+    /// The points of `Icon::rotated(shift)` of an icon of side `size`. Descriptors do not change
+    /// under rotation.
     #[must_use]
     pub fn rotated(&self, shift: usize, size: usize) -> Self {
         let last = size as f32 - 1.0;
@@ -203,7 +207,8 @@ impl Jet {
         }
     }
 
-    /// `(L_uu, L_uw, L_ww, L_uuu, L_uuw, L_uww, L_www) / sqrt(L_u^2 + floor^2)`, u along the gradient, w across.
+    /// `(L_uu, L_uw, L_ww, L_uuu, L_uuw, L_uww, L_www) / sqrt(L_u^2 + floor^2)`, u along the
+    /// gradient, w across.
     fn steered(&self, floor: f64) -> [f64; DIMENSION] {
         let gradient = self.x.hypot(self.y);
         let norm = gradient.hypot(floor);
@@ -231,8 +236,9 @@ impl Jet {
     }
 }
 
-/// First sample and the weights of orders 0 to 3 of each sample around `centre`: correlation kernels of
-/// `sigma^n d^n/dx^n (G * I)`. Orders 1 to 3 sum to 0, so that a constant never leaks in.
+/// First sample and the weights of orders 0 to 3 of each sample around `centre`: correlation
+/// kernels of `sigma^n d^n/dx^n (G * I)`. Orders 1 to 3 sum to 0, so that a constant never leaks
+/// in.
 fn kernels(centre: f64, sigma: f64) -> (i32, Vec<[f64; 4]>) {
     let sigma = if sigma > 0.1 { sigma } else { 0.1 };
     let radius = ((5.0 * sigma).ceil() as i32).clamp(1, MAX_RADIUS);
@@ -241,7 +247,8 @@ fn kernels(centre: f64, sigma: f64) -> (i32, Vec<[f64; 4]>) {
         .map(|i| {
             let t = (f64::from(first + i) - centre) / sigma;
             let g = (-0.5 * t * t).exp();
-            // (-1)^n He_n(-t) = He_n(t): the sample at +t weighs the derivative at the centre with He_n(t) G.
+            // (-1)^n He_n(-t) = He_n(t): the sample at +t weighs the derivative at the centre with
+            // He_n(t) G.
             [g, t * g, (t * t - 1.0) * g, (t * t - 3.0) * t * g]
         })
         .collect();

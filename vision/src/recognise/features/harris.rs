@@ -30,8 +30,8 @@ pub struct HarrisParams {
     pub max_points: usize,
     /// The strongest this many of each of 5 x 5 parts of the icon are kept.
     ///
-    /// Departs from method 5, which keeps the strongest above 1e-3 of the peak wherever they are: a label, a lamp
-    /// or a passer-by with strong contrast would then take most of the points.
+    /// Departs from method 5, which keeps the strongest above 1e-3 of the peak wherever they are: a
+    /// label, a lamp or a passer-by with strong contrast would then take most of the points.
     pub max_points_per_part: usize,
 }
 
@@ -58,7 +58,8 @@ pub struct HarrisPoint {
     pub response: f32,
 }
 
-/// The strongest local maxima (5 x 5) of the Harris response, strongest first; equal ones in row-major order.
+/// The strongest local maxima (5 x 5) of the Harris response, strongest first; equal ones in
+/// row-major order.
 pub fn harris(icon: &Icon, p: &HarrisParams) -> Vec<HarrisPoint> {
     let response = response(icon, p);
     // Two pixels of neighbourhood are read around every point.

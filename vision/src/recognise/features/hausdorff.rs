@@ -1,5 +1,5 @@
-//! Two point sets in, partial Hausdorff distance H^r out (method 6.2): the k-th smallest distance of a point to its
-//! nearest match, position distance times descriptor distance.
+//! Two point sets in, partial Hausdorff distance H^r out (method 6.2): the k-th smallest distance
+//! of a point to its nearest match, position distance times descriptor distance.
 
 use crate::recognise::features::descriptor::PointSet;
 use serde::{Deserialize, Serialize};
@@ -20,8 +20,8 @@ impl Default for HausdorffParams {
     }
 }
 
-/// H^r: the greater of both directed distances, in icon pixels times Mahalanobis distance; infinite when either set
-/// has fewer than `min_points`.
+/// H^r: the greater of both directed distances, in icon pixels times Mahalanobis distance; infinite
+/// when either set has fewer than `min_points`.
 pub fn hausdorff(a: &PointSet, b: &PointSet, p: &HausdorffParams) -> f64 {
     let smaller = a.len().min(b.len());
     if smaller < p.min_points.max(1) {
@@ -49,8 +49,8 @@ pub struct Counterpart {
     pub distance: f64,
 }
 
-/// The nearest counterpart in `b` of each point of `a`: of these distances, [`hausdorff`] takes the k-th smallest.
-/// Empty where `b` has no point.
+/// The nearest counterpart in `b` of each point of `a`: of these distances, [`hausdorff`] takes the
+/// k-th smallest. Empty where `b` has no point.
 pub fn counterparts(a: &PointSet, b: &PointSet) -> Vec<Counterpart> {
     let nearest = |i: usize| {
         let squares = (0..b.len()).map(|j| (j, product_squared(a, i, b, j)));

@@ -14,8 +14,8 @@ use crate::{
     },
 };
 
-/// An icon with the features of both distances, computed once. Depends on icon, points, descriptor and bucket
-/// parameters only; not stored, since it follows from the icon.
+/// An icon with the features of both distances, computed once. Depends on icon, points, descriptor
+/// and bucket parameters only; not stored, since it follows from the icon.
 #[derive(Debug, Clone, PartialEq)]
 pub struct IconFeatures {
     /// The icon.

@@ -1,12 +1,13 @@
-//! A picture and two kernels in, the picture correlated with one along its rows and with the other along its
-//! columns out; the border is replicated.
+//! A picture and two kernels in, the picture correlated with one along its rows and with the other
+//! along its columns out; the border is replicated.
 
 use fearless_simd::{Level, dispatch};
 
 /// Bucket lengths are padded with zeros to a multiple of this, for vector units.
 pub(crate) const LANES: usize = 16;
 
-/// `pixels` in rows of `width`, correlated with `across` along x and `down` along y. Kernels of odd length.
+/// `pixels` in rows of `width`, correlated with `across` along x and `down` along y. Kernels of odd
+/// length.
 pub(crate) fn filtered(pixels: &[f32], width: usize, across: &[f32], down: &[f32]) -> Vec<f32> {
     dispatch!(Level::new(), _s => columns(&rows(pixels, width, across), width, down))
 }
@@ -58,8 +59,8 @@ fn columns(image: &[f32], width: usize, kernel: &[f32]) -> Vec<f32> {
     out
 }
 
-/// Fills a line of whole vectors with the sums of the parts of `source` that begin at `offsets`, each times its
-/// weight.
+/// Fills a line of whole vectors with the sums of the parts of `source` that begin at `offsets`,
+/// each times its weight.
 #[expect(clippy::inline_always, reason = "as above")]
 #[inline(always)]
 fn weighted(source: &[f32], offsets: &[usize], weights: &[f32], line: &mut [f32]) {

@@ -1,6 +1,6 @@
-//! Icon in, signature out: the directions of its grey-level slopes on a coarse grid, in a few hundred bytes. The
-//! inner product of two signatures ranks the landmarks for the short list, also where the detected border is a
-//! little beside the learnt one. Later stages verify the short list.
+//! Icon in, signature out: the directions of its grey-level slopes on a coarse grid, in a few
+//! hundred bytes. The inner product of two signatures ranks the landmarks for the short list, also
+//! where the detected border is a little beside the learnt one. Later stages verify the short list.
 //!
 //! Beyond the method (its section 6.3 asks for a global descriptor where there are many landmarks).
 
@@ -17,8 +17,8 @@ const MIN_DEVIATION: f32 = 1.0;
 /// A signature's length in steps of its numbers.
 const LENGTH: f32 = 480.0;
 
-/// The signature of an icon: whole numbers, of Euclidean length 480 as nearly as rounding lets it; all zeros for a
-/// flat icon.
+/// The signature of an icon: whole numbers, of Euclidean length 480 as nearly as rounding lets it;
+/// all zeros for a flat icon.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Signature([i8; SIGNATURE_BYTES]);
 
@@ -46,7 +46,8 @@ impl Signature {
     }
 }
 
-/// Likeness of two signatures: the cosine between them, -1 to 1 but for rounding; 0 with a flat icon.
+/// Likeness of two signatures: the cosine between them, -1 to 1 but for rounding; 0 with a flat
+/// icon.
 #[expect(
     clippy::inline_always,
     reason = "an instruction set holds only in what is inlined where it was chosen"

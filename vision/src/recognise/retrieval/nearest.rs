@@ -1,5 +1,5 @@
-//! Readings of one quad (borders times rotations) and a set of landmarks in, the nearest landmarks out, by the
-//! smallest distance over readings and exemplars (method 7.5). `decision` decides.
+//! Readings of one quad (borders times rotations) and a set of landmarks in, the nearest landmarks
+//! out, by the smallest distance over readings and exemplars (method 7.5). `decision` decides.
 
 use crate::{
     detect::quad::Quad,
@@ -63,8 +63,8 @@ impl QuadReading {
     }
 }
 
-/// Every reading of `quad` whose icon can be cut: all borders, and all four rotations where the orientation is
-/// ambiguous.
+/// Every reading of `quad` whose icon can be cut: all borders, and all four rotations where the
+/// orientation is ambiguous.
 pub(crate) fn quad_readings(image: &GrayImage, quad: &Quad, p: &Params) -> Vec<QuadReading> {
     let borders = std::iter::once(&quad.corners_px).chain(&quad.alternates).take(MAX_BORDERS);
     let rotations = if quad.upright_ambiguous { 4 } else { 1 };
@@ -123,8 +123,8 @@ fn ratio(distance: f64, tau: f64) -> f64 {
     if tau > 0.0 { distance / tau } else { f64::INFINITY }
 }
 
-/// The `count` landmarks whose signatures are most like one of the readings', best first, each with its best reading;
-/// of equal ones the lower id. Distances are initialised to their largest values.
+/// The `count` landmarks whose signatures are most like one of the readings', best first, each with
+/// its best reading; of equal ones the lower id. Distances are initialised to their largest values.
 pub(crate) fn short_list(readings: &[QuadReading], models: &ModelSet, count: usize) -> Vec<NearLandmark> {
     let mut found: Vec<(usize, Listed)> = Vec::new();
     for (i, reading) in readings.iter().enumerate() {

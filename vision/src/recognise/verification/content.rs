@@ -1,8 +1,9 @@
 //! Two aligned icons in, their similarity beyond the frame out.
 //!
-//! A frame is uniform along a whole side: moulding, mat, the edge of a panel. Many pictures and blank boards share
-//! one, so similarity of the frame does not identify a landmark. The frame is subtracted, and only the remaining
-//! content of the learnt icon counts. Beyond the method; the thresholds are in `VerdictParams`.
+//! A frame is uniform along a whole side: moulding, mat, the edge of a panel. Many pictures and
+//! blank boards share one, so similarity of the frame does not identify a landmark. The frame is
+//! subtracted, and only the remaining content of the learnt icon counts. Beyond the method; the
+//! thresholds are in `VerdictParams`.
 
 use crate::recognise::{
     features::correlation::CorrelationParams,
@@ -12,8 +13,8 @@ use crate::recognise::{
 /// Similarity of two icons beyond the frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Content {
-    /// Mean correlation of the slopes over the buckets, each weighted by the share of the learnt icon's slopes that
-    /// its frame does not explain, where both have texture; -1 to 1.
+    /// Mean correlation of the slopes over the buckets, each weighted by the share of the learnt
+    /// icon's slopes that its frame does not explain, where both have texture; -1 to 1.
     pub likeness: f64,
     /// Sum of those weights, in buckets. At most the number of buckets without the corners.
     pub shown: f64,
@@ -28,8 +29,8 @@ impl Content {
 const SHOWS: f32 = 15.0;
 /// ... to which noise and grain may add that much.
 const GRAIN: f32 = 30.0;
-/// A bucket of the picture has texture with slopes of this share of its mean, and this much: buckets under an
-/// untextured cover are ignored.
+/// A bucket of the picture has texture with slopes of this share of its mean, and this much:
+/// buckets under an untextured cover are ignored.
 const TEXTURED_SHARE: f32 = 0.08;
 const TEXTURED: f32 = 10.0;
 
@@ -75,8 +76,8 @@ fn is_corner(bucket: usize, side: usize) -> bool {
     end(bucket % side) && end(bucket / side)
 }
 
-/// The icon without its frame: from every pixel the mean of the pixels at the same distance from the same side is
-/// subtracted.
+/// The icon without its frame: from every pixel the mean of the pixels at the same distance from
+/// the same side is subtracted.
 fn without_frame(icon: &Smoothed) -> Smoothed {
     let size = icon.size();
     let mut sums = vec![[(0.0_f32, 0.0_f32); 4]; size.div_ceil(2)];

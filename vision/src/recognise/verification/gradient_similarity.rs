@@ -1,8 +1,10 @@
-//! Two aligned icons in, their gradient similarity out. Slopes are compared bucket by bucket: unlike grey levels,
-//! they are not correlated by common shading, and buckets without texture do not count.
+//! Two aligned icons in, their gradient similarity out. Slopes are compared bucket by bucket:
+//! unlike grey levels, they are not correlated by common shading, and buckets without texture do
+//! not count.
 //!
-//! Beyond the method: its distances compare icons at the detected corners; this one is for icons after alignment
-//! (`aligner.rs`), where it separates landmarks from look-alikes far better (docs/EVALUATION.md).
+//! Beyond the method: its distances compare icons at the detected corners; this one is for icons
+//! after alignment (`aligner.rs`), where it separates landmarks from look-alikes far better
+//! (docs/EVALUATION.md).
 
 use crate::{
     icon::Icon,
@@ -48,16 +50,18 @@ impl Smoothed {
 /// Similarity of two icons.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct IconComparison {
-    /// Mean over the buckets of the correlation of their slopes, -1 to 1; 0 where both are flat, or cut differently.
+    /// Mean over the buckets of the correlation of their slopes, -1 to 1; 0 where both are flat, or
+    /// cut differently.
     pub likeness: f64,
-    /// Share of the buckets in which both have texture that differs, 0 to 1. An untextured occluder does not
-    /// contradict; another picture does.
+    /// Share of the buckets in which both have texture that differs, 0 to 1. An untextured occluder
+    /// does not contradict; another picture does.
     pub contradicting: f64,
 }
 
 /// A bucket contradicts when its correlation is below this...
 pub(crate) const CONTRADICTS: f32 = 0.3;
-/// ... and both have slopes of at least this share of their icon's mean, and this much, in squared grey levels.
+/// ... and both have slopes of at least this share of their icon's mean, and this much, in squared
+/// grey levels.
 const SHOWS_SHARE: f32 = 0.1;
 const SHOWS_LEAST: f32 = 10.0;
 
@@ -85,8 +89,8 @@ pub fn between(a: &Smoothed, b: &Smoothed, p: &CorrelationParams) -> IconCompari
     }
 }
 
-/// The gradient correlation of every bucket pair, row by row: [`IconComparison::likeness`] is their mean. `None` where
-/// the icons are cut differently, or too small.
+/// The gradient correlation of every bucket pair, row by row: [`IconComparison::likeness`] is their
+/// mean. `None` where the icons are cut differently, or too small.
 pub fn bucket_similarities(a: &Icon, b: &Icon, p: &CorrelationParams) -> Option<Vec<f32>> {
     let buckets = compare(&Smoothed::new(a), &Smoothed::new(b), p)?;
     Some(buckets.iter().map(|b| b.correlation).collect())
@@ -143,7 +147,8 @@ impl Cell {
     }
 }
 
-/// `per_side` by `per_side` cells of two icons, row by row. None where the icons are cut differently, or too small.
+/// `per_side` by `per_side` cells of two icons, row by row. None where the icons are cut
+/// differently, or too small.
 pub(crate) fn cells(a: &Smoothed, b: &Smoothed, per_side: usize) -> Option<Vec<Cell>> {
     let size = a.size;
     let fit = b.size == size && size > 2 * BORDER_PX + per_side;

@@ -1,6 +1,6 @@
-//! Template alignment of a landmark with point evidence. In: the image, the evidence with the corners of the
-//! homography, the landmark. Out: the aligned corners in the evidence, the likeness there, and whether a part
-//! mismatches.
+//! Template alignment of a landmark with point evidence. In: the image, the evidence with the
+//! corners of the homography, the landmark. Out: the aligned corners in the evidence, the likeness
+//! there, and whether a part mismatches.
 
 use crate::{
     frame::GrayImage,
@@ -23,14 +23,15 @@ use crate::{
     seen_border::FoundBy,
 };
 
-/// Alignment is accepted from this likeness on if it moved no corner of the homography further than...
+/// Alignment is accepted from this likeness on if it moved no corner of the homography further
+/// than...
 const MIN_LIKENESS: f64 = 0.4;
 /// ... so many icon pixels, or...
 const MAX_MOVED_ICON_PX: f64 = 4.0;
 /// ... so many squared standard deviations: 99.99 % of a corner in the plane.
 const MAX_SQUARE: f64 = 18.4;
-/// From this likeness on alignment is accepted at any displacement: the covariance of points that lie at
-/// one end of a landmark is too small at its other end.
+/// From this likeness on alignment is accepted at any displacement: the covariance of points that
+/// lie at one end of a landmark is too small at its other end.
 const SURE_LIKENESS: f64 = 0.65;
 
 /// Comparison of the picture with a learnt icon after alignment.
@@ -47,9 +48,9 @@ impl IconAlignment {
     pub(crate) const NONE: Self = Self { likeness: None, has_mismatch: None };
 }
 
-/// Aligns the picture with the learnt icon, starting at the corners of `evidence` and, if that fails, at
-/// `detected_px`. The aligned corners replace those of `evidence` if its covariance allows them, or from
-/// [`SURE_LIKENESS`] on.
+/// Aligns the picture with the learnt icon, starting at the corners of `evidence` and, if that
+/// fails, at `detected_px`. The aligned corners replace those of `evidence` if its covariance
+/// allows them, or from [`SURE_LIKENESS`] on.
 pub(crate) fn align_to_icon(
     image: &GrayImage,
     evidence: &mut PointEvidence,
@@ -91,7 +92,8 @@ fn may_be_at(evidence: &PointEvidence, corners_px: &Corners, p: &Params) -> bool
     })
 }
 
-/// The picture aligned with the most similar of the learnt icons, starting at `start_px`, and that icon.
+/// The picture aligned with the most similar of the learnt icons, starting at `start_px`, and that
+/// icon.
 fn aligned(
     image: &GrayImage,
     start_px: &Corners,

@@ -6,20 +6,22 @@ use crate::{
     recognise::verification::gradient_similarity::{Bucket, CONTRADICTS, Smoothed, cells, shows},
 };
 
-/// Cells along a side. Windows of two by two overlap by half: each is as large as a part of the table.
+/// Cells along a side. Windows of two by two overlap by half: each is as large as a part of the
+/// table.
 pub const CELLS: usize = 2 * TABLE;
 /// Windows along a side.
 pub const WINDOWS: usize = CELLS - 1;
 /// Side of a block of windows, a quarter of the picture...
 const BLOCK: usize = 4;
-/// ... that mismatches if at least this many of its windows do. Chosen on the set `tune`; detection and false-alarm
-/// rates are in docs/EVALUATION.md, "Recognition with points".
+/// ... that mismatches if at least this many of its windows do. Chosen on the set `tune`; detection
+/// and false-alarm rates are in docs/EVALUATION.md, "Recognition with points".
 pub const MIN_DIFFERING: usize = 9;
-/// With more untextured cells where the icon has texture, the block is occluded: only the edge of the occluder
-/// differs.
+/// With more untextured cells where the icon has texture, the block is occluded: only the edge of
+/// the occluder differs.
 const MAX_HIDDEN: usize = 4;
 
-/// Where the icon has no texture, the picture mismatches with slopes of more than this share of its mean.
+/// Where the icon has no texture, the picture mismatches with slopes of more than this share of its
+/// mean.
 const APPEARS_SHARE: f32 = 0.5;
 
 /// The mismatched windows and the untextured cells of a picture.
@@ -30,7 +32,8 @@ pub struct MismatchMap {
 }
 
 impl MismatchMap {
-    /// Compares `picture`, aligned with `learnt`, with it. `None` where the icons are cut differently.
+    /// Compares `picture`, aligned with `learnt`, with it. `None` where the icons are cut
+    /// differently.
     pub fn new(picture: &Smoothed, learnt: &Smoothed) -> Option<Self> {
         let cells = cells(picture, learnt, CELLS)?;
         let of_two = |i: usize| {

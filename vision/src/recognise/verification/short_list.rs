@@ -1,5 +1,5 @@
-//! Nearest landmarks in, the same after template alignment out: stronger evidence than a distance at the detected
-//! corners. `decision` decides.
+//! Nearest landmarks in, the same after template alignment out: stronger evidence than a distance
+//! at the detected corners. `decision` decides.
 
 use crate::{
     frame::GrayImage,
@@ -49,8 +49,8 @@ impl VerifiedLandmark {
     /// The first gate that refuses it.
     /// `share` scales tau of the likeness for the size of the map.
     pub(crate) fn refusal(&self, kind: DistanceKind, share: f64, p: &VerdictParams) -> Option<MatchRefusal> {
-        // Alignment favours the template, so its limit is stricter, except for `Both`: its tau was learnt after
-        // alignment.
+        // Alignment favours the template, so its limit is stricter, except for `Both`: its tau was
+        // learnt after alignment.
         let limit = if self.moved.is_some() { p.verified_share } else { 1.0 };
         // Written so that a NaN refuses.
         let below = |ratio: f64, limit: f64| ratio < limit;
@@ -76,8 +76,8 @@ impl VerifiedLandmark {
     }
 }
 
-/// Aligns the quad's picture with the exemplar of each landmark of the short list; the distances are those after
-/// alignment. Landmarks rejected at the coarse level are not aligned further.
+/// Aligns the quad's picture with the exemplar of each landmark of the short list; the distances
+/// are those after alignment. Landmarks rejected at the coarse level are not aligned further.
 pub(crate) fn verify_short_list(
     image: &GrayImage,
     readings: &[QuadReading],
@@ -125,8 +125,8 @@ pub(crate) fn verify_short_list(
     watch.finished(RecogniseStep::Distances);
 }
 
-/// Sets the likeness at the detected corners for landmarks that were not aligned: the margin of an accepted
-/// landmark includes them.
+/// Sets the likeness at the detected corners for landmarks that were not aligned: the margin of an
+/// accepted landmark includes them.
 fn compare_as_found(readings: &[QuadReading], found: &mut [VerifiedLandmark], c: &CorrelationParams) {
     let mut smoothed: Vec<Option<Smoothed>> = vec![None; readings.len()];
     for VerifiedLandmark { near, .. } in found.iter_mut().filter(|j| j.moved.is_none()) {
@@ -136,8 +136,8 @@ fn compare_as_found(readings: &[QuadReading], found: &mut [VerifiedLandmark], c:
     }
 }
 
-/// C^r and H^r of an icon to the nearest of a model's exemplars. For a landmark that only points identify, H^r is
-/// not computed and stays infinite.
+/// C^r and H^r of an icon to the nearest of a model's exemplars. For a landmark that only points
+/// identify, H^r is not computed and stays infinite.
 pub(crate) fn distances(icon: &Icon, model: &LandmarkModel, p: &Params) -> (f64, f64) {
     let c = &p.recognise.correlation;
     let own = Buckets::new(icon, c);

@@ -16,7 +16,8 @@ use std::sync::Arc;
 /// Stops of a seed that no constant was chosen on.
 const SEED: u64 = 815;
 
-/// The answer to a frame with these extrinsics; `prior` is where the robot thinks it is, to 5 cm and a degree.
+/// The answer to a frame with these extrinsics; `prior` is where the robot thinks it is, to 5 cm
+/// and a degree.
 fn answered(
     scene: &Scene,
     map: &MapSnapshot,
@@ -60,7 +61,8 @@ fn resized(map: &MapSnapshot, factor: f64) -> MapSnapshot {
     map
 }
 
-/// Counts the refused frames, and those whose first cause is this one with a value within the tolerance.
+/// Counts the refused frames, and those whose first cause is this one with a value within the
+/// tolerance.
 #[derive(Debug, Default)]
 struct Count {
     refused: usize,

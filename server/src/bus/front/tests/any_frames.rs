@@ -1,5 +1,6 @@
-//! Claim: whatever frames a robot sends, no thread of the router behind the front panics, and another client loses no message.
-//! `WAYMARK_RUNS` says how many frames; each connection sends some of them, until it is ended.
+//! Claim: whatever frames a robot sends, no thread of the router behind the front panics, and
+//! another client loses no message. `WAYMARK_RUNS` says how many frames; each connection sends some
+//! of them, until it is ended.
 
 use super::*;
 use std::{
@@ -221,7 +222,8 @@ async fn received(from: &mut ReadHalf<DuplexStream>) -> TransportBody {
     message.expect("a message").body
 }
 
-/// Opens a session, and sends frames until there are enough or the connection ends; how many went, and how it ended.
+/// Opens a session, and sends frames until there are enough or the connection ends; how many went,
+/// and how it ended.
 async fn connection(router: &std::path::Path, random: &mut Random, lasting: &Lasting) -> (u64, End) {
     random.temper = [Temper::Good, Temper::Wild, Temper::Broken][random.below(3) as usize];
     (random.next_key, random.next_id) = (1, 1);
@@ -265,7 +267,8 @@ async fn any_frames_of_a_robot_leave_the_router_and_others_whole() {
     static PANICS: AtomicU64 = AtomicU64::new(0);
     let before = panic::take_hook();
     panic::set_hook(Box::new(move |what| {
-        // Threads of other tests may panic on purpose; those of zenoh's runtimes have names of its own.
+        // Threads of other tests may panic on purpose; those of zenoh's runtimes have names of its
+        // own.
         let thread = std::thread::current().name().unwrap_or_default().to_owned();
         if ["rx-", "tx-", "net-", "app-", "acc-"].iter().any(|zenoh| thread.starts_with(zenoh)) {
             PANICS.fetch_add(1, Ordering::Relaxed);

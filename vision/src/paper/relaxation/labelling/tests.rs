@@ -5,7 +5,8 @@ fn label(item: usize, start: f64, bias: f64) -> Label {
     Label { item, start, bias }
 }
 
-/// Symmetric matching among `n` items with given scores, reciprocal +1 and sharing -1, as both passes build it.
+/// Symmetric matching among `n` items with given scores, reciprocal +1 and sharing -1, as both
+/// passes build it.
 fn matching(n: usize, scores: &[(usize, usize, f64)]) -> Problem {
     let mut rows = vec![Vec::new(); n];
     for &(k, l, s) in scores {

@@ -13,7 +13,8 @@ fn a_square_with_perfect_sides_scores_one() {
     let pairs = pairs(&segments, &image, &SimilarityParams::default());
     assert_eq!(pairs.iter().map(|p| (p.k, p.l)).collect::<Vec<_>>(), vec![(0, 2), (1, 3)]);
     for pair in &pairs {
-        // Method 21: c1 = c2 = c3 = c4 = 1; perfect corners and a uniform square make the other two 1 as well.
+        // Method 21: c1 = c2 = c3 = c4 = 1; perfect corners and a uniform square make the other two
+        // 1 as well.
         for cue in pair.cues {
             assert!((cue - 1.0).abs() < 1e-3, "{pair:?}");
         }
@@ -25,7 +26,8 @@ fn a_square_with_perfect_sides_scores_one() {
 
 #[test]
 fn cues_by_hand() {
-    // Sides of 100 and 50 px, 80 px apart, level; the shorter one lies within the longer one's span.
+    // Sides of 100 and 50 px, 80 px apart, level; the shorter one lies within the longer one's
+    // span.
     let (a, b) = (segment([0.0, 0.0], [100.0, 0.0]), segment([10.0, 80.0], [60.0, 80.0]));
     assert!((inverse_ratio(a.length_px, b.length_px) - 0.8).abs() < 1e-12);
     assert!(angle_between(&a, &b) < 1e-12);

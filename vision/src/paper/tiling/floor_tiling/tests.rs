@@ -33,7 +33,8 @@ fn room(tilt_rad: f64, turn_rad: f64, tile_m: f64) -> Room {
 }
 
 impl Room {
-    /// Grey level along the ray through a pixel: light tiles with dark joints, a light wall with dark posters.
+    /// Grey level along the ray through a pixel: light tiles with dark joints, a light wall with
+    /// dark posters.
     fn level(&self, u: f64, v: f64) -> f64 {
         let k = &self.view.intrinsics;
         let (x, y) = ((u - k.cx_px) / k.fx_px, (v - k.cy_px) / k.fy_px);
@@ -280,7 +281,8 @@ fn quads_of_the_floor_are_removed_and_those_of_the_wall_stay() {
         trace::NoTrace,
     };
     let room = Room { chequered: true, ..room(-0.2, 0.35, 0.3) };
-    // As noisy as the segments above. Without calibration one scale of some quieter pictures is missed.
+    // As noisy as the segments above. Without calibration one scale of some quieter pictures is
+    // missed.
     let image = room.image(2.0);
     for grouping in [Grouping::Proposals, Grouping::Relaxation] {
         let count = |tiling: TilingParams| {

@@ -164,8 +164,8 @@ fn the_landmarks_border_is_chosen_over_the_wall_panel() {
     assert_eq!(by_points(&image, &nested, &six(&p), &p).unwrap().border, 1);
 }
 
-/// Only the upper left of the landmark has points, the rest is hidden, and another border was detected: the
-/// identity is certain, the lower right corner is undetermined.
+/// Only the upper left of the landmark has points, the rest is hidden, and another border was
+/// detected: the identity is certain, the lower right corner is undetermined.
 #[test]
 fn a_landmark_with_undetermined_corners_is_not_identified() {
     let p = Params::default();
@@ -189,9 +189,9 @@ fn a_landmark_with_undetermined_corners_is_not_identified() {
     assert_eq!(asked(0.5), Some((Verdict::Ambiguous(first), Some(MatchRefusal::Corners))));
 }
 
-/// Corners of small and large posters that were found by another border than the taught one, in blurred and noisy
-/// images: squared errors are what their covariances say without the 0.3 px of the taught border, which is exact
-/// here.
+/// Corners of small and large posters that were found by another border than the taught one, in
+/// blurred and noisy images: squared errors are what their covariances say without the 0.3 px of
+/// the taught border, which is exact here.
 #[test]
 fn corner_errors_agree_with_their_covariance() {
     let p = Params::default();

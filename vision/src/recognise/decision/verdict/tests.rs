@@ -1,4 +1,5 @@
-//! The decision on drawn posters: right, unknown, ambiguous; rotations, borders, light, occlusion; every refusal.
+//! The decision on drawn posters: right, unknown, ambiguous; rotations, borders, light, occlusion;
+//! every refusal.
 
 use super::*;
 use crate::{

@@ -103,7 +103,8 @@ fn a_frame_without_content_is_not_accepted() {
     let blank = trained(&framed(None));
     let ModelStatus::Candidate(failures) = &blank.status else { panic!("{:?}", blank.status) };
     assert!(failures.iter().any(|f| f.gate == Gate::Content), "{failures:?}");
-    // A picture in that frame is a landmark, distinct from the empty frame and from another picture in it.
+    // A picture in that frame is a landmark, distinct from the empty frame and from another picture
+    // in it.
     let taught = trained(&framed(Some(3)));
     assert!(taught.is_active(), "{:?}", taught.status);
     let set = ModelSet::new(vec![Arc::new(taught)], &PARAMS).unwrap();
@@ -186,7 +187,8 @@ fn tau_shrinks_in_large_maps() {
     assert!(reported.ratio > 1.0 && (icon.distance / icon.tau - reported.ratio).abs() < 1e-9);
 }
 
-/// A picture that identifies a landmark where icons decide does not where points decide and give no evidence.
+/// A picture that identifies a landmark where icons decide does not where points decide and give no
+/// evidence.
 #[test]
 fn where_points_decide_icons_alone_do_not_identify() {
     let image = photograph(&poster(1), &oblique(), 0.8, 20.0);

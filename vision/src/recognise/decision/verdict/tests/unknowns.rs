@@ -1,5 +1,6 @@
-//! Claim: the icons accept at most 1 % of pictures that are no landmark but a third of one shows through them. The bound is
-//! near to what is measured, so thresholds that are a tenth too loose break it.
+//! Claim: the icons accept at most 1 % of pictures that are no landmark but a third of one shows
+//! through them. The bound is near to what is measured, so thresholds that are a tenth too loose
+//! break it.
 
 use super::*;
 
