@@ -141,8 +141,8 @@ fn pose_text(quad: &QuadAnswer) -> String {
 /// The points' evidence for the first candidate; empty where points did not decide.
 fn by_points(quad: &QuadAnswer) -> String {
     quad.points.as_ref().map_or_else(String::new, |points| {
-        let alarms = points.log10_false_alarms.round();
-        format!(", {} of {} matches agree, 1e{alarms} false alarms expected", points.inliers, points.matches)
+        let chance = points.log10_chance.round();
+        format!(", {} of {} matches agree, by chance 1e{chance}", points.inliers, points.matches)
     })
 }
 
@@ -201,7 +201,7 @@ mod tests {
     #[test]
     fn a_line_says_what_points_say() {
         let points =
-            PointEvidence { matches: 40, inliers: 34, log10_false_alarms: -21.3, ..PointEvidence::default() };
+            PointEvidence { matches: 40, inliers: 34, log10_chance: -21.3, ..PointEvidence::default() };
         let mut quad = QuadAnswer {
             verdict: Verdict::Unique.into(),
             landmark: "door".into(),
@@ -209,7 +209,7 @@ mod tests {
             points: Some(points),
             ..QuadAnswer::default()
         };
-        let evidence = ", 34 of 40 matches agree, 1e-21 false alarms expected";
+        let evidence = ", 34 of 40 matches agree, by chance 1e-21";
         assert_eq!(of(&quad), format!("a.jpg: 1 quad\n  door with confidence 0.98{evidence}"));
         quad.pose_refusal = "no_size".into();
         assert!(of(&quad).ends_with("no pose: its size is not known (waymark landmark size door WxH)"));

@@ -243,18 +243,21 @@ pub struct Quads {
 pub struct Candidate {
     #[prost(string, tag = "1")]
     pub landmark: ::prost::alloc::string::String,
-    /// C^r and H^r; H^r is absent when there are too few points, and when another gate refused already.
-    #[prost(double, tag = "2")]
-    pub correlation: f64,
+    /// C^r and H^r; absent where points decide. H^r is absent, too, when there are too few points, and when another gate
+    /// refused already.
+    #[prost(double, optional, tag = "2")]
+    pub correlation: ::core::option::Option<f64>,
     #[prost(double, optional, tag = "3")]
     pub hausdorff: ::core::option::Option<f64>,
-    /// The distance that decides, its threshold and their ratio (accepted below 1).
-    #[prost(double, tag = "4")]
-    pub distance: f64,
-    #[prost(double, tag = "5")]
-    pub threshold: f64,
+    /// The distance that decides and its threshold; absent where points decide, and where the distance is infinite.
+    #[prost(double, optional, tag = "4")]
+    pub distance: ::core::option::Option<f64>,
+    #[prost(double, optional, tag = "5")]
+    pub threshold: ::core::option::Option<f64>,
+    /// Accepted below 1: the distance over its threshold, or, where points decide, -5 over their log10_chance.
     #[prost(double, tag = "6")]
     pub ratio: f64,
+    /// Equal for each landmark that the verdict leaves, and for `probability_none` where that is left.
     #[prost(double, tag = "7")]
     pub probability: f64,
     /// Empty, or the gate that refused it: correlation, hausdorff, similarity, mismatch, low_content, margin,
@@ -283,10 +286,10 @@ pub struct PointEvidence {
     pub checked: u32,
     #[prost(uint32, tag = "4")]
     pub agreeing: u32,
-    /// log10 of the number of such coincidences expected when something else is compared with the whole map. Accepted from
-    /// -5 downwards.
+    /// log10 of the number of such agreements by a model of chance: independent points, the whole map compared. Accepted from
+    /// -5 downwards. It orders evidence and is no rate of wrong names: real pictures have more in common than chance gives.
     #[prost(double, tag = "5")]
-    pub log10_false_alarms: f64,
+    pub log10_chance: f64,
     /// 25 values: the landmark divided into 5 by 5 equal parts, as it was taught, upright. Rows from its top, in each row
     /// from its left: value 5 * row + column.
     #[prost(enumeration = "PartAgreement", repeated, tag = "6")]
@@ -352,7 +355,8 @@ pub struct QuadAnswer {
     pub landmark: ::prost::alloc::string::String,
     #[prost(message, repeated, tag = "6")]
     pub candidates: ::prost::alloc::vec::Vec<Candidate>,
-    /// The paper's measure, and the one normalised by ln(N+1).
+    /// The paper's measure of how alone the answer stands, and the one normalised by ln(N+1); 1: one possibility is left,
+    /// a landmark or none of the map.
     #[prost(double, tag = "7")]
     pub entropy_m: f64,
     #[prost(double, tag = "8")]
@@ -391,6 +395,10 @@ pub struct QuadAnswer {
     /// stays what the picture alone says; corners and pose are those of this landmark. Empty unless GUIDED.
     #[prost(string, tag = "17")]
     pub guided_landmark: ::prost::alloc::string::String,
+    /// Probability that the quad is none of the map's landmarks: 1 where none was accepted, the share of one more possibility
+    /// where the only accepted one is in doubt, else 0.
+    #[prost(double, tag = "18")]
+    pub probability_none: f64,
 }
 /// A number that makes recognised landmarks fit a pose if it alone is changed.
 #[derive(::serde::Serialize, ::serde::Deserialize)]

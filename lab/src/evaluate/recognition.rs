@@ -262,7 +262,7 @@ fn explain(image: &TruthImage, landmark: Option<&str>, labelled: &Corners, answe
             .take(3)
             .map(|c| {
                 format!(
-                    "{} ratio {:.2} C {:.2} H {:.1?} {}",
+                    "{} ratio {:.2} C {:.2?} H {:.1?} {}",
                     c.landmark, c.ratio, c.correlation, c.hausdorff, c.refusal
                 )
             })

@@ -39,24 +39,22 @@ pub fn verdict(recognition: Verdict) -> v1::Verdict {
 
 /// A candidate; `name` gives the landmark's name.
 pub fn candidate(c: &MatchCandidate, name: impl Fn(LandmarkId) -> String) -> v1::Candidate {
-    let icon = match c.evidence {
-        Evidence::Icon(icon) => icon,
-        // The wire has no absent C^r and threshold: the largest C^r, and the ratio as the distance.
-        Evidence::Points { likeness } => {
-            IconEvidence { correlation: 2.0, hausdorff: f64::INFINITY, likeness, distance: c.ratio, tau: 1.0 }
-        }
+    let (icon, likeness) = match c.evidence {
+        Evidence::Icon(icon) => (Some(icon), icon.likeness),
+        Evidence::Points { likeness } => (None, likeness),
     };
+    // JSON has no infinity: an infinite distance (too few points) is absent.
+    let of = |value: fn(&IconEvidence) -> f64| icon.as_ref().map(value).filter(|v| v.is_finite());
     v1::Candidate {
         landmark: name(c.landmark),
-        correlation: icon.correlation,
-        // JSON has no infinity: an infinite distance (too few points) is absent.
-        hausdorff: icon.hausdorff.is_finite().then_some(icon.hausdorff),
-        distance: finite(icon.distance),
-        threshold: finite(icon.tau),
+        correlation: of(|i| i.correlation),
+        hausdorff: of(|i| i.hausdorff),
+        distance: of(|i| i.distance),
+        threshold: of(|i| i.tau),
         ratio: finite(c.ratio),
         probability: c.probability,
         refusal: c.refusal.map_or("", refusal).to_owned(),
-        gradient_similarity: icon.likeness.filter(|l| l.is_finite()),
+        gradient_similarity: likeness.filter(|l| l.is_finite()),
     }
 }
 
@@ -83,8 +81,9 @@ pub fn fill_verdict(quad: &mut v1::QuadAnswer, v: &RecognitionResult, name: impl
         quad.landmark = name(id);
     }
     quad.candidates = v.candidates.iter().map(|c| candidate(c, &name)).collect();
-    quad.entropy_m = v.entropy_m;
-    quad.entropy_norm = v.entropy_norm;
+    quad.entropy_m = v.possibilities.entropy_m(v.landmarks);
+    quad.entropy_norm = v.possibilities.entropy_norm(v.landmarks);
+    quad.probability_none = v.possibilities.probability_none();
     quad.confidence = v.confidence;
     quad.points = v.points.as_deref().map(|evidence| points(evidence, v.landmarks));
     quad.doubtful_landmark = doubtful(v).map(name).unwrap_or_default();
@@ -103,7 +102,7 @@ pub fn points(evidence: &PointEvidence, landmarks: usize) -> v1::PointEvidence {
         checked: evidence.checked as u32,
         agreeing: evidence.agreeing as u32,
         // JSON has no infinity.
-        log10_false_alarms: log10_false_alarms(evidence, landmarks).max(f64::MIN),
+        log10_chance: log10_false_alarms(evidence, landmarks).max(f64::MIN),
         agreement: evidence.agreement.0.as_flattened().iter().map(|p| part(p).into()).collect(),
     }
 }
@@ -130,7 +129,7 @@ fn solution(s: &PoseSolution) -> v1::LandmarkPose {
     }
 }
 
-/// Distances may be infinite (too few points); the wire and JSON say it as the largest number.
+/// A ratio may be infinite (too few points); JSON has no infinity: the largest number.
 fn finite(value: f64) -> f64 {
     if value.is_finite() { value } else { f64::MAX }
 }
@@ -139,7 +138,7 @@ fn finite(value: f64) -> f64 {
 mod tests {
     use super::*;
     use nalgebra::Matrix2;
-    use vision::points::agreement::Agreement;
+    use vision::{paper::entropy::Possibilities, points::agreement::Agreement};
 
     #[test]
     fn an_infinite_distance_stays_writable() {
@@ -162,15 +161,14 @@ mod tests {
             ("l4", "hausdorff", None)
         );
         let json = serde_json::to_value(&wire).unwrap();
-        assert!(json["distance"].is_number() && json["ratio"].is_number());
+        assert!(json["ratio"].is_number() && json["distance"].is_null() && json["threshold"] == 0.5);
     }
 
     fn ambiguous() -> RecognitionResult {
         RecognitionResult {
             verdict: Verdict::Ambiguous(LandmarkId(1)),
             candidates: vec![],
-            entropy_m: 1.0,
-            entropy_norm: 0.5,
+            possibilities: Possibilities::new(1, true),
             confidence: 0.2,
             rotation: 0,
             border: 0,
@@ -204,7 +202,7 @@ mod tests {
         let wire = points(&evidence(), 100);
         assert_eq!((wire.matches, wire.inliers, wire.checked, wire.agreeing), (30, 21, 12, 9));
         // Four turns (0.6) and 100 landmarks (2).
-        assert!((wire.log10_false_alarms + 17.4).abs() < 1e-9, "{}", wire.log10_false_alarms);
+        assert!((wire.log10_chance + 17.4).abs() < 1e-9, "{}", wire.log10_chance);
         let said: Vec<_> =
             wire.agreement().enumerate().filter(|(_, p)| *p != v1::PartAgreement::Silent).collect();
         assert_eq!(wire.agreement.len(), 25);
@@ -217,7 +215,7 @@ mod tests {
             ]
         );
         let never = PointEvidence { log10_nfa: f64::NEG_INFINITY, ..evidence() };
-        assert!(serde_json::to_value(points(&never, 1)).unwrap()["log10_false_alarms"].is_number());
+        assert!(serde_json::to_value(points(&never, 1)).unwrap()["log10_chance"].is_number());
     }
 
     /// The doubtful landmark has a field of its own: a client without that field reads "ambiguous".
@@ -245,6 +243,25 @@ mod tests {
         );
         assert_eq!(quad.points.map(|p| p.inliers), Some(21));
         assert_eq!(filled(MatchRefusal::Margin).doubtful_landmark, "");
+    }
+
+    /// Where points decide, distances of icons are absent, and a landmark in doubt is not certain.
+    #[test]
+    fn nothing_is_sent_that_was_not_measured() {
+        let c = MatchCandidate {
+            landmark: LandmarkId(1),
+            evidence: Evidence::Points { likeness: Some(0.4) },
+            ratio: 0.3,
+            probability: 0.5,
+            refusal: Some(MatchRefusal::Disagreement),
+        };
+        let mut quad = v1::QuadAnswer::default();
+        fill_verdict(&mut quad, &RecognitionResult { candidates: vec![c], ..ambiguous() }, |_| "door".into());
+        let json = serde_json::to_value(&quad.candidates[0]).unwrap();
+        let absent = ["correlation", "hausdorff", "distance", "threshold"];
+        assert!(absent.iter().all(|name| json[*name].is_null()), "{json}");
+        assert_eq!((json["gradient_similarity"].as_f64(), json["ratio"].as_f64()), (Some(0.4), Some(0.3)));
+        assert!((quad.probability_none - 0.5).abs() < 1e-12 && quad.entropy_norm < 0.5, "{quad:?}");
     }
 
     #[test]

@@ -205,7 +205,7 @@ fn evidence_in(answers: &[v1::Answer], landmark: String) -> LandmarkEvidence {
     for quad in answers.iter().flat_map(|answer| &answer.quads) {
         let is_named = [&quad.landmark, &quad.guided_landmark].contains(&&shown.landmark);
         let is_doubtful = quad.doubtful_landmark == shown.landmark;
-        let bin = quad.points.as_ref().map(|points| (-points.log10_false_alarms / EVIDENCE_BIN) as usize);
+        let bin = quad.points.as_ref().map(|points| (-points.log10_chance / EVIDENCE_BIN) as usize);
         match bin.map(|bin| bin.min(EVIDENCE_BINS - 1)) {
             Some(bin) if is_named => shown.named[bin] += 1,
             Some(bin) if is_doubtful => shown.doubtful[bin] += 1,

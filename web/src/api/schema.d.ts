@@ -209,12 +209,15 @@ export interface components {
         };
         Candidate: {
             landmark: string;
-            /** C^r and H^r; H^r is absent when there are too few points, and when another gate refused already. */
-            correlation: number;
+            /** C^r and H^r; absent where points decide. H^r is absent, too, when there are too few points, and when another gate refused already. */
+            correlation: number | null;
             hausdorff: number | null;
-            /** The distance that decides, its threshold and their ratio (accepted below 1). */ distance: number;
-            threshold: number;
+            /** The distance that decides and its threshold; absent where points decide, and where the distance is infinite. */
+            distance: number | null;
+            threshold: number | null;
+            /** Accepted below 1: the distance over its threshold, or, where points decide, -5 over their log10_chance. */
             ratio: number;
+            /** Equal for each landmark that the verdict leaves, and for `probability_none` where that is left. */
             probability: number;
             /** Empty, or the gate that refused it: correlation, hausdorff, similarity, mismatch, low_content, margin, points (so many points would agree by chance too often), disagreement (a connected part shows something else), corners (points agree, but do not tell where its corners are), plain (its icon alone speaks for it). */
             refusal: string;
@@ -1095,8 +1098,8 @@ export interface components {
             /** Further points of the landmark that the image shows, at different places, and how many of them look as taught. */
             checked: number;
             agreeing: number;
-            /** log10 of the number of such coincidences expected when something else is compared with the whole map. Accepted from -5 downwards. */
-            log10_false_alarms: number;
+            /** log10 of the number of such agreements by a model of chance: independent points, the whole map compared. Accepted from -5 downwards. It orders evidence and is no rate of wrong names: real pictures have more in common than chance gives. */
+            log10_chance: number;
             /** 25 values: the landmark divided into 5 by 5 equal parts, as it was taught, upright. Rows from its top, in each row from its left: value 5 * row + column. */
             agreement: components["schemas"]["PartAgreement"][];
         };
@@ -1205,7 +1208,8 @@ export interface components {
             verdict: components["schemas"]["Verdict"];
             /** Set only for UNIQUE; what a known pose adds is `guided_landmark`. */ landmark: string;
             candidates: components["schemas"]["Candidate"][];
-            /** The paper's measure, and the one normalised by ln(N+1). */ entropy_m: number;
+            /** The paper's measure of how alone the answer stands, and the one normalised by ln(N+1); 1: one possibility is left, a landmark or none of the map. */
+            entropy_m: number;
             entropy_norm: number;
             /** Chance that the named landmark is right, 0 to 1, learnt from data; 0 unless UNIQUE. */
             confidence: number;
@@ -1221,6 +1225,8 @@ export interface components {
             sighting: components["schemas"]["Sighting"];
             /** The landmark that the quad is by the pose known before the frame, where the picture alone leaves several. The verdict stays what the picture alone says; corners and pose are those of this landmark. Empty unless GUIDED. */
             guided_landmark: string;
+            /** Probability that the quad is none of the map's landmarks: 1 where none was accepted, the share of one more possibility where the only accepted one is in doubt, else 0. */
+            probability_none: number;
         };
         QuadKind: "unspecified" | "full" | "three_sided" | "expected" | "texture";
         /** The points of a quad that are like points of a landmark. */

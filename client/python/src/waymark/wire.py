@@ -241,11 +241,12 @@ class Candidate:
     """A landmark that a quad was compared with."""
 
     landmark: str = ""
-    correlation: float = 0.0
+    # C^r, H^r, the distance that decides and its threshold: None where points decide, and where infinite.
+    correlation: float | None = None
     hausdorff: float | None = None
-    distance: float = 0.0
-    threshold: float = 0.0
-    # Distance over threshold; accepted below 1.
+    distance: float | None = None
+    threshold: float | None = None
+    # Accepted below 1: distance over threshold, or, by points, -5 over their `log10_chance`.
     ratio: float = 0.0
     probability: float = 0.0
     # Empty, or the gate that refused it.
@@ -261,7 +262,7 @@ class PointEvidence:
     inliers: int = 0
     checked: int = 0
     agreeing: int = 0
-    log10_false_alarms: float = 0.0
+    log10_chance: float = 0.0
     # 5 x 5 parts of the landmark as taught, by rows from its top left.
     agreement: tuple[PartAgreement, ...] = ()
 
@@ -306,6 +307,8 @@ class QuadAnswer:
     doubtful_landmark: str = ""
     sighting: Sighting = "unspecified"
     guided_landmark: str = ""
+    # That the quad is none of the map's landmarks.
+    probability_none: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -181,7 +181,10 @@ fn outcome(verdict: &RecognitionResult, id: LandmarkId) -> Outcome {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use vision::recognise::{Evidence, MatchCandidate};
+    use vision::{
+        paper::entropy::Possibilities,
+        recognise::{Evidence, MatchCandidate},
+    };
 
     fn verdict(recognition: Verdict, refusal: Option<MatchRefusal>) -> RecognitionResult {
         let candidate = MatchCandidate {
@@ -194,8 +197,7 @@ mod tests {
         RecognitionResult {
             verdict: recognition,
             candidates: vec![candidate],
-            entropy_m: 1.0,
-            entropy_norm: 1.0,
+            possibilities: Possibilities::new(1, false),
             confidence: 0.0,
             rotation: 0,
             border: 0,

@@ -36,8 +36,8 @@ impl Service {
     pub(super) async fn answered(&self, map: &str, robot: &str, status: v1::Status) {
         let candidate = v1::Candidate {
             landmark: "sign".into(),
-            distance: 0.6,
-            threshold: 0.4,
+            distance: Some(0.6),
+            threshold: Some(0.4),
             ratio: 1.5,
             refusal: "correlation".into(),
             ..v1::Candidate::default()
@@ -219,11 +219,9 @@ async fn what_points_said_for_a_landmark_is_counted_by_strength() {
     let service = Service::start(Limits::default()).await;
     let (status, _) = service.upload("sign", blocks(1), &[("create", "true"), ("whole_image", "true")]).await;
     assert_eq!(status, 201);
-    let quad = |log10_false_alarms: Option<f64>, landmark: &str, doubtful_landmark: &str| v1::QuadAnswer {
-        points: log10_false_alarms.map(|log10_false_alarms| v1::PointEvidence {
-            log10_false_alarms,
-            ..v1::PointEvidence::default()
-        }),
+    let quad = |log10_chance: Option<f64>, landmark: &str, doubtful_landmark: &str| v1::QuadAnswer {
+        points: log10_chance
+            .map(|log10_chance| v1::PointEvidence { log10_chance, ..v1::PointEvidence::default() }),
         landmark: landmark.into(),
         doubtful_landmark: doubtful_landmark.into(),
         ..v1::QuadAnswer::default()

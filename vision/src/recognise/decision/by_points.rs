@@ -12,7 +12,7 @@ use crate::{
     frame::GrayImage,
     geometry::corners::Corners,
     model::{landmark_model::LandmarkModel, model_set::ModelSet},
-    paper::entropy::{entropy_m, entropy_norm, probability},
+    paper::entropy::Possibilities,
     params::Params,
     points::{
         search::{LandmarkPoints, search},
@@ -69,6 +69,8 @@ pub(crate) fn by_points(
     let others = found.iter().skip(1).chain(&rivals);
     let refusal =
         refusal(best, others, (model, &alignment), n, p).or((!is_located).then_some(MatchRefusal::Corners));
+    let sure = refusal.is_none();
+    let possibilities = Possibilities::new(accepted, !sure);
     let of = |(i, f): (usize, &LandmarkPoints)| {
         let ratio = if alarms[i] < 0.0 { LOG10_EPSILON / alarms[i] } else { f64::INFINITY };
         let refused =
@@ -77,16 +79,14 @@ pub(crate) fn by_points(
             landmark: models.at(f.model)?.id,
             evidence: Evidence::Points { likeness: if i == 0 { alignment.likeness } else { None } },
             ratio,
-            probability: probability(alarms[i] <= LOG10_EPSILON, accepted),
+            probability: possibilities.probability(alarms[i] <= LOG10_EPSILON),
             refusal: refused,
         })
     };
-    let sure = refusal.is_none();
     Some(RecognitionResult {
         verdict: if sure { Verdict::Unique(model.id) } else { Verdict::Ambiguous(model.id) },
         candidates: found.iter().enumerate().filter_map(of).take(MAX_CANDIDATES).collect(),
-        entropy_m: entropy_m(accepted, n),
-        entropy_norm: entropy_norm(accepted, n),
+        possibilities,
         confidence: if sure { confidence(alarms[0]) } else { 0.0 },
         rotation: evidence.turned,
         border,

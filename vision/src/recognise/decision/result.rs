@@ -1,6 +1,9 @@
 //! The verdict on one quad with the match candidates behind it.
 
-use crate::{geometry::corners::Corners, model::landmark_id::LandmarkId, points::verify::PointEvidence};
+use crate::{
+    geometry::corners::Corners, model::landmark_id::LandmarkId, paper::entropy::Possibilities,
+    points::verify::PointEvidence,
+};
 use serde::{Deserialize, Serialize};
 
 /// Why a candidate was refused.
@@ -20,7 +23,7 @@ pub enum MatchRefusal {
     /// Accepted by its own thresholds, but another landmark, or the same one turned, is too close
     /// behind.
     Margin,
-    /// The point evidence has too many expected false alarms.
+    /// The point evidence may be chance.
     Points,
     /// Its points agree, but a connected part mismatches: perhaps not the taught landmark.
     Disagreement,
@@ -96,10 +99,8 @@ pub struct RecognitionResult {
     pub verdict: Verdict,
     /// Nearest landmarks by increasing ratio, at most [`MAX_CANDIDATES`]; refused ones included.
     pub candidates: Vec<MatchCandidate>,
-    /// The paper's m with the printed 1/(N+1), natural logarithm (method 10). Never a gate.
-    pub entropy_m: f64,
-    /// 1 - ln K / ln(N+1), in (0, 1].
-    pub entropy_norm: f64,
+    /// What the quad may be (method 10): probabilities and entropies follow. Never a gate.
+    pub possibilities: Possibilities,
     /// Probability that the identity is right, 0 to 1 (`confidence.rs`); 0 unless `Unique`.
     pub confidence: f64,
     /// Which of the four corner rotations matched: corner `rotation` of the quad is the landmark's

@@ -6,10 +6,7 @@ use crate::{
     detect::quad::Quad,
     frame::GrayImage,
     model::model_set::ModelSet,
-    paper::{
-        deciding_distance::verified_nearest,
-        entropy::{entropy_m, entropy_norm, probability},
-    },
+    paper::{deciding_distance::verified_nearest, entropy::Possibilities},
     params::Params,
     recognise::{
         decision::{
@@ -82,8 +79,7 @@ fn unknown(landmarks: usize) -> RecognitionResult {
     RecognitionResult {
         verdict: Verdict::Unknown,
         candidates: Vec::new(),
-        entropy_m: 1.0,
-        entropy_norm: 1.0,
+        possibilities: Possibilities::new(0, false),
         confidence: 0.0,
         rotation: 0,
         border: 0,
@@ -104,27 +100,26 @@ fn decide(
     let share = if kind == DistanceKind::Both { p.tau_share(landmarks) } else { 1.0 };
     let refusals: Vec<Option<MatchRefusal>> = found.iter().map(|j| j.refusal(kind, share, p)).collect();
     let accepted = refusals.iter().filter(|r| r.is_none()).count();
-    let mut verdict = unknown(landmarks);
-    verdict.entropy_m = entropy_m(accepted, landmarks);
-    verdict.entropy_norm = entropy_norm(accepted, landmarks);
-    verdict.candidates = found
-        .iter()
-        .zip(&refusals)
-        .take(MAX_CANDIDATES)
-        .map(|(j, refusal)| candidate(&j.near, *refusal, accepted, (kind, share)))
-        .collect();
-    let Some(best) = refusals.iter().position(Option::is_none) else { return verdict };
+    let best = refusals.iter().position(Option::is_none);
+    // Departs from method 10, which asks for a margin only where two or more are accepted: a
+    // runner-up just above its own threshold is as much reason for doubt as one just below.
+    let refusal = best.and_then(|best| match margin(found, best, kind) {
+        margin if margin >= p.margin => Some(MatchRefusal::Margin),
+        _ => (kind == DistanceKind::Both && p.points).then_some(MatchRefusal::Plain),
+    });
+    let possibilities = Possibilities::new(accepted, refusal.is_some());
+    let of = |(j, refusal): (&VerifiedLandmark, &Option<MatchRefusal>)| {
+        candidate(&j.near, *refusal, possibilities, (kind, share))
+    };
+    let mut verdict = RecognitionResult {
+        possibilities,
+        candidates: found.iter().zip(&refusals).take(MAX_CANDIDATES).map(of).collect(),
+        ..unknown(landmarks)
+    };
+    let Some(best) = best else { return verdict };
     let near = &found[best].near;
     (verdict.rotation, verdict.border) = (readings[near.reading].rotation, readings[near.reading].border);
     verdict.aligned_px = found[best].moved;
-    let margin = margin(found, best, kind);
-    // Departs from method 10, which asks for a margin only where two or more are accepted: a
-    // runner-up just above its own threshold is as much reason for doubt as one just below.
-    let refusal = if margin >= p.margin {
-        Some(MatchRefusal::Margin)
-    } else {
-        (kind == DistanceKind::Both && p.points).then_some(MatchRefusal::Plain)
-    };
     if refusal.is_none() {
         verdict.verdict = Verdict::Unique(near.model.id);
         verdict.confidence = confidence(&verdict.candidates, best, landmarks, kind);
@@ -158,7 +153,7 @@ fn margin(found: &[VerifiedLandmark], best: usize, kind: DistanceKind) -> f64 {
 fn candidate(
     near: &NearLandmark,
     refusal: Option<MatchRefusal>,
-    accepted: usize,
+    possibilities: Possibilities,
     (kind, share): (DistanceKind, f64),
 ) -> MatchCandidate {
     let (distance, tau) = match kind {
@@ -176,7 +171,7 @@ fn candidate(
             tau: share * tau,
         }),
         ratio: near.ratio(kind) / share,
-        probability: probability(refusal.is_none(), accepted),
+        probability: possibilities.probability(refusal.is_none()),
         refusal,
     }
 }

@@ -3,10 +3,9 @@ import type { LiveAnswer, LiveQuad } from "../../words/quads";
 
 export interface Candidate {
   landmark: string;
-  correlation: number;
-  hausdorff?: number;
-  distance: number;
-  threshold: number;
+  /** Absent where points decide. */
+  distance?: number;
+  threshold?: number;
   ratio: number;
   refusal?: string;
   gradient_similarity?: number;
@@ -14,7 +13,7 @@ export interface Candidate {
 
 export interface StoredQuadBody extends Omit<LiveQuad, "candidates"> {
   candidates?: Candidate[];
-  points?: { matches: number; inliers: number; checked: number; agreeing: number; log10_false_alarms: number; agreement: string[] };
+  points?: { matches: number; inliers: number; checked: number; agreeing: number; log10_chance: number; agreement: string[] };
 }
 
 export interface PoseBody {

@@ -349,20 +349,20 @@ class Candidate(_message.Message):
     def __init__(self, landmark: _Optional[str] = ..., correlation: _Optional[float] = ..., hausdorff: _Optional[float] = ..., distance: _Optional[float] = ..., threshold: _Optional[float] = ..., ratio: _Optional[float] = ..., probability: _Optional[float] = ..., refusal: _Optional[str] = ..., gradient_similarity: _Optional[float] = ...) -> None: ...
 
 class PointEvidence(_message.Message):
-    __slots__ = ("matches", "inliers", "checked", "agreeing", "log10_false_alarms", "agreement")
+    __slots__ = ("matches", "inliers", "checked", "agreeing", "log10_chance", "agreement")
     MATCHES_FIELD_NUMBER: _ClassVar[int]
     INLIERS_FIELD_NUMBER: _ClassVar[int]
     CHECKED_FIELD_NUMBER: _ClassVar[int]
     AGREEING_FIELD_NUMBER: _ClassVar[int]
-    LOG10_FALSE_ALARMS_FIELD_NUMBER: _ClassVar[int]
+    LOG10_CHANCE_FIELD_NUMBER: _ClassVar[int]
     AGREEMENT_FIELD_NUMBER: _ClassVar[int]
     matches: int
     inliers: int
     checked: int
     agreeing: int
-    log10_false_alarms: float
+    log10_chance: float
     agreement: _containers.RepeatedScalarFieldContainer[PartAgreement]
-    def __init__(self, matches: _Optional[int] = ..., inliers: _Optional[int] = ..., checked: _Optional[int] = ..., agreeing: _Optional[int] = ..., log10_false_alarms: _Optional[float] = ..., agreement: _Optional[_Iterable[_Union[PartAgreement, str]]] = ...) -> None: ...
+    def __init__(self, matches: _Optional[int] = ..., inliers: _Optional[int] = ..., checked: _Optional[int] = ..., agreeing: _Optional[int] = ..., log10_chance: _Optional[float] = ..., agreement: _Optional[_Iterable[_Union[PartAgreement, str]]] = ...) -> None: ...
 
 class LandmarkPose(_message.Message):
     __slots__ = ("camera_from_landmark", "covariance", "reprojection_rms_px")
@@ -385,7 +385,7 @@ class CameraPose(_message.Message):
     def __init__(self, map_from_camera: _Optional[_Union[Pose3, _Mapping]] = ..., covariance: _Optional[_Iterable[float]] = ..., landmarks: _Optional[_Iterable[str]] = ...) -> None: ...
 
 class QuadAnswer(_message.Message):
-    __slots__ = ("corners", "kind", "score", "verdict", "landmark", "candidates", "entropy_m", "entropy_norm", "confidence", "pose", "second_pose", "pose_ambiguous", "pose_refusal", "points", "doubtful_landmark", "sighting", "guided_landmark")
+    __slots__ = ("corners", "kind", "score", "verdict", "landmark", "candidates", "entropy_m", "entropy_norm", "confidence", "pose", "second_pose", "pose_ambiguous", "pose_refusal", "points", "doubtful_landmark", "sighting", "guided_landmark", "probability_none")
     CORNERS_FIELD_NUMBER: _ClassVar[int]
     KIND_FIELD_NUMBER: _ClassVar[int]
     SCORE_FIELD_NUMBER: _ClassVar[int]
@@ -403,6 +403,7 @@ class QuadAnswer(_message.Message):
     DOUBTFUL_LANDMARK_FIELD_NUMBER: _ClassVar[int]
     SIGHTING_FIELD_NUMBER: _ClassVar[int]
     GUIDED_LANDMARK_FIELD_NUMBER: _ClassVar[int]
+    PROBABILITY_NONE_FIELD_NUMBER: _ClassVar[int]
     corners: _containers.RepeatedCompositeFieldContainer[Point]
     kind: QuadKind
     score: float
@@ -420,7 +421,8 @@ class QuadAnswer(_message.Message):
     doubtful_landmark: str
     sighting: Sighting
     guided_landmark: str
-    def __init__(self, corners: _Optional[_Iterable[_Union[Point, _Mapping]]] = ..., kind: _Optional[_Union[QuadKind, str]] = ..., score: _Optional[float] = ..., verdict: _Optional[_Union[Verdict, str]] = ..., landmark: _Optional[str] = ..., candidates: _Optional[_Iterable[_Union[Candidate, _Mapping]]] = ..., entropy_m: _Optional[float] = ..., entropy_norm: _Optional[float] = ..., confidence: _Optional[float] = ..., pose: _Optional[_Union[LandmarkPose, _Mapping]] = ..., second_pose: _Optional[_Union[LandmarkPose, _Mapping]] = ..., pose_ambiguous: bool = ..., pose_refusal: _Optional[str] = ..., points: _Optional[_Union[PointEvidence, _Mapping]] = ..., doubtful_landmark: _Optional[str] = ..., sighting: _Optional[_Union[Sighting, str]] = ..., guided_landmark: _Optional[str] = ...) -> None: ...
+    probability_none: float
+    def __init__(self, corners: _Optional[_Iterable[_Union[Point, _Mapping]]] = ..., kind: _Optional[_Union[QuadKind, str]] = ..., score: _Optional[float] = ..., verdict: _Optional[_Union[Verdict, str]] = ..., landmark: _Optional[str] = ..., candidates: _Optional[_Iterable[_Union[Candidate, _Mapping]]] = ..., entropy_m: _Optional[float] = ..., entropy_norm: _Optional[float] = ..., confidence: _Optional[float] = ..., pose: _Optional[_Union[LandmarkPose, _Mapping]] = ..., second_pose: _Optional[_Union[LandmarkPose, _Mapping]] = ..., pose_ambiguous: bool = ..., pose_refusal: _Optional[str] = ..., points: _Optional[_Union[PointEvidence, _Mapping]] = ..., doubtful_landmark: _Optional[str] = ..., sighting: _Optional[_Union[Sighting, str]] = ..., guided_landmark: _Optional[str] = ..., probability_none: _Optional[float] = ...) -> None: ...
 
 class PoseRefusalCause(_message.Message):
     __slots__ = ("quantity", "landmark", "expected", "measured", "sigma", "unit")
