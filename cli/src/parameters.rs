@@ -5,12 +5,16 @@ use super::pictures;
 use anyhow::{Context as _, bail};
 use serde_json::Value;
 use std::path::PathBuf;
-use vision::detect::DetectParams;
+use vision::{detect::DetectParams, params::preset::Preset};
 
 /// Parameters of quad detection.
 #[derive(Debug, Clone, Default, clap::Args)]
 #[command(next_help_heading = "Detection parameters")]
 pub struct ParameterArgs {
+    /// The parameters that the others change: `default`, or those of the `paper`: relaxation over all
+    /// six cues, floor tiling removed.
+    #[arg(long, value_name = "NAME", default_value = "default")]
+    preset: Preset,
     /// Parameters as JSON, only what differs from the defaults, such as {"quads": {"grouping":
     /// "relaxation"}}.
     #[arg(long, value_name = "FILE")]
@@ -58,7 +62,7 @@ pub struct ParameterArgs {
 impl ParameterArgs {
     /// The parameters asked for; those not mentioned have their defaults.
     pub fn parameters(&self) -> anyhow::Result<DetectParams> {
-        let mut all = serde_json::to_value(pictures::detect_params(self.params.as_deref())?)?;
+        let mut all = serde_json::to_value(pictures::detect_params(self.preset, self.params.as_deref())?)?;
         for (path, value) in self.flags() {
             put(&mut all, path, value)?;
         }
@@ -75,8 +79,12 @@ impl ParameterArgs {
             let leaf = path.rsplit('.').next().unwrap_or(path);
             format!("{leaf}={}", value.to_string().replace('"', ""))
         };
-        let parts =
-            file.into_iter().chain(self.flags().into_iter().map(flag)).chain(self.set.iter().cloned());
+        let preset = (self.preset != Preset::Default).then(|| self.preset.word().to_owned());
+        let parts = preset
+            .into_iter()
+            .chain(file)
+            .chain(self.flags().into_iter().map(flag))
+            .chain(self.set.iter().cloned());
         let name = parts.collect::<Vec<_>>().join(" ");
         if name.is_empty() { "default".to_owned() } else { name }
     }
@@ -157,6 +165,25 @@ mod tests {
     fn nothing_said_is_the_defaults() {
         assert_eq!(of(&[]).unwrap(), DetectParams::default());
         assert_eq!(Line::parse_from(["x"]).parameters.name(), "default");
+    }
+
+    /// The preset first, then the file, then flags and `--set`.
+    #[test]
+    fn others_change_the_preset() {
+        let paper = Preset::Paper.params().detect;
+        assert_eq!(of(&["--preset=paper"]).unwrap(), paper);
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("p.json");
+        std::fs::write(&file, r#"{"relaxation": {"linear_weight": 1.5}}"#).unwrap();
+        let changed = of(&["--preset=paper", "--params", file.to_str().unwrap(), "--scales=1"]).unwrap();
+        assert!((changed.relaxation.linear_weight - 1.5).abs() < 1e-12 && changed.quads.scales == 1);
+        assert_eq!((changed.similarity, changed.tiling), (paper.similarity, paper.tiling));
+        assert_eq!(changed.quads.grouping, Grouping::Relaxation);
+        assert!(of(&["--preset=papers"]).unwrap_err().to_string().contains("default, paper"));
+        assert_eq!(
+            Line::parse_from(["x", "--preset=paper", "--scales=1"]).parameters.name(),
+            "paper scales=1"
+        );
     }
 
     #[test]

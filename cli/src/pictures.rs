@@ -5,6 +5,7 @@ use anyhow::Context as _;
 use engine::{decode::ImageLimits, picture};
 use image::{ImageDecoder as _, ImageEncoder as _};
 use protos::convert::frame::MAX_ENCODED_IMAGE_BYTES;
+use serde_json::Value;
 use std::{
     fs::File,
     io::{Cursor, Read as _},
@@ -13,6 +14,7 @@ use std::{
 use vision::{
     detect::DetectParams,
     frame::{GrayImage, Picture},
+    params::preset::Preset,
 };
 
 /// Quality of photographs that are made smaller before they are sent.
@@ -136,12 +138,28 @@ pub fn is_picture(path: &Path) -> bool {
         .is_some_and(|e| ["png", "jpg", "jpeg", "bmp"].iter().any(|known| e.eq_ignore_ascii_case(known)))
 }
 
-/// Detection parameters from a JSON file that names only what differs from the defaults; no file,
-/// the defaults.
-pub fn detect_params(file: Option<&Path>) -> anyhow::Result<DetectParams> {
-    let Some(path) = file else { return Ok(DetectParams::default()) };
+/// Detection parameters of `preset`, changed by a JSON file that names only what differs.
+pub fn detect_params(preset: Preset, file: Option<&Path>) -> anyhow::Result<DetectParams> {
+    let Some(path) = file else { return Ok(preset.params().detect) };
     let text = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
-    serde_json::from_slice(&text).with_context(|| format!("{} holds no detection parameters", path.display()))
+    let holds_none = || format!("{} holds no detection parameters", path.display());
+    // For unknown names and wrong kinds, with their line.
+    serde_json::from_slice::<DetectParams>(&text).with_context(holds_none)?;
+    let mut all = serde_json::to_value(preset.params().detect)?;
+    merge(&mut all, serde_json::from_slice(&text)?);
+    serde_json::from_value(all).with_context(holds_none)
+}
+
+/// Puts what `changes` names in the place of what `all` has.
+fn merge(all: &mut Value, changes: Value) {
+    match (all, changes) {
+        (Value::Object(all), Value::Object(changes)) => {
+            for (name, change) in changes {
+                merge(all.entry(name).or_insert(Value::Null), change);
+            }
+        }
+        (all, change) => *all = change,
+    }
 }
 
 /// A grey image as JPEG, as phones compress: for photographs to learn from.

@@ -17,8 +17,8 @@ use std::{
     path::{Path, PathBuf},
     time::Duration,
 };
-#[cfg(unix)]
 use tokio::signal::unix::{Signal, SignalKind, signal};
+use vision::params::preset::Preset;
 
 /// Time that the other parts have to end after one has failed.
 const STOP_AFTER_FAILURE: Duration = Duration::from_secs(10);
@@ -103,6 +103,10 @@ pub(super) struct Serve {
     /// no such permission.
     #[arg(long)]
     insecure: bool,
+    /// The pipeline: `default`, or that of the `paper`, for experiments: relaxation, icons alone. Its
+    /// maps want `waymark map create --distance hausdorff` (or correlation) [default: default].
+    #[arg(long, value_name = "NAME")]
+    preset: Option<Preset>,
 }
 
 impl Serve {
@@ -113,7 +117,7 @@ impl Serve {
             let advice = "A server starts without one; server/config.example.toml lists all settings.";
             return Err(Failure::new(Class::NotFound, "no_settings_file", sentence).advise(advice).into());
         }
-        let mut raw = RawConfig::read(self.config.as_deref())?;
+        let mut raw = RawConfig::read_over(self.preset, self.config.as_deref())?;
         if let Some(data) = self.data {
             raw.data = data;
         }

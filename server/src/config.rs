@@ -33,7 +33,7 @@ use addresses::{is_loopback, socket_address, zenoh_address, zenoh_endpoint};
 use environment::{PREFIX, is_known};
 use figment::{
     Figment,
-    providers::{Env, Format, Toml},
+    providers::{Env, Format, Serialized, Toml},
 };
 use protos::Name;
 use serde::{Deserialize, Serialize};
@@ -43,7 +43,7 @@ use std::{
     path::{Path, PathBuf},
     sync::Arc,
 };
-use vision::params::Params;
+use vision::params::{Params, preset::Preset};
 
 /// Variables that begin with `WAYMARK_` but are read by the command line, not by the settings.
 const NOT_SETTINGS: [&str; 8] =
@@ -87,6 +87,8 @@ pub struct RawConfig {
     pub ros2: RawRos2,
     /// Every bound.
     pub limits: Limits,
+    /// The parameters that `algorithm` changes.
+    pub preset: Preset,
     /// Parameters of the algorithms. Models learnt under other distance parameters are refused.
     pub algorithm: Params,
 }
@@ -108,6 +110,7 @@ impl Default for RawConfig {
             backup: BackupSettings::default(),
             ros2: RawRos2::default(),
             limits: Limits::default(),
+            preset: Preset::default(),
             algorithm: Params::default(),
         }
     }
@@ -117,6 +120,11 @@ impl RawConfig {
     /// Defaults, then the file (which must exist if named), then the environment; of that what is
     /// no setting is left out ([`Self::unknown_variables`]).
     pub fn read(file: Option<&Path>) -> Result<Self, ConfigError> {
+        Self::read_over(None, file)
+    }
+
+    /// The same with this preset, whatever they name.
+    pub fn read_over(preset: Option<Preset>, file: Option<&Path>) -> Result<Self, ConfigError> {
         // Defaults are left to serde.
         let mut figment = Figment::new();
         if let Some(path) = file {
@@ -124,10 +132,20 @@ impl RawConfig {
         }
         let settings = environment::names();
         let variables = Env::prefixed(PREFIX).filter(move |name| is_known(name.as_str(), &settings));
-        figment
-            .merge(variables.ignore(&NOT_SETTINGS).split("__"))
-            .extract()
-            .map_err(|e| ConfigError::Read(Box::new(e)))
+        let read = |e| ConfigError::Read(Box::new(e));
+        let mut figment = figment.merge(variables.ignore(&NOT_SETTINGS).split("__"));
+        if let Some(preset) = preset {
+            figment = figment.merge(Serialized::default("preset", preset));
+        }
+        let preset = if figment.contains("preset") {
+            figment.extract_inner("preset").map_err(read)?
+        } else {
+            Preset::Default
+        };
+        if preset != Preset::Default {
+            figment = figment.join(Serialized::default("algorithm", preset.params()));
+        }
+        figment.extract().map_err(read)
     }
 }
 

@@ -248,11 +248,13 @@ fn every_section_cited_in_a_comment_exists() {
 }
 
 /// Product code of `vision` that imports the paper's method: parameters, both detectors, their
-/// trace, the decision.
-const PAPER_ENTRIES: [&str; 5] = [
+/// trace, the preset, the decision.
+const PAPER_ENTRIES: [&str; 7] = [
     "vision/src/detect/detector.rs",
     "vision/src/detect/params.rs",
+    "vision/src/params/preset.rs",
     "vision/src/recognise/decision/by_points.rs",
+    "vision/src/recognise/decision/result.rs",
     "vision/src/recognise/decision/verdict.rs",
     "vision/src/trace.rs",
 ];

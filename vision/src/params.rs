@@ -2,6 +2,7 @@
 //! docs/method/20-parameters.md.
 
 mod distance_hash;
+pub mod preset;
 
 use crate::{
     detect::params::DetectParams, icon::IconParams, learn::params::LearnParams,

@@ -30,6 +30,28 @@ fn the_example_file_names_every_setting_with_its_default() {
     assert!(keys(&all, "").len() > 30, "the settings are no longer read");
 }
 
+/// A preset is what `algorithm` changes: the file's values stay, all others are the preset's.
+#[test]
+fn a_preset_is_changed_by_what_the_file_names() {
+    let read = |preset: Option<Preset>, text: &str| {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("waymark.toml");
+        std::fs::write(&path, text).unwrap();
+        RawConfig::read_over(preset, Some(&path))
+    };
+    assert_eq!(read(None, "").unwrap().algorithm, Params::default());
+    let paper = read(None, "preset = \"paper\"\n").unwrap();
+    assert_eq!((paper.preset, &paper.algorithm), (Preset::Paper, &Preset::Paper.params()));
+    let changed = "preset = \"paper\"\n[algorithm.recognise.verdict]\nmargin = 0.5\n";
+    let mut expected = Preset::Paper.params();
+    expected.recognise.verdict.margin = 0.5;
+    assert_eq!(read(None, changed).unwrap().algorithm, expected);
+    assert_eq!(read(Some(Preset::Paper), "").unwrap().algorithm, Preset::Paper.params());
+    assert_eq!(read(Some(Preset::Default), "preset = \"paper\"\n").unwrap().algorithm, Params::default());
+    let error = read(None, "preset = \"papers\"\n").unwrap_err().to_string();
+    assert!(error.contains("papers") && error.contains("preset"), "{error}");
+}
+
 #[test]
 fn the_example_file_shows_every_setting_of_a_robot_of_ros_with_its_default() {
     let lines = include_str!("../../config.example.toml").lines();

@@ -9,3 +9,4 @@ pub mod three_sided;
 pub(crate) mod detector;
 pub(crate) mod deciding_distance;
 pub mod entropy;
+pub(crate) mod preset;

@@ -17,7 +17,10 @@ use report::Report;
 use score::{FOUND, ImageScore};
 use sim::views::ViewsParams;
 use std::path::{Path, PathBuf};
-use vision::detect::{DetectParams, Grouping, QuadParams};
+use vision::{
+    detect::{DetectParams, Grouping, QuadParams},
+    params::preset::Preset,
+};
 
 /// Worst images that are drawn when their number is not given.
 const DRAWN: usize = 20;
@@ -33,8 +36,8 @@ pub(crate) struct Args {
     #[arg(long, default_value_t = 0.0)]
     min_side_px: f64,
     /// Also evaluate these parameters: a file as for --params, `relaxation` for the paper's
-    /// grouping, or one change as for --set. May be repeated.
-    #[arg(long, value_name = "FILE|relaxation|PATH=VALUE")]
+    /// grouping, `paper` for its preset, or one change as for --set. May be repeated.
+    #[arg(long, value_name = "FILE|relaxation|paper|PATH=VALUE")]
     compare: Vec<PathBuf>,
     /// One JSON object per set and parameters instead of tables.
     #[arg(long)]
@@ -113,8 +116,10 @@ fn parameters(args: &Args) -> anyhow::Result<Vec<Named>> {
         let params = if other.as_os_str() == "relaxation" {
             let quads = QuadParams { grouping: Grouping::Relaxation, ..QuadParams::default() };
             DetectParams { quads, ..DetectParams::default() }
+        } else if other.as_os_str() == "paper" {
+            Preset::Paper.params().detect
         } else {
-            files::detect_params(Some(other))?
+            files::detect_params(Preset::Default, Some(other))?
         };
         all.push(Named { name: stem(other), params });
     }

@@ -100,7 +100,7 @@ fn steps(count: u32, step: f64) -> Vec<f64> {
 
 /// Sweeps every axis. Where `size_px` is 0, each view draws its own size.
 fn run(experiment: &'static str, args: &Args, size_px: f64, axes: &[Axis]) -> anyhow::Result<()> {
-    let p = Params::default();
+    let p = args.common.preset.params();
     let class = class(&args.common, args.landmarks, &p)?;
     let base = Conditions { size_px, ..Conditions::default() };
     let curves: Vec<_> =
@@ -115,7 +115,7 @@ fn class(common: &Common, landmarks: u32, p: &Params) -> anyhow::Result<Class> {
     let pictures = pictures::mixed(&photographs, 0.5, landmarks as usize, |i| {
         pictures::generated(common.part, common.seed, i)
     });
-    let class = Class::new(pictures, common.taught, common.seed, p)?;
+    let class = Class::new(pictures, common.taught, common.seed, p)?.deciding_by(common.preset);
     anyhow::ensure!(!class.models.is_empty(), "no landmark passed its gates");
     Ok(class)
 }

@@ -11,7 +11,7 @@ use crate::evaluate::{
     statistics::{Interval, bootstrap, upper_bound, wilson},
 };
 use serde::Serialize;
-use vision::{params::Params, recognise::DistanceKind};
+use vision::recognise::DistanceKind;
 
 /// Bins of equal mass.
 const BINS: usize = 15;
@@ -70,7 +70,7 @@ struct Report {
 
 pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     anyhow::ensure!(!args.common.detector, "there is no --detector here");
-    let found = answers(&args.common, args.quads, &Params::default())?;
+    let found = answers(&args.common, args.quads, &args.common.preset.params())?;
     let report = Report {
         set: args.common.part.name(),
         seed: args.common.seed,

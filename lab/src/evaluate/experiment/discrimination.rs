@@ -19,7 +19,7 @@ use vision::{
     model::LandmarkId,
     params::Params,
     random::Random,
-    recognise::{DistanceKind, Verdict, recognise},
+    recognise::{Verdict, recognise},
 };
 
 /// `waymark-lab evaluate discrimination`.
@@ -108,7 +108,7 @@ const COMPARED: usize = 12;
 const HISTOGRAM_VIEWS: u64 = 200;
 
 pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
-    let p = Params::default();
+    let p = args.common.preset.params();
     let photographs = pictures::photographs(&args.common.photographs, args.common.part)?;
     // Every other picture is taught, the rest are distractors.
     let deal = |odd: usize| photographs.iter().skip(odd).step_by(2).cloned().collect::<Vec<_>>();
@@ -119,6 +119,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
             pictures::generated(args.common.part, args.common.seed, i)
         });
         let class = Class::new(pictures, args.common.taught, args.common.seed, &p)?;
+        let class = class.deciding_by(args.common.preset);
         anyhow::ensure!(!class.models.is_empty(), "no landmark passed its gates");
         let report = measure(&class, &unknown, args, &p);
         say(args.common.json, &report, || table(&report))?;
@@ -189,8 +190,7 @@ fn distractor_view(
     let (rendered, corners) =
         rendered_view(class, &distractor.texture, mixed(&[common.seed, 3, i as u64, u64::from(v)]), common)?;
     let quads = corners.map_or_else(|| detected(&rendered, p), |c| vec![quad(c)]);
-    let verdicts =
-        quads.iter().map(|q| recognise(&rendered.image, q, &class.models, DistanceKind::Both, p).verdict);
+    let verdicts = quads.iter().map(|q| recognise(&rendered.image, q, &class.models, class.kind, p).verdict);
     let worst = verdicts.min_by_key(|r| match r {
         Verdict::Unique(_) => 0,
         Verdict::Ambiguous(_) => 1,

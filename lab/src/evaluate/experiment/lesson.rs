@@ -14,10 +14,10 @@ use vision::{
     geometry::Corners,
     learn::{TrainingView, add_negatives, learn, synthesis},
     model::{LandmarkId, LandmarkModel, ModelSet},
-    params::Params,
+    params::{Params, preset::Preset},
     points::taught::{MAX_POINT_VIEWS, TaughtPoint, view_points},
     random::Random,
-    recognise::{IconFeatures, features},
+    recognise::{DistanceKind, IconFeatures, features},
 };
 
 /// Views of each landmark, as in the server.
@@ -78,9 +78,17 @@ pub(crate) struct Class {
     /// Pictures that failed a quality gate or could not be learnt.
     pub(crate) candidates: Vec<usize>,
     pub(crate) wall: Texture,
+    /// The distance that decides.
+    pub(crate) kind: DistanceKind,
 }
 
 impl Class {
+    /// The same where the distance of `preset` decides.
+    #[must_use]
+    pub(crate) fn deciding_by(self, preset: Preset) -> Self {
+        Self { kind: preset.distance(), ..self }
+    }
+
     /// Teaches all `pictures` together.
     pub(crate) fn new(pictures: Vec<Picture>, how: Taught, seed: u64, p: &Params) -> anyhow::Result<Self> {
         let wall = plaster(seed);
@@ -111,7 +119,7 @@ impl Class {
             .map(|(i, _)| i)
             .collect();
         let models = ModelSet::in_use(models.into_iter().flatten().map(Arc::new), p)?;
-        Ok(Self { landmarks: pictures, models, candidates, wall })
+        Ok(Self { landmarks: pictures, models, candidates, wall, kind: DistanceKind::default() })
     }
 
     /// Pictures that are active landmarks.

@@ -21,7 +21,7 @@ use vision::{
     model::LandmarkId,
     params::Params,
     random::Random,
-    recognise::{DistanceKind, Verdict, recognise},
+    recognise::{Verdict, recognise},
 };
 
 /// `waymark-lab evaluate lookalikes`.
@@ -78,7 +78,7 @@ struct Pair {
 }
 
 pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
-    let p = Params::default();
+    let (p, preset) = (args.common.preset.params(), args.common.preset);
     anyhow::ensure!(
         !args.common.detector && args.common.plot.is_none(),
         "there is neither --detector nor --plot here"
@@ -86,9 +86,9 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let photographs = super::pictures::photographs(&args.common.photographs, args.common.part)?;
     let pairs = pairs(&photographs, args);
     let first: Vec<Picture> = pairs.iter().map(|pair| pair.pictures[0].clone()).collect();
-    let alone = Class::new(first, args.common.taught, args.common.seed, &p)?;
+    let alone = Class::new(first, args.common.taught, args.common.seed, &p)?.deciding_by(preset);
     let both: Vec<Picture> = pairs.iter().flat_map(|pair| pair.pictures.clone()).collect();
-    let both = Class::new(both, args.common.taught, args.common.seed, &p)?;
+    let both = Class::new(both, args.common.taught, args.common.seed, &p)?.deciding_by(preset);
     let counted = of_each(&pairs, "look-alikes", |i, pair| {
         // The look-alike of landmark i, with only i taught.
         let one = count(&alone, &pair.pictures[1], [None, Some(i)], args, &p);
@@ -141,7 +141,7 @@ fn count(
             continue;
         };
         counts.views += 1;
-        match recognise(&rendered.image, &quad(corners), &class.models, DistanceKind::Both, p).verdict {
+        match recognise(&rendered.image, &quad(corners), &class.models, class.kind, p).verdict {
             Verdict::Unique(id) if is(id, own) => counts.right += 1,
             Verdict::Unique(id) if is(id, look_alike) => counts.look_alike += 1,
             Verdict::Unique(_) => counts.other += 1,

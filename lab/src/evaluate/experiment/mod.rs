@@ -27,7 +27,7 @@ use std::{
         atomic::{AtomicUsize, Ordering},
     },
 };
-use vision::params::Params;
+use vision::params::{Params, preset::Preset};
 
 /// Arguments of every experiment.
 #[derive(Debug, Clone, clap::Args)]
@@ -52,6 +52,9 @@ pub(crate) struct Common {
     /// Let the detector find the quad in the whole image, instead of giving the true corners.
     #[arg(long)]
     pub(crate) detector: bool,
+    /// The pipeline: the `default`, or that of the `paper`, where H^r decides.
+    #[arg(long, value_name = "NAME", default_value = "default")]
+    pub(crate) preset: Preset,
     /// Print one JSON object instead of a table.
     #[arg(long)]
     pub(crate) json: bool,
@@ -76,6 +79,7 @@ pub(crate) struct Setting {
     taught: &'static str,
     corners: String,
     seed: u64,
+    preset: Preset,
     /// Landmarks in the map (N), and how many of them are photographs.
     landmarks: usize,
     photographs: usize,
@@ -100,6 +104,7 @@ impl Setting {
             taught: common.taught.name(),
             corners,
             seed: common.seed,
+            preset: common.preset,
             landmarks: class.models.len(),
             photographs: class.active().filter(|(_, picture)| picture.photograph).count(),
             candidates: class.candidates.iter().map(|i| class.landmarks[*i].name.clone()).collect(),
@@ -112,8 +117,9 @@ impl Setting {
     fn lines(&self) -> Vec<String> {
         vec![
             format!(
-                "{}: set {}, seed {}, N = {} landmarks ({} photographs) taught from {}; corners {}",
+                "{}: preset {}, set {}, seed {}, N = {} landmarks ({} photographs) taught from {}; corners {}",
                 self.experiment,
+                self.preset.word(),
                 self.set,
                 self.seed,
                 self.landmarks,

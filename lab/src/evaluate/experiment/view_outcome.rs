@@ -11,7 +11,7 @@ use vision::{
     icon::icon,
     model::LandmarkId,
     params::Params,
-    recognise::{DistanceKind, MatchRefusal, RecognitionResult, Verdict, features, recognise},
+    recognise::{MatchRefusal, RecognitionResult, Verdict, features, recognise},
     trace::NoTrace,
 };
 
@@ -119,7 +119,7 @@ pub(crate) fn score_view(
 ) -> ViewFigures {
     let quads = corners.map_or_else(|| detected(rendered, p), |c| vec![quad(*c)]);
     let verdicts: Vec<RecognitionResult> =
-        quads.iter().map(|q| recognise(&rendered.image, q, &class.models, DistanceKind::Both, p)).collect();
+        quads.iter().map(|q| recognise(&rendered.image, q, &class.models, class.kind, p)).collect();
     let mut ratios = [f64::INFINITY; 3];
     if let Some(at) = quads.first().map(|q| q.corners_px) {
         ratios = paper_ratios(class, id, rendered, &at, p);
