@@ -60,7 +60,7 @@ impl Default for SegmentParams {
 const CELL_PX: f64 = 16.0;
 /// Most fragments that take part, the longest first; the rest stays as it is.
 const MAX_FRAGMENTS: usize = 8192;
-/// Rounds of collinear_merge; each at least halves what still has a partner.
+/// Rounds of merging; each at least halves what still has a partner.
 const MAX_ROUNDS: usize = 8;
 
 /// A straight run of edge points, with all sums that a refit needs.
