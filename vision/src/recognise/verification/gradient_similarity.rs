@@ -75,7 +75,7 @@ pub fn likeness(a: &Icon, b: &Icon, p: &CorrelationParams) -> f64 {
     compare_gradients(a, b, p).likeness
 }
 
-/// The same as [`alike`] of smoothed icons.
+/// The same as [`compare_gradients`] of smoothed icons.
 pub fn between(a: &Smoothed, b: &Smoothed, p: &CorrelationParams) -> IconComparison {
     let Some(buckets) = compare(a, b, p) else { return IconComparison { likeness: 0.0, contradicting: 0.0 } };
     let count = buckets.len() as f64;
