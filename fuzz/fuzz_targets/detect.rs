@@ -11,7 +11,7 @@ use vision::{
     detect::{
         DetectParams, Grouping, MAX_QUADS, MAX_SCALES, Nested, Quad, detect,
         edges::edge_map::EdgeMap,
-        segments::{edge_segments::EdgeSegment, collinear_merge::MAX_SEGMENTS},
+        segments::{collinear_merge::MAX_SEGMENTS, edge_segments::EdgeSegment},
     },
     frame::{Distortion, GrayImage, Intrinsics},
     geometry::polygon,
