@@ -89,8 +89,7 @@ enum Command {
     /// A first drive teaches the posters, then robots drive and send frames over zenoh. Watch it at
     /// the printed address. Ends with a summary; exit status 1 if there was a false match.
     Demo(demo::Args),
-    /// Write the files that the guides name: photographs of a rendered office, a laser log, floor
-    /// plans
+    /// Write the files that the guides name: photographs of an office, a laser log, floor plans
     ///
     /// With them the guides can be followed without a poster, a camera or a robot. For example:
     ///   waymark sample office
@@ -132,8 +131,7 @@ enum Command {
     Map(map::Args),
     /// Landmarks: teach, list, show, place, size, rename, delete, accept.
     Landmark(landmark::Args),
-    /// Changes of a map, by whom and why: list, diff; the way back: rollback, undo; drafts: draft,
-    /// publish
+    /// Changes of a map: list, diff; the way back: rollback, undo; drafts: draft, publish
     ///
     /// Every change of a map is a commit. For example:
     ///   waymark history list
@@ -156,8 +154,7 @@ enum Command {
     ///   waymark landmark accept 1 3=poster 5=fire-plan
     #[command(verbatim_doc_comment)]
     Gathering(gathering::Args),
-    /// Record a robot's run against a reference trajectory: the map learns which modality to trust
-    /// where
+    /// Record a robot's run beside a reference: the map learns which modality to trust where
     ///
     /// For example:
     ///   waymark run start r1
@@ -173,8 +170,7 @@ enum Command {
     ///   waymark record drive.mcap --robot r1 --seconds 60
     #[command(verbatim_doc_comment)]
     Record(recording::record::Args),
-    /// Play a recording, or a bag of ROS 2, into a running server as a robot, and compare the
-    /// answers.
+    /// Play a recording or a bag of ROS 2 into a server as a robot, and compare the answers.
     ///
     /// The robot must be registered, or --map given. Two builds or two versions of a map are
     /// compared by playing the same file into both. Exit status 1 if --compare finds a difference.

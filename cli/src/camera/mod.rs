@@ -20,8 +20,7 @@ pub(crate) struct Args {
 
 #[derive(Debug, clap::Subcommand)]
 enum Verb {
-    /// A camera's focal length, principal point and distortion from pictures of one flat object; no
-    /// server needed
+    /// Focal length, principal point and distortion from pictures of a flat object; no server
     ///
     /// Five to ten pictures of one poster or board from different sides, each of which shows it as
     /// its largest quad; at least three of the sides must differ by more than 15 degrees. Pictures

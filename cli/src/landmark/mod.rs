@@ -53,8 +53,7 @@ enum Verb {
     ///   waymark landmark teach poster hall.jpg --pick 2
     #[command(verbatim_doc_comment)]
     Teach(teach::TeachArgs),
-    /// Set the place of a landmark: on a wall by tape measure, by coordinates, or by a photograph
-    /// from a known place
+    /// Set a landmark's place: on a wall, by coordinates, or by a photograph from a known place
     ///
     /// By tape measure: `waymark map walls MAP --draw walls.svg` numbers the walls; stand before
     /// the wall, measure from its left end to the middle of the landmark, and from the floor to its

@@ -70,8 +70,7 @@ enum Verb {
         #[command(flatten)]
         server: ServerArgs,
     },
-    /// Show or set the visibility settings of a map: the camera and the limits that define
-    /// "visible"
+    /// Show or set the visibility settings of a map: camera and limits that define "visible"
     ///
     /// The visibility areas of landmarks follow from them. For example, a camera 0.8 m up that
     /// tilts up to 60 degrees:
@@ -98,8 +97,7 @@ enum Verb {
         #[command(flatten)]
         server: ServerArgs,
     },
-    /// Make a new map of all that a map has: landmarks with views and models, walls, floor plan,
-    /// runs, settings
+    /// Copy a map: landmarks with views and models, walls, floor plan, runs, settings
     ///
     /// Robots stay on the first one. For example:
     ///   waymark map duplicate office office-trial
@@ -113,8 +111,7 @@ enum Verb {
         #[command(flatten)]
         server: ServerArgs,
     },
-    /// Save a map to one file: landmarks with photographs and models, walls, floor plan, runs,
-    /// settings
+    /// Save a map to a file: landmarks, photographs, models, walls, floor plan, runs, settings
     ///
     /// The file is a zip that other programs read without Waymark. For example:
     ///   waymark map save office office.zip
@@ -157,8 +154,7 @@ enum Verb {
     ///   waymark map convert floor.yaml --out floor.json --draw floor.svg
     #[command(verbatim_doc_comment)]
     Convert(convert::ConvertArgs),
-    /// Build walls from a laser log: scans are matched and loops closed; a server is needed only
-    /// with --into
+    /// Build walls from a laser log: scans matched, loops closed; a server only with --into
     ///
     /// The first pose is the origin of the map. Standard output says how many loops were closed and
     /// refused: a picture (--draw) shows where. Poses in a CARMEN log are taken for odometry; in a

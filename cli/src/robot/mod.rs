@@ -65,8 +65,7 @@ enum Verb {
     /// Revoke certificates of a robot: its messages are refused at once, and its connection is
     /// closed.
     Revoke(certificates::RevokeArgs),
-    /// Print who may do what on a zenoh router of your own that servers join, for the settings of
-    /// zenohd
+    /// Print who may do what on a zenoh router that servers join, for the settings of zenohd
     ///
     /// Robots are those of the server, known by certificates with their names. For example:
     ///   waymark robot access-control --server-certificate hall-server > access.json5

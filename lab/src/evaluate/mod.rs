@@ -38,8 +38,7 @@ pub(crate) enum Command {
     /// Starts a server of its own in a temporary folder. A landmark taught from one picture is
     /// learnt from views generated from it (warped, dimmed, blurred).
     Recognition(recognition::Args),
-    /// Worlds made by others, with exact truth: quads, names and poses, each landmark taught from
-    /// one picture.
+    /// Worlds made by others, with exact truth: quads, names, poses, taught from one picture.
     ///
     /// A world is a folder in the evaluation format with the camera of every picture beside it
     /// (world.json, docs/EVALUATION.md). Its landmarks are taught with true size and place; its
@@ -49,8 +48,7 @@ pub(crate) enum Command {
     ///   waymark-lab evaluate outside photoreal --strangers --json
     #[command(verbatim_doc_comment)]
     Outside(Box<outside::Args>),
-    /// Recognition over the view angle: H^r, C^r and gradient similarity over their thresholds, and
-    /// the decision.
+    /// Recognition over the view angle: distances over their thresholds, and the decision.
     ///
     /// Landmarks are rendered posters (and photographs, with --photographs), taught as a robot
     /// would teach them. Every view has its own noise, blur, light and compression; only the angle
@@ -70,8 +68,7 @@ pub(crate) enum Command {
     Illumination(experiment::conditions::Args),
     /// Recognition over the share of a landmark's area that is hidden in its middle.
     Occlusion(experiment::conditions::Args),
-    /// False acceptance of distractors: per pair by the paper's thresholds, per quad by the
-    /// decision.
+    /// False acceptance of distractors: by pair and the paper's thresholds, by quad and decision.
     ///
     /// Distractors are posters that are not taught, photographs, doors, windows and tiles, and, as
     /// strata of their own, look-alikes of landmarks made on purpose. Bounds are exact, by quads
@@ -82,15 +79,13 @@ pub(crate) enum Command {
     /// Pairs of pictures that are nearly the same (another text, one block changed, mirrored, two
     /// doors): distinguished, refused as ambiguous, or confused.
     Lookalikes(experiment::look_alikes::Args),
-    /// Laser maps from scan logs: error of relative poses beside odometry alone and published
-    /// figures, walls, time.
+    /// Laser maps from scan logs: errors beside odometry and published figures, walls, time.
     ///
     /// For example:
     ///   waymark-lab evaluate mapping laser-carmen-corrected laser-intel-raw-odometry --draw maps --plot mapping.svg
     #[command(verbatim_doc_comment)]
     Mapping(mapping::Args),
-    /// Occupancy grids imported: share of their wall cells that walls explain, and of walls that
-    /// lie on wall cells.
+    /// Occupancy grids imported: share of wall cells explained, and of walls on wall cells.
     ///
     /// For example:
     ///   waymark-lab evaluate grids maps-ros-grid --draw grids
@@ -98,8 +93,7 @@ pub(crate) enum Command {
     Grids(grids::Args),
     /// Calibration of confidences: reliability diagram and expected calibration error.
     Confidence(experiment::confidence::Args),
-    /// Auto-calibration of a camera from views of one quad: error of the focal length by the number
-    /// of views (Fig. 17).
+    /// Auto-calibration from views of one quad: error of the focal length by views (Fig. 17).
     ///
     /// Synthetic views with the constraints C1, C1+C2, C1+C3 and all, linear and refined; and real
     /// boards, their outermost quad against all their points and against what the set states. For

@@ -25,8 +25,7 @@ pub(crate) enum Command {
     ///   waymark-lab evaluate detection museum-paintings --params weights.json --grouping relaxation
     #[command(verbatim_doc_comment)]
     Similarity(Box<similarity::SimilarityArgs>),
-    /// The two networks of the default detector: the border model (which line beside a side is the
-    /// border) and the quad classifier (whether a quad is an object).
+    /// The networks of the default detector: border model (which line) and quad classifier.
     ///
     /// The border model learns to choose, of the lines beside each side of a detected quad, the one
     /// on the labelled side. The classifier learns to separate quads on labelled objects from false
@@ -40,8 +39,7 @@ pub(crate) enum Command {
     ///   waymark-lab evaluate detection corridor --seed 3 --compare networks.json
     #[command(verbatim_doc_comment)]
     Detector(Box<detector::DetectorArgs>),
-    /// The weights of the confidence: the chance that an identity is right, from answers whose
-    /// truth is known.
+    /// The weights of the confidence, from answers whose truth is known.
     ///
     /// Maps are taught and quads recognised as in `waymark-lab evaluate confidence`, which
     /// evaluates the calibration. Fit on the set `calibrate`, evaluate on `test`. The same options
