@@ -2,7 +2,7 @@
 
 use super::{
     Setting, say,
-    sweep::{Crossing, Curve, DISTANCES},
+    sweep::{Crossing, Curve, RATIOS},
     write_plot,
 };
 use crate::evaluate::{
@@ -36,10 +36,10 @@ pub(crate) fn show(
 fn table(setting: &Setting, curves: &[Curve]) -> Vec<String> {
     let mut lines = setting.lines();
     for curve in curves {
-        lines.push(format!("  {:<28} median (and 90 %) of D/tau", curve.name));
+        lines.push(format!("  {:<28} median (and 90 %); the decision accepts below 1", curve.name));
         lines.push(format!(
             "  {:>9} {:>6}  {:<13} {:<13} {:<13} {:<22} not recognised",
-            "", "views", DISTANCES[0], DISTANCES[1], DISTANCES[2], "rightly recognised"
+            "", "views", RATIOS[0], RATIOS[1], RATIOS[2], "rightly recognised"
         ));
         for p in &curve.points {
             let ratio = |d: usize| {
@@ -65,8 +65,8 @@ fn table(setting: &Setting, curves: &[Curve]) -> Vec<String> {
                 why.join(", ")
             ));
         }
-        for (d, name) in DISTANCES.iter().enumerate() {
-            lines.push(format!("    median {name}/tau reaches 1 at {}", words(&curve.crossings[d])));
+        for (d, name) in RATIOS.iter().enumerate() {
+            lines.push(format!("    median {name} reaches 1 at {}", words(&curve.crossings[d])));
         }
         lines.push(format!("    half are recognised up to   {}", words(&curve.half)));
         lines.push(format!("    95 % are recognised up to   {}", words(&curve.most)));
@@ -82,10 +82,10 @@ fn words(crossing: &Crossing) -> String {
 }
 
 fn svg(setting: &Setting, curves: &[Curve]) -> String {
-    let mut words: Vec<(&str, String)> = DISTANCES
+    let mut words: Vec<(&str, String)> = RATIOS
         .iter()
         .zip(COLOURS)
-        .map(|(name, colour)| (colour, format!("{name}/tau: median, bars to the 90 % quantile")))
+        .map(|(name, colour)| (colour, format!("{name}: median, bars to the 90 % quantile")))
         .collect();
     words.push((COLOURS[3], "share rightly recognised by the whole decision (1 is the dashed line)".into()));
     words.push(("none", setting.lines().swap_remove(0)));
@@ -101,7 +101,7 @@ fn svg(setting: &Setting, curves: &[Curve]) -> String {
                 .collect();
             panel.axes(svg, &ticks);
             panel.level(svg, 1.0);
-            for (d, colour) in COLOURS.iter().enumerate().take(DISTANCES.len()) {
+            for (d, colour) in COLOURS.iter().enumerate().take(RATIOS.len()) {
                 let of = |y: Option<f64>| y.unwrap_or(HIGHEST);
                 let line: Vec<(f64, f64)> = curve.points.iter().map(|p| (p.value, of(p.median[d]))).collect();
                 panel.curve(svg, &line, colour);

@@ -15,7 +15,7 @@ use std::collections::BTreeMap;
 use vision::{params::Params, random::Random};
 
 /// Names of the ratios, in the order of [`ViewFigures::ratios`].
-pub(crate) const DISTANCES: [&str; 3] = ["H^r", "C^r", "similarity"];
+pub(crate) const RATIOS: [&str; 3] = ["H^r/tau", "C^r/tau", "decision"];
 /// Most draws for one view.
 const TRIES: u64 = 10;
 
