@@ -11,8 +11,8 @@ use vision::{detect::DetectParams, params::preset::Preset};
 #[derive(Debug, Clone, Default, clap::Args)]
 #[command(next_help_heading = "Detection parameters")]
 pub struct ParameterArgs {
-    /// The parameters that the others change: `default`, or those of the `paper`: relaxation over all
-    /// six cues, floor tiling removed.
+    /// The parameters that the others change: `default`, or those of the `paper`: relaxation over
+    /// all six cues, floor tiling removed.
     #[arg(long, value_name = "NAME", default_value = "default")]
     preset: Preset,
     /// Parameters as JSON, only what differs from the defaults, such as {"quads": {"grouping":

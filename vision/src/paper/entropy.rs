@@ -11,8 +11,8 @@ pub struct Possibilities {
 }
 
 impl Possibilities {
-    /// None of the map is left where nothing was accepted, and where the only landmark is `doubtful`.
-    /// Departs from the paper, which knows no doubt: the landmark would be certain.
+    /// None of the map is left where nothing was accepted, and where the only landmark is
+    /// `doubtful`. Departs from the paper, which knows no doubt: the landmark would be certain.
     pub fn new(accepted: usize, doubtful: bool) -> Self {
         Self { accepted, none: accepted == 0 || accepted == 1 && doubtful }
     }

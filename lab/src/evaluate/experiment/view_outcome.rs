@@ -73,8 +73,8 @@ impl Outcome {
 /// Figures of one view.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ViewFigures {
-    /// H^r / tau and C^r / tau at the corners of the first quad, and the ratio of the candidate that
-    /// the decision compares with 1, whatever decides; infinite without.
+    /// H^r / tau and C^r / tau at the corners of the first quad, and the ratio of the candidate
+    /// that the decision compares with 1, whatever decides; infinite without.
     pub(crate) ratios: [f64; 3],
     pub(crate) outcome: Outcome,
 }
