@@ -89,8 +89,11 @@ fn comments_wrap() {
         for (number, line) in (1..).zip(text.lines()) {
             let is_comment = line.trim_start().starts_with("//");
             is_code ^= is_comment && line.contains("```");
-            // Names, links and commands cannot be broken.
-            let is_whole = ["`", "](", "://"].iter().any(|c| line.contains(c)) || line.ends_with('\\');
+            // Code, links and commands cannot be broken: a line breaks at a space outside of
+            // backticks.
+            let outside: String = line.trim_start().split('`').step_by(2).collect();
+            let breaks = outside.trim_start_matches(['/', '!', ' ']).contains(' ');
+            let is_whole = !breaks || line.contains("](") || line.contains("://") || line.ends_with('\\');
             let is_prose = is_comment && !line.contains(" waymark") && !is_code && !is_whole;
             if is_prose && line.chars().count() > MAX_COMMENT {
                 long.push(format!("{name}:{number}"));

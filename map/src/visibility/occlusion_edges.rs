@@ -17,7 +17,7 @@ const EDGE_HALVINGS: u32 = 50;
 /// Smaller distances count as this, metres.
 pub(super) const MIN_NEAR_M: f64 = 1e-6;
 
-/// The rims of one quarter.
+/// The occlusion edges of one quadrant.
 #[derive(Default)]
 pub(super) struct OcclusionEdges {
     pub far: Vec<Piece>,
@@ -48,7 +48,7 @@ struct ContourTracer<'a> {
     made: OcclusionEdges,
 }
 
-/// The rims of the quarter about a direction.
+/// The occlusion edges of the quadrant about a direction.
 pub(super) fn occlusion_edges(limits: &Limits, ahead_rad: f64) -> OcclusionEdges {
     let mut follower = ContourTracer { limits, ahead_rad, made: OcclusionEdges::default() };
     let slope = |i: u32| MAX_SLOPE * (2.0 * f64::from(i) / f64::from(GRID) - 1.0);

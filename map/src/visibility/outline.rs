@@ -131,7 +131,7 @@ fn closed(mut runs: Vec<Run>) -> Vec<(Run, bool)> {
 /// Directions closer than this are equal.
 const SAME: f64 = 1e-12;
 
-/// A continuous measure of direction over all quarters: from -1, 2 for each quarter.
+/// A continuous measure of direction over all quadrants: from -1, 2 for each.
 fn direction(quarter: usize, slope: f64) -> f64 {
     2.0 * MAX_SLOPE * quarter as f64 + slope
 }

@@ -1,4 +1,4 @@
-//! Bounds in all directions about a landmark: four quarters, each with its own axis, so that no
+//! Bounds in all directions about a landmark: four quadrants, each with its own axis, so that no
 //! slope exceeds one.
 
 use crate::visibility::{
@@ -20,7 +20,7 @@ pub(super) struct Quadrant {
     pub near: Envelope,
 }
 
-/// The bounds of all quarters, the first ahead, the others to the left. `obstacles` in the
+/// The bounds of all quadrants, the first ahead, the others to the left. `obstacles` in the
 /// landmark's frame.
 pub(super) fn quadrants(
     limits: &Limits,

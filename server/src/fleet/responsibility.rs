@@ -50,7 +50,7 @@ pub(crate) fn responsibility(world: World<'_>, message: Addressed<'_>) -> Respon
     // A name that is none is no map: who has the robot says so.
     let Ok(map) = Name::new(message.map) else { return by_registration(world, message) };
     match on_map(world, &map) {
-        Some(duty) => duty,
+        Some(responsibility) => responsibility,
         None => {
             match (world.others.gone(&ServerToken::Holds(map.clone())), by_registration(world, message)) {
                 (_, Responsibility::Silent) => Responsibility::Silent,

@@ -1,4 +1,4 @@
-//! Edge map in, chains of edge points out (method 1.2): tracing, then bridging of small gaps.
+//! Edge map in, chains of edge points out (method 1.2): tracing, then closing of small gaps.
 //!
 //! A chain keeps one polarity: the brighter side never changes over. Corners stay inside chains;
 //! finding the straight parts is the next stage's work.
@@ -157,7 +157,7 @@ impl<'a> Tracer<'a> {
     fn next(&self, at: usize, sense: Option<f32>) -> Option<(usize, f32)> {
         let mut best = None;
         let mut best_cos = MIN_COS_TURN;
-        // Runs between two touching junctions would be found again and again; bridging joins what
+        // Runs between two touching junctions would be found again and again; closing joins what
         // they separate.
         let junction = self.branches[at] >= 3;
         let mut ring = changing_ring_code(&self.free, self.edges.width(), at);

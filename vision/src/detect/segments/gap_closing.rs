@@ -26,7 +26,8 @@ impl Default for ChainParams {
     }
 }
 
-/// A traced run of pixels, before bridging: row-major indices in a buffer shared by all runs.
+/// A traced run of pixels, before gaps are closed: row-major indices in a buffer shared by all
+/// runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct PixelRun {
     pub(crate) start: usize,
