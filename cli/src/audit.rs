@@ -26,7 +26,7 @@ enum Verb {
     List {
         /// Only those of tokens with this name, or of the `server`.
         #[arg(long, value_name = "NAME")]
-        by: Option<String>,
+        actor: Option<String>,
         /// Only those of this map and of what is in it.
         #[arg(long, value_name = "MAP")]
         map: Option<String>,
@@ -64,9 +64,9 @@ fn head(text: &str) -> Result<AuditHead, String> {
 pub(crate) async fn run(args: &Args) -> anyhow::Result<()> {
     let session = args.server.session()?;
     let done = match &args.verb {
-        Verb::List { by, map, limit } => {
+        Verb::List { actor, map, limit } => {
             let target = map.as_ref().map(|map| format!("/maps/{map}"));
-            list(&session, by.clone(), target, *limit).await
+            list(&session, actor.clone(), target, *limit).await
         }
         Verb::Verify { head, file: None } => match session.maps().check_audit(head.as_ref()).await {
             Ok(check) => show(&session, &check),
@@ -83,11 +83,11 @@ pub(crate) async fn run(args: &Args) -> anyhow::Result<()> {
 
 async fn list(
     session: &Session,
-    by: Option<String>,
+    actor: Option<String>,
     target: Option<String>,
     limit: u16,
 ) -> anyhow::Result<()> {
-    let query = AuditQuery { limit: Some(usize::from(limit)), actor: by, target, ..AuditQuery::default() };
+    let query = AuditQuery { limit: Some(usize::from(limit)), actor, target, ..AuditQuery::default() };
     let page = session.maps().audit(&query).await?;
     let table = |all: &[AuditEntry]| {
         Table::of(["entry", "when", "who", "what", "to"], all, |entry| {
@@ -103,7 +103,7 @@ async fn list(
     session.list(&page.items, table, "Nothing was changed so.")?;
     let more = page.total.saturating_sub(page.items.len() as u64);
     if page.next.is_some() {
-        session.note(&format!("  {more} more: --limit, --by or --map"));
+        session.note(&format!("  {more} more: --limit, --actor or --map"));
     }
     Ok(())
 }

@@ -34,7 +34,7 @@ enum Verb {
         landmark: Option<String>,
         /// Views of every landmark that is recognised beyond doubt, too.
         #[arg(long)]
-        known: bool,
+        include_known: bool,
     },
     /// Stop; the tracks wait for a decision.
     Stop {
@@ -73,8 +73,9 @@ pub(crate) async fn run(args: &Args) -> anyhow::Result<()> {
 async fn on_map(session: &Session, verb: &Verb) -> anyhow::Result<()> {
     let (maps, map) = (session.maps(), session.map().await?);
     match verb {
-        Verb::Start { robot, landmark, known } => {
-            let new = NewGatheringBody { robot: robot.clone(), landmark: landmark.clone(), known: *known };
+        Verb::Start { robot, landmark, include_known } => {
+            let new =
+                NewGatheringBody { robot: robot.clone(), landmark: landmark.clone(), known: *include_known };
             let begun = maps.start_gathering(map, &new).await?;
             session.show(&begun, &format!("gathering {} has begun", begun.id))?;
             session.note(&format!(

@@ -8,7 +8,7 @@
 
 mod corrections;
 mod frames;
-mod lent_recording;
+mod exclusive_recording;
 mod messages;
 mod robot;
 mod run_recording;

@@ -35,7 +35,7 @@ pub(super) struct LoadArgs {
     name: Option<String>,
     /// Leave out the link to the map that it lies in; otherwise a map of that name must be there.
     #[arg(long)]
-    without_link: bool,
+    no_map_link: bool,
     #[command(flatten)]
     server: ServerArgs,
 }
@@ -91,7 +91,7 @@ pub(super) async fn load(args: &LoadArgs) -> anyhow::Result<()> {
 async fn loaded(session: &Session, args: &LoadArgs) -> anyhow::Result<()> {
     let file = args.file.display();
     let bundle = fs::read(&args.file).await.with_context(|| file.to_string())?;
-    let query = BundleQuery { name: args.name.clone(), without_link: args.without_link };
+    let query = BundleQuery { name: args.name.clone(), without_link: args.no_map_link };
     let map = session.maps().load_map(bundle, &query).await?;
     let landmarks = counted(map.landmarks, "landmark");
     session.show(&map, &format!("map {} loaded from {file}, with {landmarks}", map.name))

@@ -1,5 +1,5 @@
-//! A recording that is being learnt from. The recording stays where it is until what was learnt is
-//! stored: until then it can be learnt from again.
+//! Exclusive use of a recording while statistics are learnt from it. The recording stays in place
+//! until they are stored; if that fails, it can be used again.
 
 use super::{
     MotionTracker, lock_robot,
@@ -8,9 +8,9 @@ use super::{
 use protos::Name;
 use std::sync::{Arc, PoisonError};
 
-/// A copy of a robot's recording. One exists at a time; dropping it leaves the recording as it was.
+/// A copy of a robot's recording. One exists at a time; dropping it releases the recording.
 #[derive(Debug)]
-pub struct LentRecording {
+pub struct ExclusiveRecording {
     motion: Arc<MotionTracker>,
     robot: Name,
     /// The copy.
@@ -18,9 +18,9 @@ pub struct LentRecording {
 }
 
 impl MotionTracker {
-    /// Lends the recording of a robot. Copies up to some 70 MB: not for an async thread. Errors:
-    /// there is none, or it is lent.
-    pub fn lend_recording(self: &Arc<Self>, robot: &Name) -> Result<LentRecording, RecordingError> {
+    /// Copies the recording of a robot, up to about 70 MB: not for an async thread. Errors: there is
+    /// none, or it is in use.
+    pub fn lend_recording(self: &Arc<Self>, robot: &Name) -> Result<ExclusiveRecording, RecordingError> {
         let state = self.lock().robots.get(robot).cloned().ok_or(RecordingError::None)?;
         let mut state = lock_robot(&state);
         let recording = state.recording.as_mut().ok_or(RecordingError::None)?;
@@ -28,7 +28,7 @@ impl MotionTracker {
             return Err(RecordingError::Lent);
         }
         recording.lent = true;
-        Ok(LentRecording { motion: self.clone(), robot: robot.clone(), recording: recording.clone() })
+        Ok(ExclusiveRecording { motion: self.clone(), robot: robot.clone(), recording: recording.clone() })
     }
 
     /// Whether the recording of a robot is lent.
@@ -39,7 +39,7 @@ impl MotionTracker {
     }
 }
 
-impl LentRecording {
+impl ExclusiveRecording {
     /// What was learnt is stored: ends the recording, unless it was cancelled and another has
     /// started.
     pub fn finish(self) {
@@ -53,7 +53,7 @@ impl LentRecording {
     }
 }
 
-impl Drop for LentRecording {
+impl Drop for ExclusiveRecording {
     fn drop(&mut self) {
         let Some(state) = self.motion.lock().robots.get(&self.robot).cloned() else { return };
         let mut state = lock_robot(&state);
