@@ -15,8 +15,12 @@ fn maps() -> Vec<PathBuf> {
     let folder = data.join("maps-ros-grid");
     let Ok(entries) = std::fs::read_dir(&folder) else {
         // Past the capture of output: whoever runs the tests must know what was not tested.
-        writeln!(std::io::stderr(), "skipped: no grid maps in {} (set WAYMARK_DATA)", folder.display())
-            .expect("standard error");
+        writeln!(
+            std::io::stderr(),
+            "skipped: real_grids: no grid maps in {} (set WAYMARK_DATA)",
+            folder.display()
+        )
+        .expect("standard error");
         return vec![];
     };
     let all = entries.map(|e| e.expect("an entry").path());

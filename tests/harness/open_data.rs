@@ -17,7 +17,10 @@ pub fn open_data(set: &str) -> Option<PathBuf> {
     None
 }
 
-/// Prints that a test is skipped, past the capture of output: it must be visible.
+/// Prints that this test is skipped, past the capture of output: it must be visible, and `.ci/run`
+/// lists all of them at its end.
 pub fn skipped(reason: &str) {
-    writeln!(std::io::stderr(), "skipped: {reason}").expect("standard error");
+    let thread = std::thread::current();
+    let test = thread.name().unwrap_or("a test");
+    writeln!(std::io::stderr(), "skipped: {test}: {reason}").expect("standard error");
 }

@@ -6,10 +6,10 @@ use crate::lab;
 use serde_json::{Value, json};
 use std::{
     fs,
-    io::Write as _,
     path::{Path, PathBuf},
 };
 use tempfile::TempDir;
+use tests::open_data;
 
 /// Photographs with paintings that are taught, and with distractors alone.
 const PHOTOGRAPHS: usize = 10;
@@ -19,22 +19,9 @@ const FLOOR_RECALL_70: f64 = 0.75;
 /// Least number of right names.
 const FLOOR_RIGHT: u64 = 4;
 
-/// The set's folder, where it is: `WAYMARK_DATA`, else `shared/data` beside the repository.
+/// The set's folder, where it is.
 fn museum() -> Option<PathBuf> {
-    let data = std::env::var_os("WAYMARK_DATA")
-        .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/data"), PathBuf::from);
-    let folder = data.join("museum-paintings");
-    let there = folder.join("truth.json").is_file();
-    if !there {
-        // Written past the capture of output: a skipped test must be visible.
-        writeln!(
-            std::io::stderr(),
-            "skipped: no real photographs in {} (set WAYMARK_DATA)",
-            folder.display()
-        )
-        .expect("standard error");
-    }
-    there.then_some(folder.canonicalize().ok()?)
+    open_data("museum-paintings")?.canonicalize().ok()
 }
 
 /// A folder in the evaluation format with some photographs of walls, and the known paintings on
