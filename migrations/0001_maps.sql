@@ -8,6 +8,8 @@ CREATE TABLE maps (
     name              TEXT    NOT NULL UNIQUE CHECK (length(name) BETWEEN 1 AND 64),
     -- Counts up with every change that an answer could depend on; every answer quotes it.
     version           INTEGER NOT NULL DEFAULT 1 CHECK (version >= 1),
+    -- Which detector and decision; NULL: as the server's settings say.
+    preset            TEXT    CHECK (preset IN ('default', 'paper')),
     distance          TEXT    NOT NULL CHECK (distance IN ('both', 'correlation', 'hausdorff')),
     created_ms        INTEGER NOT NULL,
     -- Revisions (see 0008_history.sql): of the map and of all that is in it, when that changed last, and of the floor plan.

@@ -116,7 +116,11 @@ fn named_line(named: &NamedLandmark<'_>) -> String {
 
 /// The landmarks that the quad fits by the picture alone.
 fn fitting(quad: &QuadAnswer) -> Vec<&str> {
-    quad.candidates.iter().filter(|c| c.ratio < 1.0).map(|c| c.landmark.as_str()).collect()
+    quad.candidates
+        .iter()
+        .filter(|c| c.ratio.is_some_and(|ratio| ratio < 1.0))
+        .map(|c| c.landmark.as_str())
+        .collect()
 }
 
 /// Distance of a landmark with a pose, or that its size is missing for one; nothing where no camera
@@ -226,8 +230,11 @@ mod tests {
 
     #[test]
     fn a_line_says_what_the_pose_named_and_what_the_picture_alone_says() {
-        let candidate =
-            |name: &str, ratio| Candidate { landmark: name.into(), ratio, ..Candidate::default() };
+        let candidate = |name: &str, ratio| Candidate {
+            landmark: name.into(),
+            ratio: Some(ratio),
+            ..Candidate::default()
+        };
         let mut quad = QuadAnswer {
             verdict: Verdict::Ambiguous.into(),
             candidates: vec![candidate("door-2", 0.5), candidate("door-3", 0.6), candidate("poster", 1.4)],

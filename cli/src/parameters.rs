@@ -14,7 +14,7 @@ pub struct ParameterArgs {
     /// The parameters that the others change: `default`, or those of the `paper`: relaxation over
     /// all six cues, floor tiling removed.
     #[arg(long, value_name = "NAME", default_value = "default")]
-    preset: Preset,
+    pub preset: Preset,
     /// Parameters as JSON, only what differs from the defaults, such as {"quads": {"grouping":
     /// "relaxation"}}.
     #[arg(long, value_name = "FILE")]

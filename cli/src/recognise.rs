@@ -7,7 +7,9 @@ use super::{
     pictures::{self, Sent},
     session::{MapArgs, Session},
 };
+use client::RecogniseOptions;
 use std::path::{Path, PathBuf};
+use vision::params::preset::Preset;
 
 /// `waymark recognise`.
 #[derive(Debug, clap::Args)]
@@ -21,6 +23,9 @@ pub(crate) struct Args {
     /// one by a lens of another focal length, by its EXIF, is refused.
     #[arg(long, value_name = "FILE|FX,FY,CX,CY", value_parser = camera)]
     camera: Option<CameraArg>,
+    /// Detector and decision for these photographs, `default` or `paper`; otherwise the map's.
+    #[arg(long, value_name = "NAME")]
+    preset: Option<Preset>,
     #[command(flatten)]
     map: MapArgs,
 }
@@ -62,11 +67,9 @@ async fn photograph(session: &Session, map: &str, args: &Args, path: &Path) -> R
         camera.of_photograph(&image).map_err(named)?;
     }
     let maps = session.maps();
-    let answer = match args.camera.as_ref().map(CameraArg::stated) {
-        Some((camera, Some(size_px))) => maps.recognise_of_size(map, image, (&camera, size_px)).await,
-        Some((camera, None)) => maps.recognise(map, image, Some(&camera)).await,
-        None => maps.recognise(map, image, None).await,
-    };
+    let (camera, camera_size_px) = args.camera.as_ref().map(CameraArg::stated).unzip();
+    let options = RecogniseOptions { camera, camera_size_px: camera_size_px.flatten(), preset: args.preset };
+    let answer = maps.recognise_with(map, image, &options).await;
     let answer = session.explained(answer.map_err(Into::into)).await.map_err(|error| {
         let failure = Failure::of(&error);
         match failure.class {

@@ -21,7 +21,7 @@ mod transport;
 
 pub use capture::Capture;
 pub use error::ClientError;
-pub use http::{FileDownload, LandmarkRegion, MapClient, NewView, Revised};
+pub use http::{FileDownload, LandmarkRegion, MapClient, NewView, RecogniseOptions, Revised};
 pub use listener::{FleetListener, ListenedMessage};
 pub use protos::{
     self, api,

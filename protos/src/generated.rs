@@ -254,9 +254,10 @@ pub struct Candidate {
     pub distance: ::core::option::Option<f64>,
     #[prost(double, optional, tag = "5")]
     pub threshold: ::core::option::Option<f64>,
-    /// Accepted below 1: the distance over its threshold, or, where points decide, -5 over their log10_chance.
-    #[prost(double, tag = "6")]
-    pub ratio: f64,
+    /// Accepted below 1: the distance over its threshold, or, where points decide, -5 over their log10_chance. Absent where
+    /// it is infinite: too few points.
+    #[prost(double, optional, tag = "6")]
+    pub ratio: ::core::option::Option<f64>,
     /// Equal for each landmark that the verdict leaves, and for `probability_none` where that is left.
     #[prost(double, tag = "7")]
     pub probability: f64,

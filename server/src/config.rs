@@ -178,6 +178,8 @@ pub struct Config {
     pub ros2: Vec<Ros2Robot>,
     /// Every bound.
     pub limits: Limits,
+    /// The preset that `params` began with: its distance is that of new maps.
+    pub preset: Preset,
     /// Parameters of the algorithms.
     pub params: Arc<Params>,
     /// Name of the layer between SQLite and the files, where a test has its own.
@@ -279,6 +281,7 @@ impl TryFrom<RawConfig> for Config {
             backup: backup::checked(raw.backup)?,
             ros2: ros2::checked(raw.ros2)?,
             limits: raw.limits,
+            preset: raw.preset,
             params: Arc::new(raw.algorithm),
             #[cfg(test)]
             vfs: None,

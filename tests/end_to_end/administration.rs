@@ -170,6 +170,34 @@ fn a_map_gets_another_name_while_nothing_works_on_it() {
 }
 
 #[test]
+fn a_map_or_a_photograph_is_compared_by_the_papers_pipeline() {
+    let desk = Desk::new();
+    desk.done("map create office");
+    let photograph = desk.path("poster.png");
+    wall_with(&photograph, &[1]);
+    desk.done(&format!("landmark teach poster {photograph} --map office"));
+    let points_decide = |options: &str| {
+        let seen = desk.done(&format!("recognise {photograph} --map office {options} --json"));
+        let seen: Value = serde_json::from_str(&seen).expect("JSON");
+        let candidate = &seen["quads"][0]["candidates"][0];
+        assert_eq!(candidate["landmark"], "poster", "{seen}");
+        candidate["hausdorff"].is_null()
+    };
+    assert!(points_decide("") && !points_decide("--preset paper"));
+    assert!(desk.done("map pipeline office --preset paper").contains("paper, distance hausdorff"));
+    assert!(!points_decide("") && points_decide("--preset default"));
+    let both = desk.done("map pipeline office --distance correlation");
+    assert!(both.contains("paper, distance correlation"), "{both}");
+    assert!(desk.done("map show office").contains("paper, distance correlation"));
+    assert!(desk.done("map pipeline office --preset server").contains("server's settings, distance both"));
+    assert!(points_decide(""));
+    desk.failed("map pipeline office", 2, "usage");
+    let unknown = desk.failed("map pipeline office --preset papers", 2, "usage");
+    assert!(unknown.contains("default, paper, server"), "{unknown}");
+    desk.server.kill();
+}
+
+#[test]
 fn one_of_several_framed_things_is_picked() {
     let desk = Desk::new();
     desk.done("map create office");

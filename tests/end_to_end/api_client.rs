@@ -83,7 +83,7 @@ async fn maps_are_stored_with_all_their_fields() {
     assert_eq!(maps.walls("hall").await.expect("walls"), walls());
     let parent =
         Parent { map: "hall".into(), x_m: 1.0, y_m: 2.0, theta_rad: 0.0, level_m: 3.0, covariance: None };
-    let new = NewMap { distance: Distance::Hausdorff, parent: Some(parent), ..NewMap::new("attic") };
+    let new = NewMap { distance: Some(Distance::Hausdorff), parent: Some(parent), ..NewMap::new("attic") };
     let attic = maps.create_map(&new).await.expect("map");
     assert_eq!((attic.distance, attic.parent.expect("a parent").level_m), (Distance::Hausdorff, 3.0));
     let query = TransformQuery { to: "hall".into(), x_m: Some(0.5), y_m: Some(0.0), theta_rad: Some(0.0) };

@@ -8,6 +8,7 @@ use crate::{
     detect::{
         detector::detect_for_recognition,
         edge_buffers::DetectBuffers,
+        params::DetectParams,
         quad::{Quad, QuadKind},
     },
     frame::{GrayImage, Intrinsics, PictureRef},
@@ -56,12 +57,20 @@ pub struct FrameCamera<'a> {
     pub intrinsics: Option<&'a Intrinsics>,
     /// From the camera's mounting. Where it is not known, quads are compared in all four rotations.
     pub up: Option<Up>,
+    /// Height of the camera above the floor, metres, from the camera's mounting.
+    pub height_m: Option<f64>,
 }
 
 impl<'a> FrameCamera<'a> {
     /// A camera that is not rolled.
     pub fn level(intrinsics: Option<&'a Intrinsics>) -> Self {
-        Self { intrinsics, up: Some(Up::level()) }
+        Self { intrinsics, up: Some(Up::level()), height_m: None }
+    }
+
+    /// The detector's parameters with the floor as this camera sees it. `None` where that changes
+    /// nothing, and of a camera that is not known or rolled.
+    fn above_its_floor(&self, p: &DetectParams, width_px: usize) -> Option<DetectParams> {
+        p.above_floor(*self.intrinsics?, width_px, self.height_m?, self.up?.tilt_without_roll_rad()?)
     }
 }
 
@@ -123,7 +132,9 @@ impl Pipeline {
         trace: &mut impl Trace,
     ) -> FrameAnalysis {
         let image = image.into();
-        let quads = detect_for_recognition(&mut self.buffers, image, &p.detect, trace);
+        let own = camera.above_its_floor(&p.detect, image.width());
+        let quads =
+            detect_for_recognition(&mut self.buffers, image, own.as_ref().unwrap_or(&p.detect), trace);
         analyse(image, quads, camera, landmarks, BorderBy::Picture, (p, trace))
     }
 }
@@ -157,7 +168,7 @@ fn analyse(
     by: BorderBy,
     (p, trace): (&Params, &mut impl Trace),
 ) -> FrameAnalysis {
-    let FrameCamera { intrinsics, up } = camera;
+    let FrameCamera { intrinsics, up, .. } = camera;
     let mut quads: Vec<Quad> = quads.into_iter().map(|q| q.named_by(up.as_ref(), intrinsics)).collect();
     let verdict = |(i, quad): (usize, &Quad)| {
         let is_asked = i < MAX_RECOGNISED_QUADS;

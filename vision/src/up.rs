@@ -18,6 +18,9 @@ const MAX_ELEVATION_DEG: f64 = 45.0;
 /// are seen at more than 70 degrees, where none is recognised.
 const MAX_ELEVATION_WITH_LEVEL_DEG: f64 = 20.0;
 
+/// Largest roll of a camera that counts as not rolled.
+const MAX_ROLL_DEG: f64 = 2.0;
+
 /// The direction of up in the camera frame, of a camera whose robot stands on the floor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Up {
@@ -43,6 +46,14 @@ impl Up {
     #[must_use]
     pub fn with_level_landmarks(self) -> Self {
         Self { max_elevation_deg: MAX_ELEVATION_WITH_LEVEL_DEG, ..self }
+    }
+
+    /// Angle of the optical axis above the horizontal, rad, of a camera whose image rows are level to
+    /// within [`MAX_ROLL_DEG`]; `None` of any other, and of one that looks straight up or down.
+    pub(crate) fn tilt_without_roll_rad(self) -> Option<f64> {
+        let up = self.camera_up;
+        let roll_rad = up.x.atan2(-up.y);
+        (roll_rad.abs() <= MAX_ROLL_DEG.to_radians()).then(|| up.z.asin())
     }
 
     /// Which corner, 0 to 3, is the top-left one. `None` where up does not decide.

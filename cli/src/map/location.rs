@@ -1,8 +1,7 @@
 //! Options of `map create` and `map locate`: where a map belongs, and its link to another map.
 
 use crate::arg_parsers::numbers;
-use client::api::{Distance, MapPatch, NewMap, Parent};
-use vision::recognise::DistanceKind;
+use client::api::{MapPatch, NewMap, Parent};
 
 /// Location of a map.
 #[derive(Debug, Clone, clap::Args)]
@@ -36,25 +35,25 @@ impl LocationArgs {
     }
 
     /// A map with what is given.
-    pub(super) fn new_map(&self, name: &str, distance: Option<DistanceKind>) -> NewMap {
+    pub(super) fn new_map(&self, name: &str) -> NewMap {
         NewMap {
             name: name.to_owned(),
-            distance: distance.map(Distance::from).unwrap_or_default(),
             site: self.site.clone(),
             building: self.building.clone(),
             floor: self.floor.clone(),
             parent: self.link(),
+            ..NewMap::default()
         }
     }
 
     /// A change to what is given; the rest stays.
     pub(super) fn patch(&self) -> MapPatch {
         MapPatch {
-            name: None,
             site: self.site.clone().map(Some),
             building: self.building.clone().map(Some),
             floor: self.floor.clone().map(Some),
             parent: self.link().map(Some),
+            ..MapPatch::default()
         }
     }
 }
@@ -81,7 +80,7 @@ mod tests {
         assert_eq!((patch.site, patch.building), (None, Some(Some("house".into()))));
         let link = patch.parent.flatten().unwrap();
         assert!((link.theta_rad - std::f64::consts::FRAC_PI_2).abs() < 1e-12, "{link:?}");
-        assert_eq!((link.map.as_str(), args.new_map("a", None).name.as_str()), ("plan", "a"));
+        assert_eq!((link.map.as_str(), args.new_map("a").name.as_str()), ("plan", "a"));
         assert!(origin("1,2").is_err());
     }
 }

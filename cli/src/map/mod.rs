@@ -18,9 +18,9 @@ use super::{
     screen::{Table, counted},
     session::{Consent, ServerArgs, Session},
 };
-use client::api::{LandmarkStatus, Map};
+use client::api::{LandmarkStatus, Map, MapPatch, NewMap};
 use formats::scan_log::LaserDefaults;
-use vision::recognise::DistanceKind;
+use vision::{params::preset::Preset, recognise::DistanceKind};
 
 /// `waymark map`.
 #[derive(Debug, clap::Args)]
@@ -36,11 +36,33 @@ enum Verb {
         /// Lower-case letters, digits, `_` and `-`, up to 64.
         #[arg(value_name = "MAP", value_parser = name)]
         map: String,
-        /// The distance that decides in this map.
+        /// Its detector and decision, `default` or `paper`; otherwise those of the server's settings.
+        #[arg(long, value_name = "NAME")]
+        preset: Option<Preset>,
+        /// The distance that decides in this map; otherwise that of the preset.
         #[arg(long, value_parser = distance)]
         distance: Option<DistanceKind>,
         #[command(flatten)]
         location: location::LocationArgs,
+        #[command(flatten)]
+        server: ServerArgs,
+    },
+    /// Set the detector and decision of a map
+    ///
+    /// Answers follow from the next version on; undo it in the history. For example, the paper's
+    /// pipeline with C^r deciding, and back to the server's settings:
+    ///   waymark map pipeline office --preset paper --distance correlation
+    ///   waymark map pipeline office --preset server
+    #[command(verbatim_doc_comment)]
+    Pipeline {
+        /// The map.
+        map: String,
+        /// `default`, `paper`, or `server`: as the server's settings say.
+        #[arg(long, value_name = "NAME", value_parser = map_preset, required_unless_present = "distance")]
+        preset: Option<MapPreset>,
+        /// The distance that decides; otherwise that of the preset.
+        #[arg(long, value_parser = distance)]
+        distance: Option<DistanceKind>,
         #[command(flatten)]
         server: ServerArgs,
     },
@@ -204,6 +226,7 @@ pub(crate) async fn run(args: &Args) -> anyhow::Result<()> {
         Verb::Create { server, .. }
         | Verb::List { server }
         | Verb::Show { server, .. }
+        | Verb::Pipeline { server, .. }
         | Verb::Locate { server, .. }
         | Verb::Visibility { server, .. }
         | Verb::Rename { server, .. }
@@ -215,16 +238,41 @@ pub(crate) async fn run(args: &Args) -> anyhow::Result<()> {
     }
 }
 
+/// A preset of a map; `None`: as the server's settings say.
+#[derive(Debug, Clone, Copy)]
+struct MapPreset(Option<Preset>);
+
+fn map_preset(word: &str) -> Result<MapPreset, String> {
+    if word == "server" {
+        return Ok(MapPreset(None));
+    }
+    word.parse().map(|preset| MapPreset(Some(preset))).map_err(|why: String| format!("{why}, server"))
+}
+
+/// Detector and decision, in words.
+fn pipeline(map: &Map) -> String {
+    let preset = map.preset.map_or("of the server's settings", |preset| Preset::from(preset).word());
+    format!("{preset}, distance {}", format!("{:?}", map.distance).to_lowercase())
+}
+
 async fn on_server(session: &Session, verb: &Verb) -> anyhow::Result<()> {
     let maps = session.maps();
     match verb {
-        Verb::Create { map, distance, location, .. } => {
-            let made = maps.create_map(&location.new_map(map, *distance)).await?;
+        Verb::Create { map, preset, distance, location, .. } => {
+            let (preset, distance) = (preset.map(Into::into), distance.map(Into::into));
+            let new = NewMap { preset, distance, ..location.new_map(map) };
+            let made = maps.create_map(&new).await?;
             session.show(&made, &format!("map {map} created"))?;
             session.note(&format!(
                 "  Teach it a landmark: waymark landmark teach NAME PHOTO... --size 0.60x0.84 --map {map}"
             ));
             Ok(())
+        }
+        Verb::Pipeline { map, preset, distance, .. } => {
+            let preset = preset.map(|MapPreset(preset)| preset.map(Into::into));
+            let distance = distance.map(Into::into);
+            let map = maps.locate_map(map, &MapPatch { preset, distance, ..MapPatch::default() }).await?;
+            session.show(&map, &format!("{}: {}", map.name, pipeline(&map)))
         }
         Verb::Locate { map, location, .. } => {
             let map = maps.locate_map(map, &location.patch()).await?;
@@ -293,7 +341,7 @@ async fn show(session: &Session, name: &str) -> anyhow::Result<()> {
         ),
         format!("  landmarks  {}, {active} active, {placed} of these with size and place", landmarks.len()),
         format!("  walls      {}, {length_m:.1} m", counted(walls.segments.len() as u64, "segment")),
-        format!("  distance   {:?}", map.distance).to_lowercase(),
+        format!("  pipeline   {}", pipeline(&map)),
     ];
     session.show(&map, &text.join("\n"))?;
     if active > placed {

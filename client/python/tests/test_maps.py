@@ -120,6 +120,9 @@ def test_maps_are_stored_with_all_their_fields(server: Server) -> None:
         attic = maps.locate_map("attic", site="Works / 1", parent=None)
         assert (attic.site, attic.parent) == ("Works / 1", None)
         assert maps.locate_map("attic", floor="2").site == "Works / 1", "what is not given stays"
+        paper = maps.set_pipeline("attic", preset="paper")
+        assert (paper.preset, paper.distance) == ("paper", "hausdorff")
+        assert maps.set_pipeline("attic", preset=None, distance="correlation").preset is None
         assert maps.rename_map("attic", "loft").site == "Works / 1"
         assert maps.rename_map("loft", "attic").name == "attic"
         assert {"attic", "ground"} <= {each.name for each in maps.maps()}

@@ -44,6 +44,7 @@ pub use live::LiveEvents;
 pub use localise::Sensed;
 pub use map_client::{MapClient, Revised};
 pub use operation::Operation;
+pub use recognise::RecogniseOptions;
 pub use server_events::ServerEvents;
 pub use views::{LandmarkRegion, NewView};
 

@@ -237,7 +237,8 @@ pub fn frame_camera<'a>(
 ) -> FrameCamera<'a> {
     let up = mounting.and_then(|mounting| Up::new(mounting.camera_up()));
     let up = if map.has_level_landmarks() { up.map(Up::with_level_landmarks) } else { up };
-    FrameCamera { intrinsics, up }
+    let height_m = mounting.map(|mounting| mounting.robot_from_camera.translation.z);
+    FrameCamera { intrinsics, up, height_m }
 }
 
 fn database(map: &MapSnapshot) -> LandmarkDatabase<'_> {

@@ -119,7 +119,9 @@ pub fn refusal_of(answer: &v1::Answer) -> Option<&str> {
         return None;
     }
     let candidates = answer.quads.iter().flat_map(|quad| &quad.candidates);
-    let nearest = candidates.filter(|c| !c.refusal.is_empty()).min_by(|a, b| a.ratio.total_cmp(&b.ratio));
+    let ratio = |c: &&v1::Candidate| c.ratio.unwrap_or(f64::INFINITY);
+    let refused = candidates.filter(|c| !c.refusal.is_empty());
+    let nearest = refused.min_by(|a, b| ratio(a).total_cmp(&ratio(b)));
     let is_named = answer.status() == v1::Status::Matched;
     let of_candidate = nearest.filter(|_| !is_named).map(|c| c.refusal.as_str());
     of_candidate.or(Some(answer.pose_refusal.as_str())).filter(|code| !code.is_empty())

@@ -15,7 +15,7 @@ use map::{
 use std::{collections::BTreeMap, f64::consts::FRAC_PI_4, sync::Arc};
 use vision::{
     model::{LandmarkId, ModelSet},
-    params::Params,
+    params::{Params, preset::Preset},
     pose::LandmarkSize,
     recognise::DistanceKind,
 };
@@ -108,6 +108,13 @@ impl MapSnapshot {
             params: Arc::default(),
             poses: Arc::default(),
         }
+    }
+
+    /// The same map under another preset: its detector, its decision, its distance.
+    #[must_use]
+    pub fn under(&self, preset: Preset) -> Self {
+        let params = Arc::new(preset.over(&self.params));
+        Self { params, distance: preset.distance(), ..self.clone() }
     }
 
     /// Whether a landmark is level rather than upright: under a ceiling, or on a floor.

@@ -144,7 +144,7 @@ fn models(building: &Building, args: &PipelineArgs, params: &Params) -> anyhow::
         let whole = Corners::try_from([[-0.5, -0.5], [w, -0.5], [w, h], [-0.5, h]])?;
         let views = synthesis::views(picture, &whole, VIEWS, params, args.seed ^ id);
         let model = learn::learn(LandmarkId(id), &views, &[], params)?;
-        models.push(Arc::new(model.with_points_if_used(params, || vec![view_points(picture, &whole)])));
+        models.push(Arc::new(model.with_points(&[view_points(picture, &whole)])));
         progress.inc(1);
     }
     progress.finish_and_clear();

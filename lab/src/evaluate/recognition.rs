@@ -19,6 +19,7 @@ use server::Server;
 use std::{collections::BTreeMap, path::PathBuf, time::Duration};
 use vision::{
     geometry::{Corners, polygon},
+    params::preset::Preset,
     recognise::DistanceKind,
 };
 
@@ -42,7 +43,10 @@ pub(crate) struct Args {
     /// Generated views for each taught picture; default: the server's choice.
     #[arg(long)]
     generated_views: Option<u32>,
-    /// The distance that decides: both, correlation or hausdorff.
+    /// Detector and decision of the map.
+    #[arg(long, value_name = "NAME", default_value = "default")]
+    preset: Preset,
+    /// The distance that decides: both, correlation or hausdorff; otherwise that of the preset.
     #[arg(long, value_parser = cli::arg_parsers::distance)]
     distance: Option<DistanceKind>,
     /// Print one JSON object instead of a table.
@@ -151,8 +155,8 @@ async fn evaluate(truth: &Truth, args: &Args) -> anyhow::Result<Report> {
 }
 
 async fn teach(truth: &Truth, args: &Args, maps: &MapClient, report: &mut Report) -> anyhow::Result<()> {
-    let distance = args.distance.map(Distance::from).unwrap_or_default();
-    maps.create_map(&NewMap { distance, ..NewMap::new(MAP) }).await?;
+    let (preset, distance) = (Some(args.preset.into()), args.distance.map(Distance::from));
+    maps.create_map(&NewMap { preset, distance, ..NewMap::new(MAP) }).await?;
     let progress = screen::progress(truth.teach.len(), "teaching");
     for (path, landmark) in &truth.teach {
         if maps.landmark(MAP, landmark).await.is_err() {
@@ -262,7 +266,7 @@ fn explain(image: &TruthImage, landmark: Option<&str>, labelled: &Corners, answe
             .take(3)
             .map(|c| {
                 format!(
-                    "{} ratio {:.2} C {:.2?} H {:.1?} {}",
+                    "{} ratio {:.2?} C {:.2?} H {:.1?} {}",
                     c.landmark, c.ratio, c.correlation, c.hausdorff, c.refusal
                 )
             })

@@ -52,8 +52,8 @@ pub struct ChangeSummary {
     pub reference_runs_added: u64,
     /// Reference runs that are gone.
     pub reference_runs_removed: u64,
-    /// Which settings differ: `name`, `site`, `building`, `floor`, `parent`, `fusion_mode`,
-    /// `areas`, `visibility_settings`.
+    /// Which settings differ: `name`, `site`, `building`, `floor`, `parent`, `pipeline`
+    /// (detector or decision), `fusion_mode`, `areas`, `visibility_settings`.
     pub settings: Vec<String>,
     /// Names of the first landmarks that differ, at most 8.
     pub landmarks: Vec<String>,

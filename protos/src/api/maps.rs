@@ -1,7 +1,7 @@
 //! `/maps`: maps, where they are, and how they lie to each other.
 
 use serde::{Deserialize, Serialize};
-use vision::recognise::DistanceKind;
+use vision::{params::preset::Preset, recognise::DistanceKind};
 
 /// Which distance decides in a map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -38,6 +38,35 @@ impl From<DistanceKind> for Distance {
     }
 }
 
+/// A whole pipeline by its name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+#[serde(rename_all = "snake_case")]
+pub enum PipelinePreset {
+    /// The product: search of quads, points, then icons.
+    Default,
+    /// The paper: relaxation, icons alone.
+    Paper,
+}
+
+impl From<PipelinePreset> for Preset {
+    fn from(preset: PipelinePreset) -> Self {
+        match preset {
+            PipelinePreset::Default => Self::Default,
+            PipelinePreset::Paper => Self::Paper,
+        }
+    }
+}
+
+impl From<Preset> for PipelinePreset {
+    fn from(preset: Preset) -> Self {
+        match preset {
+            Preset::Default => Self::Default,
+            Preset::Paper => Self::Paper,
+        }
+    }
+}
+
 /// A map.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
@@ -55,6 +84,9 @@ pub struct Map {
     /// A picture is shown under it: `GET /maps/{map}/underlay`.
     #[serde(default)]
     pub has_underlay: bool,
+    /// Detector and decision; absent: those of the server's settings.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub preset: Option<PipelinePreset>,
     /// Which distance decides.
     pub distance: Distance,
     /// The map that it is a draft of.
@@ -112,9 +144,10 @@ pub struct Parent {
 pub struct NewMap {
     /// `[a-z0-9_-]{1,64}`, unique.
     pub name: String,
-    /// Which distance decides.
-    #[serde(default)]
-    pub distance: Distance,
+    /// Detector and decision; absent: those of the server's settings.
+    pub preset: Option<PipelinePreset>,
+    /// Which distance decides; absent: that of the preset.
+    pub distance: Option<Distance>,
     /// The site it belongs to, in words: 1 to 64 characters.
     pub site: Option<String>,
     /// The building it belongs to, in words: 1 to 64 characters.
@@ -149,6 +182,17 @@ pub struct MapPatch {
     /// Another name. Refused while a robot, an open job or an open gathering has the present one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
+    /// Detector and decision, from the next version on; null: those of the server's settings.
+    #[serde(
+        default,
+        deserialize_with = "super::patch::null_or_value",
+        skip_serializing_if = "Option::is_none"
+    )]
+    #[cfg_attr(feature = "openapi", schema(value_type = Option<PipelinePreset>))]
+    pub preset: Option<Option<PipelinePreset>>,
+    /// Which distance decides; absent where `preset` changes: that of the preset.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub distance: Option<Distance>,
     /// The site it belongs to, in words: 1 to 64 characters.
     #[serde(
         default,

@@ -13,4 +13,6 @@ pub struct PhotographForm {
     /// refused. Without them a principal point far off the middle is refused. Without intrinsics
     /// there is recognition but no pose.
     pub intrinsics: Option<String>,
+    /// `default` or `paper`: detector and decision for this photograph, in place of the map's.
+    pub preset: Option<String>,
 }

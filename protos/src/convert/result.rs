@@ -43,7 +43,7 @@ pub fn candidate(c: &MatchCandidate, name: impl Fn(LandmarkId) -> String) -> v1:
         Evidence::Icon(icon) => (Some(icon), icon.likeness),
         Evidence::Points { likeness } => (None, likeness),
     };
-    // JSON has no infinity: an infinite distance (too few points) is absent.
+    // JSON has no infinity: an infinite distance or ratio (too few points) is absent.
     let of = |value: fn(&IconEvidence) -> f64| icon.as_ref().map(value).filter(|v| v.is_finite());
     v1::Candidate {
         landmark: name(c.landmark),
@@ -51,7 +51,7 @@ pub fn candidate(c: &MatchCandidate, name: impl Fn(LandmarkId) -> String) -> v1:
         hausdorff: of(|i| i.hausdorff),
         distance: of(|i| i.distance),
         threshold: of(|i| i.tau),
-        ratio: finite(c.ratio),
+        ratio: Some(c.ratio).filter(|r| r.is_finite()),
         probability: c.probability,
         refusal: c.refusal.map_or("", refusal).to_owned(),
         gradient_similarity: likeness.filter(|l| l.is_finite()),
@@ -129,11 +129,6 @@ fn solution(s: &PoseSolution) -> v1::LandmarkPose {
     }
 }
 
-/// A ratio may be infinite (too few points); JSON has no infinity: the largest number.
-fn finite(value: f64) -> f64 {
-    if value.is_finite() { value } else { f64::MAX }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -161,7 +156,7 @@ mod tests {
             ("l4", "hausdorff", None)
         );
         let json = serde_json::to_value(&wire).unwrap();
-        assert!(json["ratio"].is_number() && json["distance"].is_null() && json["threshold"] == 0.5);
+        assert!(json["ratio"].is_null() && json["distance"].is_null() && json["threshold"] == 0.5);
     }
 
     fn ambiguous() -> RecognitionResult {

@@ -7,6 +7,7 @@ use crate::{
     store::{
         contents::{MapSettings, RunContents},
         map_locations::MapLocation,
+        maps::MapPipeline,
         pictures::hex,
         underlays::UnderlayRow,
         walls::StoredWall,
@@ -24,7 +25,7 @@ use protos::{Name, api::Parent};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use std::f64::consts::TAU;
-use vision::recognise::DistanceKind;
+use vision::{params::preset::Preset, recognise::DistanceKind};
 
 /// Longest word for a site, a building or a floor.
 const MAX_WORD: usize = 64;
@@ -37,6 +38,9 @@ const METRES_PER_PIXEL: [f64; 2] = [1e-4, 10.0];
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct MapRecord {
+    /// Absent: as the server's settings say.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    preset: Option<Preset>,
     distance: DistanceKind,
     site: Option<String>,
     building: Option<String>,
@@ -118,18 +122,19 @@ impl MapRecord {
             level_m: link.level_m,
             covariance: Some(std::array::from_fn(|i| link.parent_from_map.covariance[(i / 3, i % 3)])),
         });
-        Self { distance: settings.distance, site, building, floor, parent }
+        let MapPipeline { preset, distance } = settings.pipeline;
+        Self { preset, distance, site, building, floor, parent }
     }
 
-    /// Distance and location, checked.
-    pub(super) fn checked(self) -> Result<(DistanceKind, MapLocation), BundleError> {
+    /// Pipeline and location, checked.
+    pub(super) fn checked(self) -> Result<(MapPipeline, MapLocation), BundleError> {
         for (field, word) in [("site", &self.site), ("building", &self.building), ("floor", &self.floor)] {
             let Some(text) = word else { continue };
             check_label(text, MAX_WORD).map_err(|e| invalid(MAP, field, e))?;
         }
         let link = self.parent.map(link_of).transpose()?;
-        let Self { distance, site, building, floor, .. } = self;
-        Ok((distance, MapLocation { site, building, floor, link }))
+        let Self { preset, distance, site, building, floor, .. } = self;
+        Ok((MapPipeline { preset, distance }, MapLocation { site, building, floor, link }))
     }
 }
 

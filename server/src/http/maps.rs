@@ -14,7 +14,7 @@ use crate::{
         contents::{self, Written},
         drafts::MAX_DRAFTS,
         map_locations::{self, MapLocation},
-        maps::{self, MapRow},
+        maps::{self, MapPipeline, MapRow},
         revisions::{self, Subject},
     },
 };
@@ -26,10 +26,11 @@ use map::{
 };
 use nalgebra::{Matrix3, Vector3};
 use protos::api::{
-    ListQuery, Map, MapPatch, NewCopy, NewMap, Page, Parent, Problem, TransformQuery, TransformResponse,
-    TransformedPose,
+    Distance, ListQuery, Map, MapPatch, NewCopy, NewMap, Page, Parent, PipelinePreset, Problem,
+    TransformQuery, TransformResponse, TransformedPose,
 };
 use utoipa_axum::{router::OpenApiRouter, routes};
+use vision::params::preset::Preset;
 
 pub(super) fn router() -> OpenApiRouter<AppState> {
     OpenApiRouter::new()
@@ -74,13 +75,22 @@ pub(super) fn map_shown(row: MapRow, found: MapLocation, principal: &Principal) 
         revision: row.revision,
         landmarks: row.landmarks,
         has_underlay: row.has_underlay,
-        distance: row.distance.into(),
+        preset: row.pipeline.preset.map(Into::into),
+        distance: row.pipeline.distance.into(),
         draft_of: row.draft_of,
         parent: link.as_ref().map(parent_shown),
         site: found.site,
         building: found.building,
         floor: found.floor,
     }
+}
+
+/// A pipeline of this preset; the distance is that of the preset, or where there is none of the
+/// server's, unless it is given.
+fn pipeline(preset: Option<PipelinePreset>, distance: Option<Distance>, server: Preset) -> MapPipeline {
+    let preset = preset.map(Preset::from);
+    let distance = distance.map_or_else(|| preset.unwrap_or(server).distance(), Into::into);
+    MapPipeline { preset, distance }
 }
 
 /// Longest word for a site, a building or a floor.
@@ -108,7 +118,8 @@ async fn create(
     Extension(principal): Extension<Principal>,
     Body(new): Body<NewMap>,
 ) -> Result<(StatusCode, Json<Map>), ApiError> {
-    let (name, distance, max) = (name("name", new.name)?, new.distance.into(), app.config.limits.maps);
+    let (name, max) = (name("name", new.name)?, app.config.limits.maps);
+    let pipeline = pipeline(new.preset, new.distance, app.config.preset);
     let found = MapLocation {
         site: word("site", new.site)?,
         building: word("building", new.building)?,
@@ -117,7 +128,7 @@ async fn create(
     };
     let write = app.store.write(move |tx| {
         Box::pin(async move {
-            maps::create(tx, name.as_str(), distance, max).await?;
+            maps::create(tx, name.as_str(), pipeline, max).await?;
             let found = map_locations::set(tx, name.as_str(), |_| found).await?;
             Ok((maps::of(tx, name.as_str()).await?, found))
         })
@@ -174,7 +185,7 @@ async fn get(
     Ok(Revised(row.revision.clone(), map_shown(row, found, &principal)))
 }
 
-/// Changes a map's name, site, building, floor or position.
+/// Changes a map's name, preset, distance, site, building, floor or position.
 #[utoipa::path(patch, path = "/maps/{map}", operation_id = "updateMap",
     tag = "maps", params(("map" = String, Path)), request_body = MapPatch,
     responses((status = 200, body = Map), (status = 404, body = Problem),
@@ -194,6 +205,12 @@ async fn patch(
     let floor = changed("floor", changes.floor)?;
     let parent = changes.parent.map(|parent| parent.map(link).transpose()).transpose()?;
     maps::get(app.store.reads(), &map).await?;
+    let server = app.config.preset;
+    let repiped = move |old: MapPipeline| match (changes.preset, changes.distance) {
+        (Some(preset), distance) => pipeline(preset, distance, server),
+        (None, Some(distance)) => MapPipeline { distance: distance.into(), ..old },
+        (None, None) => old,
+    };
     if let Some(Some(link)) = &parent {
         check_map(&principal, &link.parent).map_err(unknown_parent)?;
     }
@@ -207,6 +224,7 @@ async fn patch(
                 link: parent.unwrap_or(old.link),
             })
             .await?;
+            maps::set_pipeline(tx, &map, repiped).await?;
             let now = new_name.as_ref().map_or(map.as_str(), protos::Name::as_str);
             maps::rename(tx, &map, now).await?;
             Ok((maps::of(tx, now).await?, found))

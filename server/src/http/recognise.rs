@@ -18,7 +18,9 @@ use protos::{
     api::{PhotographForm, Problem},
     v1,
 };
+use std::sync::Arc;
 use utoipa_axum::{router::OpenApiRouter, routes};
+use vision::params::preset::Preset;
 
 pub(super) fn router(upload_bytes: usize) -> OpenApiRouter<AppState> {
     OpenApiRouter::new().routes(routes!(recognise)).layer(DefaultBodyLimit::max(upload_bytes + FORM_OVERHEAD))
@@ -31,7 +33,7 @@ pub(super) fn router(upload_bytes: usize) -> OpenApiRouter<AppState> {
     responses((status = 200, body = protos::v1::Answer),
     (status = 404, body = Problem), (status = 413, body = Problem),
     (status = 422, body = Problem, description = "bad_image, wrong_encoding, too_large, out_of_range, not_finite, \
-     size_mismatch")))]
+     size_mismatch, invalid_value: the preset")))]
 async fn recognise(
     State(app): State<AppState>,
     PathParams(map): PathParams<String>,
@@ -39,9 +41,13 @@ async fn recognise(
 ) -> Result<Json<v1::Answer>, ApiError> {
     let snapshot = app.store.snapshots().get(&map);
     let snapshot = snapshot.ok_or_else(|| StoreError::NotFound { what: Kind::Map, name: map })?;
-    let mut form = Form::read(&app, request, &["image", "intrinsics"]).await?;
+    let mut form = Form::read(&app, request, &["image", "intrinsics", "preset"]).await?;
     let bytes = form.needed("image")?;
     let camera = form.optional("intrinsics").map(|part| PhotographCamera::read(&part)).transpose()?;
+    let snapshot = match form.optional("preset") {
+        Some(word) => Arc::new(snapshot.under(preset(&word)?)),
+        None => snapshot,
+    };
     let answer = app.on_vision_thread(move |app| {
         let picture = picture::decode(&bytes, app.config.limits.upload())?;
         let size = [picture.width(), picture.height()];
@@ -49,4 +55,9 @@ async fn recognise(
         Ok(answer_to_photograph(&picture, camera.as_ref(), &snapshot))
     });
     answer.await?.map(Json)
+}
+
+fn preset(word: &[u8]) -> Result<Preset, ApiError> {
+    let word = String::from_utf8_lossy(word);
+    word.parse().map_err(|why: String| ApiError::invalid("invalid_value", "preset", why))
 }

@@ -131,7 +131,7 @@ async fn read_material(
     views.retain(|id, _| targets.contains(id) || !refused.contains(id));
     Ok(Material {
         pictures: Pictures::new(store, config),
-        params: config.params.clone(),
+        params: snapshot.params.clone(),
         workers: config.workers,
         generated_views: request.generated_views,
         snapshot,
@@ -185,7 +185,7 @@ fn compute(m: &Material, reporter: &ProgressReporter) -> Result<Learnt, JobError
     let p = &m.params;
     let made = each_of(&m.targets, m.workers, reporter, (0.4, 0.8, "models"), |id| {
         let model = learn(*id, &views[id], &[], p).map_err(|e| e.to_string())?;
-        Ok::<_, String>(model.with_points_if_used(p, || points[id].clone()))
+        Ok::<_, String>(model.with_points(&points[id]))
     })?;
     let (mut models, mut failed) = (Vec::new(), Vec::new());
     for (id, result) in m.targets.iter().zip(made) {
@@ -288,8 +288,7 @@ fn learning_input(m: &Material, id: LandmarkId) -> LearningInput {
         None => VIEWS_WANTED.saturating_sub(photographs),
     };
     let wanted = wanted.min(MAX_VIEWS - photographs);
-    let uses_points = m.params.recognise.verdict.points;
-    let with_points: Vec<i64> = point_views(stored).filter(|_| uses_points).map(|l| l.view).collect();
+    let with_points: Vec<i64> = point_views(stored).map(|l| l.view).collect();
     let mut points = Vec::with_capacity(with_points.len());
     for (index, view) in stored.iter().enumerate() {
         let count = (wanted + photographs - 1 - index) / photographs;

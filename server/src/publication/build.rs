@@ -5,6 +5,7 @@
 use crate::store::{
     StoreError,
     map_rows::{self, LandmarkHead, MapHead, RowState},
+    maps::MapPipeline,
     modality_stats,
     models::{self, ModelDigest},
     walls,
@@ -41,19 +42,23 @@ pub(super) async fn snapshot(
     let (modalities, reference_runs) = modalities(&mut *conn, id, before).await?;
     #[cfg(test)]
     tests::planted(&head.name);
-    let (learnt, unusable_models) = models(conn, id, before, params, panics).await?;
+    let MapPipeline { preset, distance } = head.pipeline;
+    let params = preset.map_or_else(|| params.clone(), |preset| Arc::new(preset.over(params)));
+    let (learnt, unusable_models) = models(conn, id, before, &params, panics).await?;
     for (id, reason) in &unusable_models {
         let landmark = landmarks.get(id).map_or("", |l: &LandmarkInfo| l.name.as_str());
         tracing::warn!(map = head.name, landmark, reason, "model_not_used");
     }
-    let same_models = before.filter(|before| digests(&before.learnt).eq(digests(&learnt)));
+    let is_same =
+        |before: &&MapSnapshot| before.params == params && digests(&before.learnt).eq(digests(&learnt));
+    let same_models = before.filter(is_same);
     let models = match same_models {
         Some(before) => before.models.clone(),
-        None => ModelSet::in_use(learnt.values().map(|l| l.model.clone()), params).map_err(|e| {
+        None => ModelSet::in_use(learnt.values().map(|l| l.model.clone()), &params).map_err(|e| {
             StoreError::Damaged { what: format!("map `{}`", head.name), reason: e.to_string() }
         })?,
     };
-    let (look_alikes, look_alikes_pending) = look_alikes(head.distance, same_models);
+    let (look_alikes, look_alikes_pending) = look_alikes(distance, same_models);
     let (visibility, visibility_pending) = visibility(&landmarks, &head, before);
     Ok(Some(MapSnapshot {
         sizes: landmarks.iter().filter_map(|(id, l)| Some((*id, l.size?))).collect(),
@@ -73,8 +78,8 @@ pub(super) async fn snapshot(
         visibility_settings: head.visibility_settings,
         visibility,
         pending: Pending { visibility: visibility_pending, look_alikes: look_alikes_pending },
-        distance: head.distance,
-        params: params.clone(),
+        distance,
+        params,
         poses: Arc::default(),
     }))
 }

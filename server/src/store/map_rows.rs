@@ -3,17 +3,17 @@
 use super::{
     StoreError,
     landmarks::{self, geometry_columns},
-    maps,
+    maps::MapPipeline,
     statements::statements,
     visibility_settings,
 };
 use map::{landmark_health::LandmarkHealth, visibility::VisibilitySettings};
 use sqlx::{Row, SqliteConnection};
 use std::collections::BTreeMap;
-use vision::{model::LandmarkId, recognise::DistanceKind};
+use vision::model::LandmarkId;
 
 statements! {
-    MAP = "SELECT name, version, draft_of IS NOT NULL AS is_draft, distance, sight, walls_version FROM maps WHERE id = ?1";
+    MAP = "SELECT name, version, draft_of IS NOT NULL AS is_draft, preset, distance, sight, walls_version FROM maps WHERE id = ?1";
     NAME = "SELECT name FROM maps WHERE id = ?1";
     MAP_IDS = "SELECT id FROM maps ORDER BY id";
     ROWS = "SELECT coalesce(group_concat(id || ' ' || revision || ' ' || changed_ms || ' ' || health, ';'), '') \
@@ -28,7 +28,7 @@ pub(crate) struct MapHead {
     pub(crate) name: String,
     pub(crate) version: u64,
     pub(crate) is_draft: bool,
-    pub(crate) distance: DistanceKind,
+    pub(crate) pipeline: MapPipeline,
     /// Camera and limits of its visibility areas.
     pub(crate) visibility_settings: VisibilitySettings,
     /// Counts up whenever the walls are replaced.
@@ -75,7 +75,7 @@ pub(crate) async fn head(conn: &mut SqliteConnection, id: i64) -> Result<Option<
     Ok(Some(MapHead {
         version: row.try_get::<i64, _>("version").map_err(at())? as u64,
         is_draft: row.try_get("is_draft").map_err(at())?,
-        distance: maps::distance_of(&row.try_get::<String, _>("distance").map_err(at())?),
+        pipeline: MapPipeline::read(&row).map_err(at())?,
         visibility_settings: visibility_settings::read(
             &name,
             row.try_get::<Option<&str>, _>("sight").map_err(at())?,

@@ -2,17 +2,18 @@
 
 use super::{CommittedChange, StoreError, Tx, kind::Kind, now_ms, statements::statements, within};
 use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
-use vision::recognise::DistanceKind;
+use vision::{params::preset::Preset, recognise::DistanceKind};
 
 statements! {
     // Drafts are no further maps.
     COUNT = "SELECT count(*) FROM maps WHERE draft_of IS NULL";
-    INSERT = "INSERT INTO maps (name, distance, created_ms) VALUES (?1, ?2, ?3) RETURNING id";
-    GET = "SELECT id, name, version, id || '.' || revision AS revision, changed_ms, distance, \
+    INSERT = "INSERT INTO maps (name, preset, distance, created_ms) VALUES (?1, ?2, ?3, ?4) RETURNING id";
+    SET_PIPELINE = "UPDATE maps SET preset = ?2, distance = ?3, version = version + 1 WHERE id = ?1";
+    GET = "SELECT id, name, version, id || '.' || revision AS revision, changed_ms, preset, distance, \
            (SELECT o.name FROM maps o WHERE o.id = maps.draft_of) AS draft_of, (SELECT count(*) FROM landmarks WHERE map_id = maps.id) AS landmarks, \
            EXISTS (SELECT 1 FROM underlays WHERE map_id = maps.id) AS has_underlay \
            FROM maps WHERE name = ?1";
-    PAGE = "SELECT id, name, version, id || '.' || revision AS revision, changed_ms, distance, \
+    PAGE = "SELECT id, name, version, id || '.' || revision AS revision, changed_ms, preset, distance, \
            (SELECT o.name FROM maps o WHERE o.id = maps.draft_of) AS draft_of, (SELECT count(*) FROM landmarks WHERE map_id = maps.id) AS landmarks, \
            EXISTS (SELECT 1 FROM underlays WHERE map_id = maps.id) AS has_underlay \
             FROM maps WHERE name > ?1 ORDER BY name LIMIT ?2";
@@ -39,7 +40,7 @@ pub(crate) struct MapRow {
     pub(crate) revision: String,
     /// When the revision changed last.
     pub(crate) changed_ms: i64,
-    pub(crate) distance: DistanceKind,
+    pub(crate) pipeline: MapPipeline,
     /// The map that it is a draft of.
     pub(crate) draft_of: Option<String>,
     /// How many landmarks it has.
@@ -48,23 +49,50 @@ pub(crate) struct MapRow {
     pub(crate) has_underlay: bool,
 }
 
+/// Which detector and decision a map has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct MapPipeline {
+    /// `None`: as the server's settings say.
+    pub(crate) preset: Option<Preset>,
+    /// The distance that decides.
+    pub(crate) distance: DistanceKind,
+}
+
+impl From<DistanceKind> for MapPipeline {
+    fn from(distance: DistanceKind) -> Self {
+        Self { preset: None, distance }
+    }
+}
+
+impl MapPipeline {
+    /// From columns `preset` and `distance`; the schema admits no other words.
+    pub(super) fn read(row: &SqliteRow) -> Result<Self, sqlx::Error> {
+        let preset: Option<&str> = row.try_get("preset")?;
+        let distance: &str = row.try_get("distance")?;
+        Ok(Self { preset: preset.and_then(|word| word.parse().ok()), distance: distance_of(distance) })
+    }
+
+    pub(super) fn words(self) -> (Option<&'static str>, &'static str) {
+        (self.preset.map(Preset::word), distance_word(self.distance))
+    }
+}
+
 fn map_row(row: &SqliteRow) -> Result<MapRow, sqlx::Error> {
-    let distance: String = row.try_get("distance")?;
     Ok(MapRow {
         id: row.try_get("id")?,
         name: row.try_get("name")?,
         version: row.try_get::<i64, _>("version")? as u64,
         revision: row.try_get("revision")?,
         changed_ms: row.try_get("changed_ms")?,
-        distance: distance_of(&distance),
+        pipeline: MapPipeline::read(row)?,
         draft_of: row.try_get("draft_of")?,
         landmarks: row.try_get::<i64, _>("landmarks")? as u64,
         has_underlay: row.try_get("has_underlay")?,
     })
 }
 
-/// The word stored for a distance; the schema admits no other.
-pub(super) fn distance_word(distance: DistanceKind) -> &'static str {
+/// The word stored for a distance.
+fn distance_word(distance: DistanceKind) -> &'static str {
     match distance {
         DistanceKind::Both => "both",
         DistanceKind::Correlation => "correlation",
@@ -72,7 +100,7 @@ pub(super) fn distance_word(distance: DistanceKind) -> &'static str {
     }
 }
 
-pub(super) fn distance_of(word: &str) -> DistanceKind {
+fn distance_of(word: &str) -> DistanceKind {
     match word {
         "correlation" => DistanceKind::Correlation,
         "hausdorff" => DistanceKind::Hausdorff,
@@ -84,12 +112,14 @@ pub(super) fn distance_of(word: &str) -> DistanceKind {
 pub(crate) async fn create(
     tx: &mut Tx,
     name: &str,
-    distance: DistanceKind,
+    pipeline: impl Into<MapPipeline>,
     max: usize,
 ) -> Result<MapRow, StoreError> {
+    let (preset, distance) = pipeline.into().words();
     let id = sqlx::query_scalar(INSERT)
         .bind(name)
-        .bind(distance_word(distance))
+        .bind(preset)
+        .bind(distance)
         .bind(now_ms())
         .fetch_one(&mut tx.conn)
         .await
@@ -139,6 +169,30 @@ pub(crate) async fn bump(tx: &mut Tx, id: i64) -> Result<(), StoreError> {
         .await
         .map_err(StoreError::during("count map version"))?;
     tx.changed(CommittedChange::Map(id));
+    Ok(())
+}
+
+/// Gives a map another detector or decision; answers follow from the next version on.
+/// `change` gets the present ones.
+pub(crate) async fn set_pipeline(
+    tx: &mut Tx,
+    name: &str,
+    change: impl FnOnce(MapPipeline) -> MapPipeline + Send,
+) -> Result<(), StoreError> {
+    let map = get(&mut tx.conn, name).await?;
+    let pipeline = change(map.pipeline);
+    if map.pipeline == pipeline {
+        return Ok(());
+    }
+    let (preset, distance) = pipeline.words();
+    sqlx::query(SET_PIPELINE)
+        .bind(map.id)
+        .bind(preset)
+        .bind(distance)
+        .execute(&mut tx.conn)
+        .await
+        .map_err(StoreError::during("set the pipeline of a map"))?;
+    tx.changed(CommittedChange::Map(map.id));
     Ok(())
 }
 

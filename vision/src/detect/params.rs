@@ -10,9 +10,10 @@ use crate::{
         quad::{Quad, QuadKind},
         segments::{collinear_merge::SegmentParams, gap_closing::ChainParams},
     },
+    frame::Intrinsics,
     paper::{
         relaxation::{labelling::RelaxationParams, similarity::SimilarityParams},
-        tiling::tiling_params::TilingParams,
+        tiling::tiling_params::{FloorView, TilingParams},
     },
 };
 use serde::{Deserialize, Deserializer, Serialize, de::Error as _};
@@ -35,6 +36,25 @@ pub struct DetectParams {
     pub relaxation: RelaxationParams,
     /// Quads and their corners.
     pub quads: QuadParams,
+}
+
+impl DetectParams {
+    /// The same above the floor as one camera sees it, for images of `width_px`. `None` where tiling
+    /// is not removed, or the parameters have a floor of their own.
+    pub(crate) fn above_floor(
+        &self,
+        intrinsics: Intrinsics,
+        width_px: usize,
+        height_m: f64,
+        tilt_rad: f64,
+    ) -> Option<Self> {
+        if !self.tiling.remove || self.tiling.floor.is_some() {
+            return None;
+        }
+        let mut own = self.clone();
+        own.tiling.floor = Some(FloorView { intrinsics, width_px, height_m, tilt_rad });
+        Some(own)
+    }
 }
 
 /// How quads are formed.

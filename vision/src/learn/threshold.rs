@@ -21,11 +21,14 @@ pub struct ThresholdParams {
     /// tau stays below this share of the smallest negative distance while there are no false
     /// positives.
     pub nearest_share: f64,
+    /// Whether tau stays below that share and the absolute cap; otherwise it is that of least cost,
+    /// as in the paper.
+    pub limited: bool,
 }
 
 impl Default for ThresholdParams {
     fn default() -> Self {
-        Self { false_positive_weight: 6.0, nearest_share: 0.9 }
+        Self { false_positive_weight: 6.0, nearest_share: 0.9, limited: true }
     }
 }
 
@@ -76,7 +79,7 @@ pub fn minimise(positives: &[f64], negatives: &[f64], weight: f64) -> Result<f64
 }
 
 /// The tau in use: [`minimise`], then limited to `nearest_share` of the nearest negative where the
-/// optimum has no false positive, and below `cap` always. With fewer than [`FEW_NEGATIVES`] the cap
+/// optimum has no false positive, and below `cap` always, unless `p` lifts both. With fewer than [`FEW_NEGATIVES`] the cap
 /// counts as one more of them: the sample of negatives is small, and a distractor as near as the
 /// cap may exist.
 // Departs from method 8 twice. There n- = 0 gives no threshold; here the cap, measured on real
@@ -94,10 +97,10 @@ pub fn threshold(
     let mut tau = minimise(positives, &against, p.false_positive_weight)?;
     let mut limited_by = LimitedBy::Cost;
     let nearest = against.iter().copied().fold(f64::INFINITY, f64::min);
-    if nearest > tau && p.nearest_share * nearest < tau {
+    if p.limited && nearest > tau && p.nearest_share * nearest < tau {
         (tau, limited_by) = (p.nearest_share * nearest, LimitedBy::NearestNegative);
     }
-    if cap < tau {
+    if p.limited && cap < tau {
         (tau, limited_by) = (cap, LimitedBy::AbsoluteCap);
     }
     Ok(Threshold {
@@ -173,6 +176,11 @@ mod tests {
         let many = threshold(&OWN, &[14.0; FEW_NEGATIVES], 8.0, &p).unwrap();
         assert!((few.tau - 7.0).abs() < 1e-12 && (many.tau - 8.0).abs() < 1e-12);
         assert_eq!(many.limited_by, LimitedBy::AbsoluteCap);
+        // Without limits least cost decides alone; the cap still stands in for negatives.
+        let free = ThresholdParams { limited: false, ..p };
+        let many = threshold(&OWN, &[14.0; FEW_NEGATIVES], 8.0, &free).unwrap();
+        assert!((many.tau - 10.0).abs() < 1e-12 && many.limited_by == LimitedBy::Cost);
+        assert!((threshold(&OWN, &[], 7.0, &free).unwrap().tau - 6.5).abs() < 1e-12);
     }
 
     #[test]

@@ -109,13 +109,6 @@ impl LandmarkModel {
         self
     }
 
-    /// The same model with points, if the settings use points for decisions; `views` is called only
-    /// then.
-    #[must_use]
-    pub fn with_points_if_used(self, p: &Params, views: impl FnOnce() -> Vec<Vec<TaughtPoint>>) -> Self {
-        if p.recognise.verdict.points { self.with_points(&views()) } else { self }
-    }
-
     /// Whether it has so many points that its icons never identify it.
     pub fn is_named_by_points(&self, p: &Params) -> bool {
         p.recognise.verdict.points && self.points.len() > p.recognise.verdict.max_icon_points

@@ -7,7 +7,7 @@ use crate::{detect::params::Grouping, params::Params};
 const MIN_SCORE: f64 = 0.75;
 
 /// Relaxation over all six cues with G as printed, floor tiling removed, icons compared by the
-/// distances alone, at the detected corners. What the pages of the method list as departures
+/// distances alone, at the detected corners, by the tau of least cost. What the pages of the method list as departures
 /// without a parameter is as in the defaults.
 pub(crate) fn params() -> Params {
     let mut p = Params::default();
@@ -16,7 +16,21 @@ pub(crate) fn params() -> Params {
     p.detect.similarity.min_score = MIN_SCORE;
     p.detect.relaxation.linear_weight = 0.0;
     p.detect.tiling.remove = true;
+    p.learn.threshold.limited = false;
     p.recognise.verdict.points = false;
     p.recognise.verdict.verify_reach = 0.0;
     p
+}
+
+/// Takes from `preset` what presets differ in; the rest of `p` stays.
+pub(crate) fn choose(p: &mut Params, preset: Params) {
+    let Params { detect, recognise, learn, .. } = preset;
+    p.detect.quads.grouping = detect.quads.grouping;
+    p.detect.similarity.weights = detect.similarity.weights;
+    p.detect.similarity.min_score = detect.similarity.min_score;
+    p.detect.relaxation.linear_weight = detect.relaxation.linear_weight;
+    p.detect.tiling.remove = detect.tiling.remove;
+    p.learn.threshold.limited = learn.threshold.limited;
+    p.recognise.verdict.points = recognise.verdict.points;
+    p.recognise.verdict.verify_reach = recognise.verdict.verify_reach;
 }

@@ -32,7 +32,16 @@ impl Preset {
         }
     }
 
-    /// The distance that decides. A map keeps its own.
+    /// `p` with this preset's choice of detector and decision; bounds, icons and distances stay,
+    /// and so do the models learnt under them.
+    #[must_use]
+    pub fn over(self, p: &Params) -> Params {
+        let mut chosen = p.clone();
+        preset::choose(&mut chosen, self.params());
+        chosen
+    }
+
+    /// The distance that decides. A map may have its own.
     pub fn distance(self) -> DistanceKind {
         match self {
             Self::Default => DistanceKind::Both,
@@ -78,5 +87,18 @@ mod tests {
         assert!(!paper.recognise.verdict.points && paper.recognise.verdict.verify_reach.abs() < 1e-15);
         assert_eq!(Preset::Paper.distance(), DistanceKind::Hausdorff);
         assert_eq!(paper.distance_hash(), Params::default().distance_hash());
+    }
+
+    /// A preset over other settings changes what presets differ in, all of it and nothing else.
+    #[test]
+    fn a_preset_goes_over_other_settings() {
+        let [default, paper] = [Preset::Default, Preset::Paper].map(Preset::params);
+        assert_eq!(Preset::Paper.over(&default), paper);
+        assert_eq!(Preset::Default.over(&paper), default);
+        let mut own = Params::default();
+        own.detect.edges.high *= 2.0;
+        let over = Preset::Paper.over(&own);
+        assert_ne!(over, paper);
+        assert_eq!(Preset::Default.over(&over), own);
     }
 }

@@ -7,6 +7,7 @@ use crate::{
     geometry::{corners::Corners, homography::Homography},
     learn::{lesson::learn, synthesis, texture::Texture},
     model::landmark_model::LandmarkModel,
+    params::preset::Preset,
     points::taught::view_points,
     random::Random,
     trace::NoTrace,
@@ -142,7 +143,7 @@ fn rotated_corners_are_returned_in_the_landmarks_order() {
     let camera = camera();
     let (models, sizes) = (models(), BTreeMap::from([(LandmarkId(1), SIZE)]));
     let landmarks = LandmarkDatabase { models: &models, sizes: &sizes, kind: DistanceKind::Both };
-    let of = FrameCamera { intrinsics: Some(&camera), up: None };
+    let of = FrameCamera { intrinsics: Some(&camera), up: None, height_m: None };
     let facts = analyse_quads(&image, vec![quad.clone()], of, landmarks, &Params::default(), &mut NoTrace);
     let facts = &facts.quads[0];
     assert_pose(facts);
@@ -235,3 +236,28 @@ fn the_number_of_recognised_quads_is_bounded() {
 
 mod borderless;
 mod rolled;
+
+/// Only where tiling is removed, and only of a camera whose height and tilt are known.
+#[test]
+fn a_frame_brings_its_own_floor() {
+    let (camera, paper) = (camera(), Preset::Paper.params().detect);
+    let up =
+        |tilt: f64, roll: f64| Vector3::new(tilt.cos() * roll.sin(), -tilt.cos() * roll.cos(), tilt.sin());
+    let at =
+        |up: Vector3<f64>| FrameCamera { intrinsics: Some(&camera), up: Up::new(up), height_m: Some(1.2) };
+    let own = at(up(-0.2, 0.01)).above_its_floor(&paper, 640).and_then(|p| p.tiling.floor).unwrap();
+    assert!((own.tilt_rad + 0.2).abs() < 1e-3, "{own:?}");
+    assert_eq!((own.intrinsics, own.width_px, own.height_m), (camera, 640, 1.2));
+    let level = at(up(0.0, 0.0));
+    for unknown in [
+        at(up(-0.2, 0.1)),
+        FrameCamera { intrinsics: None, ..level },
+        FrameCamera { up: None, ..level },
+        FrameCamera { height_m: None, ..level },
+    ] {
+        assert_eq!(unknown.above_its_floor(&paper, 640), None);
+    }
+    let stated = level.above_its_floor(&paper, 640).unwrap();
+    assert_eq!(level.above_its_floor(&stated, 640), None);
+    assert_eq!(level.above_its_floor(&Params::default().detect, 640), None);
+}

@@ -60,7 +60,7 @@ pub(in crate::bench) fn models(
         let exemplars = icons(first, taught + i, p)?;
         let id = LandmarkId((taught + i + 1) as u64);
         let like = LandmarkModel { id, exemplars, ..LandmarkModel::clone(&fitted[i % taught]) };
-        with_points(like, first, taught + i, p).map(Arc::new)
+        with_points(like, first, taught + i).map(Arc::new)
     })?;
     Ok(fitted.into_iter().take(count).chain(rest).collect())
 }
@@ -69,14 +69,14 @@ pub(in crate::bench) fn models(
 fn lesson(first: u64, index: usize, p: &Params) -> anyhow::Result<LandmarkModel> {
     let views = views(first, index, VIEWS, p)?;
     let model = learn(LandmarkId(index as u64 + 1), &views, &[], p)?;
-    with_points(model, first, index, p)
+    with_points(model, first, index)
 }
 
-/// The model with the points of its poster, if points are used.
-fn with_points(model: LandmarkModel, first: u64, index: usize, p: &Params) -> anyhow::Result<LandmarkModel> {
+/// The model with the points of its poster.
+fn with_points(model: LandmarkModel, first: u64, index: usize) -> anyhow::Result<LandmarkModel> {
     let image = picture(first, index)?;
     let corners = whole(&image)?;
-    Ok(model.with_points_if_used(p, || vec![view_points(&image, &corners)]))
+    Ok(model.with_points(&[view_points(&image, &corners)]))
 }
 
 /// The poster itself and `count` views generated from it.

@@ -36,7 +36,7 @@ pub(super) fn run(args: &Args, first: u64, map: &ModelSet, p: &Params) -> anyhow
     let corners = whole(&photograph)?;
     let (ms, model) = fastest(args.rounds as usize, || {
         learn(LandmarkId(POSTER as u64), &views, &negatives, p)
-            .map(|model| model.with_points_if_used(p, || vec![view_points(&photograph, &corners)]))
+            .map(|model| model.with_points(&[view_points(&photograph, &corners)]))
     });
     let model = model?;
     Ok(Report {

@@ -107,7 +107,7 @@ impl Class {
         });
         let models = of_each(&sights, "learning", |i, TrainingData { views, points }| {
             let alone = learn(LandmarkId(i as u64), views, &[], p).ok()?;
-            let alone = alone.with_points_if_used(p, || points.clone());
+            let alone = alone.with_points(points);
             let others = icons.iter().enumerate().filter(|(other, _)| *other != i).map(|(_, icons)| icons);
             let others: Vec<IconFeatures> = others.flatten().cloned().collect();
             Some(add_negatives(&alone, &others, p))

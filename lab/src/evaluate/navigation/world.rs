@@ -126,7 +126,7 @@ impl World {
         .collect();
         let models = of_each(&lessons, "learning", |i, lesson| {
             let alone = learn(LandmarkId(i as u64), &lesson.views, &[], &p).ok()?;
-            let alone = alone.with_points_if_used(&p, || lesson.points.clone());
+            let alone = alone.with_points(&lesson.points);
             let others = lessons.iter().enumerate().filter(|(other, _)| *other != i);
             let others: Vec<IconFeatures> = others.flat_map(|(_, l)| l.icons.iter().cloned()).collect();
             Some(add_negatives(&alone, &others, &p))

@@ -145,10 +145,11 @@ const EXACT: f64 = 1e-12;
 
 /// The map, recognised with the parameters that are asked for.
 fn adjusted(args: &Args, detect: &DetectParams, map: &MapSnapshot) -> anyhow::Result<MapSnapshot> {
+    let map = map.under(args.parameters.preset);
     let mut all = serde_json::to_value(Params { detect: detect.clone(), ..Params::clone(&map.params) })?;
     args.algorithm.iter().try_for_each(|assignment| assign(&mut all, assignment))?;
     let params: Params = serde_json::from_value(all).context("--algorithm")?;
-    let mut map = MapSnapshot { params: Arc::new(params), ..map.clone() };
+    let mut map = MapSnapshot { params: Arc::new(params), ..map };
     if args.exact_places {
         for place in map.landmarks.values_mut().filter_map(|landmark| landmark.place.as_mut()) {
             place.covariance = nalgebra::Matrix6::identity() * EXACT;

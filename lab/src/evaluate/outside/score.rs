@@ -287,7 +287,7 @@ fn miss(label: &TruthQuad, map: &MapSnapshot, r: &Recognised) -> Miss {
     made(
         &word,
         format!(
-            "IoU {iou:.2}, correlation {:.2?}, ratio {:.2}{likeness}{points}",
+            "IoU {iou:.2}, correlation {:.2?}, ratio {:.2?}{likeness}{points}",
             candidate.correlation, candidate.ratio
         ),
     )

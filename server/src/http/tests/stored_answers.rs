@@ -38,7 +38,7 @@ impl Service {
             landmark: "sign".into(),
             distance: Some(0.6),
             threshold: Some(0.4),
-            ratio: 1.5,
+            ratio: Some(1.5),
             refusal: "correlation".into(),
             ..v1::Candidate::default()
         };

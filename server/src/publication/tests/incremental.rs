@@ -4,7 +4,7 @@ use super::*;
 use crate::{publication::build, store::history};
 use engine::snapshot::{MapSnapshot, Snapshots};
 use map::landmark_health::LandmarkHealth;
-use vision::pose::LandmarkSize;
+use vision::{params::preset::Preset, pose::LandmarkSize};
 
 /// The map as it is built without a version before it.
 async fn from_nothing(store: &Catalogue, config: &Config, map: &MapSnapshot) -> MapSnapshot {
@@ -54,4 +54,32 @@ async fn a_version_made_from_the_one_before_equals_one_made_from_nothing() {
     let back = check("a roll back").await;
     assert_eq!(back.values().filter(|l| l.size.is_some()).count(), 0);
     assert_eq!(back.values().map(|l| l.name.as_str()).collect::<Vec<_>>(), ["p1", "p2", "p3"]);
+}
+
+#[tokio::test]
+async fn a_maps_preset_goes_over_the_servers_settings() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut raw = RawConfig { data: dir.path().to_owned(), ..RawConfig::default() };
+    raw.algorithm.detect.edges.high *= 2.0;
+    let config = Config::try_from(raw).unwrap();
+    let (store, task) = Catalogue::open(&config).await.unwrap();
+    store.write(|tx| Box::pin(maps::create(tx, "a", DistanceKind::Both, 2))).await.unwrap();
+    let none = landmarks::LandmarkGeometry::default();
+    let made = store.write(move |tx| Box::pin(landmarks::create(tx, "a", "p", none, 5))).await.unwrap();
+    store_model(&store, made.id, &config.params).await;
+    let of = |store: &Catalogue| store.snapshots().get("a").unwrap();
+    let before = of(&store);
+    assert_eq!(*before.params, *config.params);
+    let paper = maps::MapPipeline { preset: Some(Preset::Paper), distance: DistanceKind::Hausdorff };
+    store.write(move |tx| Box::pin(maps::set_pipeline(tx, "a", move |_| paper))).await.unwrap();
+    let own = of(&store);
+    assert_eq!((&*own.params, own.distance), (&Preset::Paper.over(&config.params), paper.distance));
+    assert_eq!((own.version, own.learnt.len()), (before.version + 1, before.learnt.len()));
+    assert!(own.params.detect.edges == before.params.detect.edges && own.unusable_models.is_empty());
+    // Nothing changes, so there is no new version.
+    store.write(move |tx| Box::pin(maps::set_pipeline(tx, "a", move |_| paper))).await.unwrap();
+    assert_eq!(of(&store).version, own.version);
+    task.close().await;
+    let (store, _task) = Catalogue::open(&config).await.unwrap();
+    assert_eq!(of(&store).params, own.params);
 }

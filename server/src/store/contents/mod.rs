@@ -18,12 +18,13 @@ pub(in crate::store) use write::{distractor, landmark, model, run, settings, vie
 use super::{
     landmarks::{LandmarkGeometry, ModelSummary},
     map_locations::MapLocation,
+    maps::MapPipeline,
     pictures::Digest,
     underlays::UnderlayRow,
     walls::StoredWall,
 };
 use map::{landmark_health::LandmarkHealth, modality_stats::FusionMode};
-use vision::{model::LandmarkId, recognise::DistanceKind};
+use vision::model::LandmarkId;
 
 /// Every statement of this folder.
 #[cfg(test)]
@@ -49,7 +50,7 @@ pub(crate) struct MapContents {
 /// The settings of a map.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct MapSettings {
-    pub(crate) distance: DistanceKind,
+    pub(crate) pipeline: MapPipeline,
     pub(crate) location: MapLocation,
     pub(crate) fusion_mode: FusionMode,
     /// JSON list of `map::modality_stats::NamedArea`.

@@ -70,7 +70,7 @@ async fn settings(conn: &mut SqliteConnection, map: &MapRow) -> Result<MapSettin
     let location = map_locations::all(&mut *conn).await?.remove(&map.name).unwrap_or_default();
     let row = sqlx::query(SETTINGS).bind(map.id).fetch_one(conn).await.map_err(at())?;
     Ok(MapSettings {
-        distance: map.distance,
+        pipeline: map.pipeline,
         location,
         fusion_mode: modality_stats::mode_of(row.try_get("fusion").map_err(at())?),
         areas: row.try_get("areas").map_err(at())?,

@@ -26,7 +26,14 @@ use map::{
 use nalgebra::{Matrix3, Matrix6};
 use serde_json::json;
 use std::collections::BTreeMap;
-use vision::{geometry::Corners, icon::Icon, learn, params::Params, pose::LandmarkSize};
+use vision::{
+    geometry::Corners,
+    icon::Icon,
+    learn,
+    params::{Params, preset::Preset},
+    pose::LandmarkSize,
+    recognise::DistanceKind,
+};
 
 /// Tables of a map, with what says whose row it is.
 const TABLES: [(&str, &str); 8] = [
@@ -120,7 +127,8 @@ pub(crate) async fn filled(store: &Catalogue) {
     };
     let write = store.write(move |tx| {
         Box::pin(async move {
-            maps::create(tx, "a", DistanceKind::Correlation, 9).await?;
+            let distance = DistanceKind::Correlation;
+            maps::create(tx, "a", maps::MapPipeline { preset: Some(Preset::Paper), distance }, 9).await?;
             maps::create(tx, "outer", DistanceKind::Both, 9).await?;
             landmarks::create(tx, "a", "p1", place(), 9).await?;
             landmarks::create(tx, "a", "p2", LandmarkGeometry::default(), 9).await?;

@@ -21,7 +21,7 @@ use crate::{
 use vision::model::LandmarkId;
 
 statements! {
-    SETTINGS = "UPDATE maps SET fusion = ?2, areas = ?3, sight = ?4 WHERE id = ?1";
+    SETTINGS = "UPDATE maps SET fusion = ?2, areas = ?3, sight = ?4, preset = ?5, distance = ?6 WHERE id = ?1";
     LANDMARK = "INSERT INTO landmarks (map_id, name, created_ms, health, finding) VALUES (?1, ?2, ?3, ?4, ?5) RETURNING id";
     VIEW = "INSERT INTO views (landmark_id, image_sha256, image_kind, width_px, height_px, corners_px, created_ms, icon_side, \
             icon_scale, capture, icon) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11)";
@@ -55,7 +55,7 @@ pub(crate) async fn write(
     max: &Limits,
 ) -> Result<Written, StoreError> {
     check(contents, max)?;
-    let map = maps::create(tx, name, contents.settings.distance, max.maps).await?.id;
+    let map = maps::create(tx, name, contents.settings.pipeline, max.maps).await?.id;
     let location = contents.settings.location.clone();
     let location = map_locations::set(tx, name, |_| location).await?;
     settings(tx, map, &contents.settings).await?;
@@ -103,11 +103,14 @@ pub(in crate::store) async fn settings(
     map: i64,
     settings: &MapSettings,
 ) -> Result<(), StoreError> {
+    let (preset, distance) = settings.pipeline.words();
     let done = sqlx::query(SETTINGS)
         .bind(map)
         .bind(modality_stats::mode_word(settings.fusion_mode))
         .bind(&settings.areas)
         .bind(&settings.visibility)
+        .bind(preset)
+        .bind(distance)
         .execute(&mut tx.conn)
         .await;
     done.map_err(StoreError::during("store the settings of a map")).map(drop)

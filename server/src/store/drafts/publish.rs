@@ -297,6 +297,9 @@ impl<'a> Publication<'a> {
             map_locations::set(tx, &self.map.name, |_| location).await?;
         }
         let mut after = old.clone();
+        if is("pipeline") {
+            after.pipeline = new.pipeline;
+        }
         if is("fusion_mode") {
             after.fusion_mode = new.fusion_mode;
         }

@@ -121,6 +121,7 @@ pub(super) fn rows(contents: &MapContents, owner: impl Fn(LandmarkId) -> Owner) 
         ("building", digest_of(&location.building)),
         ("floor", digest_of(&location.floor)),
         ("parent", digest_of(&location.link)),
+        ("pipeline", digest_of(&settings.pipeline)),
         ("fusion_mode", digest_of(&settings.fusion_mode)),
         ("areas", digest_of(&settings.areas)),
         ("visibility_settings", digest_of(&settings.visibility)),

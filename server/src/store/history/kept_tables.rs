@@ -63,7 +63,6 @@ const SAME_MAP: &[(&str, &str)] = &[("map_id", "?1")];
 pub(in crate::store) const MAPS: KeptTable = KeptTable {
     left_out: &[
         "version",
-        "distance",
         "created_ms",
         "revision",
         "changed_ms",

@@ -26,18 +26,17 @@ use crate::{
 use futures::future::BoxFuture;
 use map::{landmark_health::LandmarkHealth, modality_stats::FusionMode, visibility::VisibilitySettings};
 use std::collections::BTreeMap;
-use vision::{model::LandmarkId, pose::LandmarkSize, recognise::DistanceKind};
+use vision::{model::LandmarkId, params::preset::Preset, pose::LandmarkSize, recognise::DistanceKind};
 
 /// Columns that count and are not gone back to: of a row's life, not of what it says. A map keeps
 /// its name.
-const COUNTERS: [&str; 10] = [
+const COUNTERS: [&str; 9] = [
     "revision",
     "changed_ms",
     "version",
     "walls_version",
     "underlay_revision",
     "created_ms",
-    "distance",
     "id",
     "draft_of",
     "draft_from",
@@ -167,6 +166,10 @@ fn steps() -> Vec<Write> {
         write!(|tx| walls::replace(tx, "a", &[[0.0, 0.0, 0.7, 0.0]])),
         write!(|tx| modality_stats::set(tx, "a", |_| settings)),
         write!(|tx| visibility_settings::set(tx, "a", &sight)),
+        write!(|tx| maps::set_pipeline(tx, "a", |_| maps::MapPipeline {
+            preset: Some(Preset::Paper),
+            distance: DistanceKind::Hausdorff,
+        })),
         write!(|tx| map_locations::set(tx, "a", |_| place)),
         write!(|tx| modality_stats::add(tx, "a", "r1", 12.5, &BTreeMap::new())),
         write!(|tx| modality_stats::add(tx, "a", "r1", 2.5, &BTreeMap::new())),

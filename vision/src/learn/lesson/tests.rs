@@ -172,7 +172,7 @@ fn thresholds_of_the_icons_do_not_depend_on_points() {
     let model = lesson(3, 20, &[]);
     let points = view_points(&poster(3), &whole());
     assert!(points.len() > p.recognise.verdict.max_icon_points, "{} points", points.len());
-    let with_points = model.clone().with_points_if_used(&p, || vec![points]);
+    let with_points = model.clone().with_points(&[points]);
     assert!(model.exemplars.len() > 1 && with_points.exemplars == model.exemplars);
     let twin = icons(&lesson(3, 6, &[]));
     let [held, expected] = [&with_points, &model].map(|m| add_negatives(m, &twin, &p));
@@ -252,6 +252,7 @@ fn tau_stays_below_the_farthest_stored_negative() {
             threshold: crate::learn::threshold::ThresholdParams {
                 false_positive_weight: 0.1,
                 nearest_share: 0.9,
+                ..crate::learn::threshold::ThresholdParams::default()
             },
             ..Default::default()
         },

@@ -52,7 +52,7 @@ fn named(image: &GrayImage, up: Option<Up>, p: &Params) -> Vec<QuadAnalysis> {
     let (models, sizes) = (map_of_the_part(), BTreeMap::from([(LandmarkId(1), SIZE)]));
     let landmarks = LandmarkDatabase { models: &models, sizes: &sizes, kind: DistanceKind::Both };
     let intrinsics = camera();
-    let camera = FrameCamera { intrinsics: Some(&intrinsics), up };
+    let camera = FrameCamera { intrinsics: Some(&intrinsics), up, height_m: None };
     let facts = Pipeline::default().analyse(image, camera, landmarks, p, &mut NoTrace);
     let is_unique =
         |q: &QuadAnalysis| q.recognition.as_ref().is_some_and(|v| matches!(v.verdict, Verdict::Unique(_)));

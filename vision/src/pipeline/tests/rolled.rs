@@ -55,7 +55,7 @@ fn analysed(
     let sizes = BTreeMap::from([(LandmarkId(1), SIZE)]);
     let landmarks = LandmarkDatabase { models, sizes: &sizes, kind: DistanceKind::Both };
     let camera = camera();
-    let of = FrameCamera { intrinsics: Some(&camera), up: up.and_then(Up::new) };
+    let of = FrameCamera { intrinsics: Some(&camera), up: up.and_then(Up::new), height_m: None };
     let p = Params::default();
     match given {
         Some(quad) => analyse_quads(image, vec![quad.clone()], of, landmarks, &p, &mut NoTrace),

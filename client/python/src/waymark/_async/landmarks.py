@@ -21,6 +21,7 @@ from waymark.api import (
     NewLandmark,
     NumberOrder,
     Order,
+    PipelinePreset,
     Place,
     RefusedView,
     Size,
@@ -219,8 +220,12 @@ class AsyncLandmarks(AsyncBase):
             waited_s += JOB_POLL_S
             job = await self.job(job.id)
 
-    async def recognise(self, map: str, image: Picture, intrinsics: Intrinsics | None = None) -> Answer:
+    async def recognise(
+        self, map: str, image: Picture, intrinsics: Intrinsics | None = None, *, preset: PipelinePreset | None = None
+    ) -> Answer:
         """Recognises the landmarks of one picture. Without intrinsics there is no pose; with them, `camera_pose` says
-        where it was taken, by landmarks of known size and place."""
+        where it was taken, by landmarks of known size and place. `preset`: another detector and decision than the
+        map's."""
         form = {"intrinsics": json.dumps(to_json(intrinsics))} if intrinsics is not None else {}
+        form |= {"preset": preset} if preset is not None else {}
         return await self._send(Answer, "recognise", map, files=picture_part(image), data=form)

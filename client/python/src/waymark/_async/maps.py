@@ -24,6 +24,7 @@ from waymark.api import (
     Map,
     Order,
     Parent,
+    PipelinePreset,
     PoseBody,
     Readiness,
     Replay,
@@ -99,14 +100,16 @@ class AsyncMaps(AsyncBase):
         self,
         name: str,
         *,
-        distance: Distance = "both",
+        preset: PipelinePreset | None = None,
+        distance: Distance | None = None,
         site: str | None = None,
         building: str | None = None,
         floor: str | None = None,
         parent: Parent | None = None,
     ) -> Map:
         """Creates an empty map; `Refused` with code `exists` if there is one of that name."""
-        body = present(name=name, distance=distance, site=site, building=building, floor=floor, parent=parent)
+        where = present(site=site, building=building, floor=floor, parent=parent)
+        body = present(name=name, preset=preset, distance=distance) | where
         return await self._send(Map, "create_map", json=body)
 
     async def maps(self) -> tuple[Map, ...]:
@@ -133,6 +136,13 @@ class AsyncMaps(AsyncBase):
         """Sets where a map is. What is not given stays; `None` forgets."""
         body = given(site=site, building=building, floor=floor, parent=parent)
         return await self._send(Map, "locate_map", map, json=body)
+
+    async def set_pipeline(
+        self, map: str, *, preset: PipelinePreset | Unset | None = UNSET, distance: Distance | Unset = UNSET
+    ) -> Map:
+        """Sets detector and decision of a map, and the distance that decides: without one, that of the preset. `None`:
+        those of the server's settings."""
+        return await self._send(Map, "locate_map", map, json=given(preset=preset, distance=distance))
 
     async def copy_map(self, map: str, name: str) -> Map:
         """Makes a new map of all that a map has."""
