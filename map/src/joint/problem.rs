@@ -7,7 +7,7 @@ use super::{
 use crate::slam::{graph::MAX_POSES, normal_equations::NotPositiveDefinite};
 
 /// Most factors of a problem.
-pub const MAX_FACTORS: usize = 1_000_000;
+pub const MAX_FACTORS: usize = 400_000;
 
 /// Why a joint map cannot be computed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
