@@ -17,6 +17,7 @@ mod survey;
 mod build;
 mod closures;
 mod survey_map;
+mod known_map;
 
 pub use build::SurveyProblem;
 pub use factor::{Factor, Kernels, Linearised};
@@ -27,8 +28,10 @@ pub use factors::{
     odometry::{OdometryMotion, OdometryPrior},
     reprojection::LandmarkView,
     same_object::{SAME_PARAMETERS, SameObject},
+    summary::Summary,
     wall_prior::{SizePrior, WallPrior},
 };
+pub use known_map::{KnownMap, refined};
 pub use marginals::Marginals;
 pub use params::JointParams;
 pub use problem::{JointError, JointProblem, MAX_FACTORS};

@@ -34,7 +34,7 @@ pub struct SurveyProblem {
     /// Landmark variable of each track; `None` with too few views.
     pub landmark_of: Vec<Option<usize>>,
     /// Factors before those of closures.
-    without_closures: usize,
+    pub(super) without_closures: usize,
 }
 
 impl SurveyProblem {

@@ -65,7 +65,7 @@ pub(super) fn common_frame(pairs: &[(LandmarkState, LandmarkState)]) -> (Pose2, 
     best
 }
 
-/// Mean weight of the views of each landmark, and the weight of each closure in their order.
+/// Mean weight of the views of each landmark (1 without views), and the weight of each closure in their order.
 pub(super) fn weights(survey: &SurveyProblem) -> (Vec<f64>, Vec<f64>) {
     let mut views = vec![(0.0, 0.0); survey.problem.state.landmarks.len()];
     let mut closures = Vec::new();
@@ -79,5 +79,6 @@ pub(super) fn weights(survey: &SurveyProblem) -> (Vec<f64>, Vec<f64>) {
             _ => {}
         }
     }
-    (views.iter().map(|(sum, count)| sum / count).collect(), closures)
+    let mean = |&(sum, count): &(f64, f64)| if count > 0.0 { sum / count } else { 1.0 };
+    (views.iter().map(mean).collect(), closures)
 }

@@ -10,6 +10,7 @@ use super::{
         reprojection::LandmarkView,
         same_object::SameObject,
         scan_match,
+        summary::Summary,
         wall_prior::{SizePrior, WallPrior},
     },
     variables::{State, Variable},
@@ -53,6 +54,8 @@ pub enum Factor {
     Camera(CameraPrior),
     /// A known size.
     Size(SizePrior),
+    /// What earlier drives left.
+    Summary(Box<Summary>),
 }
 
 /// Factors on the width of robust kernels (graduated non-convexity).
@@ -92,6 +95,7 @@ impl Factor {
             Self::Same(f) => vec![Landmark(f.a), Landmark(f.b)],
             Self::Camera(f) => vec![Camera(f.camera)],
             Self::Size(f) => vec![Landmark(f.landmark)],
+            Self::Summary(f) => f.variables(),
         }
     }
 
@@ -110,6 +114,7 @@ impl Factor {
             Self::Same(f) => f.linearised(state),
             Self::Camera(f) => f.linearised(state),
             Self::Size(f) => f.linearised(state),
+            Self::Summary(f) => f.linearised(state),
         };
         Linearised { residual, by: self.variables().into_iter().zip(by).collect() }
     }
@@ -140,6 +145,7 @@ impl Factor {
             Self::Same(f) => f.is_valid(),
             Self::Camera(f) => f.is_valid(),
             Self::Size(f) => f.is_valid(),
+            Self::Summary(f) => f.is_valid(),
         }
     }
 }

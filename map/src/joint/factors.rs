@@ -8,6 +8,7 @@ pub(super) mod odometry;
 pub(super) mod reprojection;
 pub(super) mod same_object;
 pub(super) mod scan_match;
+pub(super) mod summary;
 pub(super) mod wall_prior;
 
 use nalgebra::{DMatrix, DVector, SMatrix};

@@ -45,6 +45,11 @@ impl Marginals {
         Some(self.covariance.view((r, c), (row.size(), column.size())).into_owned())
     }
 
+    /// Over all parameters of the chosen variables, in their order.
+    pub(super) fn into_covariance(self) -> DMatrix<f64> {
+        self.covariance
+    }
+
     /// Of two landmarks, the part of [`SAME_PARAMETERS`].
     pub fn same_block(&self, row: Variable, column: Variable) -> Option<Matrix6<f64>> {
         let block = self.block(row, column).filter(|b| b.shape() == (8, 8))?;

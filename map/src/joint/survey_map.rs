@@ -57,19 +57,32 @@ pub struct SurveyMap {
 /// Solves a survey.
 pub fn surveyed(survey: &Survey, params: &JointParams) -> Result<SurveyMap, JointError> {
     survey.check()?;
-    let mut opened = Vec::new();
-    for drive in 0..survey.drives.len() {
-        let mut open = SurveyProblem::new(&survey.alone(drive), params, None)?;
-        narrowed(&mut open.problem, &OPEN)?;
-        opened.push(open);
-    }
+    let opened = (0..survey.drives.len()).map(|drive| opened(survey, drive, params));
+    let opened: Vec<SurveyProblem> = opened.collect::<Result<_, _>>()?;
     let keyframes: Vec<Pose2> = opened.iter().flat_map(|o| o.problem.state.keyframes.clone()).collect();
     let plan = Candidates::new(survey, &opened, params)?;
     let keyframes = plan.in_one_frame(&opened, keyframes);
     let mut joint = SurveyProblem::new(survey, params, Some(keyframes))?;
     let closures = plan.settled(survey, &mut joint, params)?;
-    let SurveyProblem { problem, first_keyframe, wall_of, landmark_of, .. } = joint;
-    Ok(SurveyMap { problem, first_keyframe, wall_of, landmark_of, closures })
+    Ok(SurveyMap::of(joint, closures))
+}
+
+impl SurveyMap {
+    pub(super) fn of(joint: SurveyProblem, closures: Vec<Closure>) -> Self {
+        let SurveyProblem { problem, first_keyframe, wall_of, landmark_of, .. } = joint;
+        Self { problem, first_keyframe, wall_of, landmark_of, closures }
+    }
+}
+
+/// One drive alone, solved without closures.
+pub(super) fn opened(
+    survey: &Survey,
+    drive: usize,
+    params: &JointParams,
+) -> Result<SurveyProblem, JointError> {
+    let mut open = SurveyProblem::new(&survey.alone(drive), params, None)?;
+    narrowed(&mut open.problem, &OPEN)?;
+    Ok(open)
 }
 
 fn narrowed(problem: &mut JointProblem, widths: &[[f64; 2]]) -> Result<(), JointError> {
@@ -82,7 +95,7 @@ fn narrowed(problem: &mut JointProblem, widths: &[[f64; 2]]) -> Result<(), Joint
 }
 
 /// Candidates with the drives of their tracks, and which are tried.
-struct Candidates {
+pub(super) struct Candidates {
     pairs: Vec<[usize; 2]>,
     tried: Vec<bool>,
     /// Frame of each drive in that of the first.
@@ -130,6 +143,11 @@ impl Candidates {
         Ok(Self { pairs, tried, frames })
     }
 
+    /// Candidates whose landmarks are not far apart in a common frame.
+    pub(super) fn by_distance(pairs: Vec<[usize; 2]>, distances_m: &[f64]) -> Self {
+        Self { tried: distances_m.iter().map(|d| *d <= FAR_M).collect(), pairs, frames: Vec::new() }
+    }
+
     fn in_one_frame(&self, opened: &[SurveyProblem], keyframes: Vec<Pose2>) -> Vec<Pose2> {
         let counts = opened.iter().map(|o| o.problem.state.keyframes.len());
         let frames = self.frames.iter().zip(counts).flat_map(|(frame, n)| std::iter::repeat_n(frame, n));
@@ -138,7 +156,7 @@ impl Candidates {
 
     /// Solves with the candidates that are tried, drops what contradicts, starts again the landmarks
     /// that a wrong one pulled away, and tries all that were dropped once more.
-    fn settled(
+    pub(super) fn settled(
         mut self,
         survey: &Survey,
         joint: &mut SurveyProblem,

@@ -4,10 +4,12 @@ use super::{
     building::{Building, Shape},
     drive::{CORNER_PX, SYSTEMATIC, SimulatedCamera, SimulatedDrive},
     figures::{Figures, best_tracks},
-    passages::{Setting, labelled},
+    passages::{LabelledSurvey, Setting, labelled},
     two_step::two_step,
 };
-use map::joint::{CameraState, CameraStated, JointError, JointParams, surveyed};
+use map::joint::{
+    CameraState, CameraStated, JointError, JointParams, KnownMap, SurveyMap, refined, surveyed,
+};
 use nalgebra::SVector;
 use vision::random::Random;
 
@@ -27,8 +29,17 @@ pub(super) struct Case {
     pub(super) name: &'static str,
     pub(super) what: &'static str,
     drives: Drives,
-    two_step: bool,
+    way: Way,
     setting: Setting,
+}
+
+/// How a case solves its drives.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Way {
+    Joint,
+    TwoSteps,
+    /// The second drive on the summary of the first.
+    Summary,
 }
 
 /// Error of the floor plan: direction (rad) and offset (m).
@@ -41,8 +52,8 @@ pub(super) fn all() -> Vec<Case> {
     let every = Setting::ALL;
     let apart = Setting { scan_loops: false, ..every };
     let blind = Setting { laser: false, ..every };
-    let case = |name, what, drives, setting| Case { name, what, drives, two_step: false, setting };
-    let steps = |name, what, drives| Case { two_step: true, ..case(name, what, drives, every) };
+    let case = |name, what, drives, setting| Case { name, what, drives, way: Way::Joint, setting };
+    let steps = |name, what, drives| Case { way: Way::TwoSteps, ..case(name, what, drives, every) };
     let wrong = |share| Setting { wrong: [share, WRONG_VIEWS], ..apart };
     vec![
         steps("a", "two steps", Drives::One),
@@ -52,6 +63,7 @@ pub(super) fn all() -> Vec<Case> {
         case("d3", "d, no closure", Drives::One, Setting { object_loops: false, ..apart }),
         case("e", "two drives", Drives::Two, every),
         case("e1", "e, no closure by scans", Drives::Two, apart),
+        Case { way: Way::Summary, ..case("f", "drive 2 on a summary of 1", Drives::Two, every) },
         case("c2", "two drives, no laser", Drives::Two, blind),
         case("c3", "c2, three sizes known", Drives::Two, Setting { sized: 3, ..blind }),
         case("c4", "one drive, no laser, plan", Drives::One, Setting { plan: Some(PLAN), ..blind }),
@@ -120,17 +132,48 @@ impl World {
             ..JointParams::default()
         };
         let mut figures = Figures::default();
-        if case.two_step {
-            let (map, placed) = two_step(&survey, &params, CORNER_PX)?;
-            figures.of_landmarks(building, &placed);
-            figures.of_path_and_walls(building, &survey, &map, drives[0])?;
-        } else {
-            let map = surveyed(&survey.survey, &params)?;
-            figures.of_landmarks(building, &best_tracks(&survey, &map)?);
-            figures.of_path_and_walls(building, &survey, &map, drives[0])?;
-            figures.of_camera(&map, truth)?;
-            figures.of_closures(&survey, &map);
+        match case.way {
+            Way::TwoSteps => {
+                let (map, placed) = two_step(&survey, &params, CORNER_PX)?;
+                figures.of_landmarks(building, &placed);
+                figures.of_path_and_walls(building, &survey, &map, drives[0])?;
+            }
+            Way::Joint => {
+                let map = surveyed(&survey.survey, &params)?;
+                figures.of_landmarks(building, &best_tracks(&survey, &map)?);
+                figures.of_path_and_walls(building, &survey, &map, drives[0])?;
+                figures.of_camera(&map, truth)?;
+                figures.of_closures(&survey, &map);
+            }
+            Way::Summary => {
+                let batch = best_tracks(&survey, &surveyed(&survey.survey, &params)?)?;
+                let of =
+                    |drive| labelled(building, &[drive], stated, &case.setting, &mut Random::new(self.seed));
+                let (one, two) = (of(drives[0]), of(drives[1]));
+                let map = on_summary(&one, &two, &params)?;
+                let placed = best_tracks(&two, &map)?;
+                figures.of_landmarks(building, &placed);
+                figures.of_camera(&map, truth)?;
+                figures.apart(&placed, &batch);
+            }
         }
         Ok(figures)
     }
+}
+
+/// The second drive on what the first one left: its walls, camera, and the best track of each
+/// object with an appearance of its own.
+fn on_summary(
+    one: &LabelledSurvey,
+    two: &LabelledSurvey,
+    params: &JointParams,
+) -> Result<SurveyMap, JointError> {
+    let first = surveyed(&one.survey, params)?;
+    let known = best_tracks(one, &first)?;
+    let landmarks: Vec<usize> = known.iter().map(|placed| placed.variable).collect();
+    let summary = KnownMap::of(&first, &landmarks)?;
+    let number = |object: usize| known.iter().position(|placed| placed.object == object);
+    let tracks = two.object_of.iter().enumerate();
+    let same: Vec<[usize; 2]> = tracks.filter_map(|(t, object)| Some([t, number(*object)?])).collect();
+    refined(&two.survey, &summary, &same, params)
 }

@@ -19,6 +19,8 @@ const NOT_A_LOOP: usize = 20;
 #[derive(Debug, Clone)]
 pub(super) struct Placed {
     pub(super) object: usize,
+    /// Its variable.
+    pub(super) variable: usize,
     pub(super) landmark: LandmarkState,
     /// Over x, y, theta, z, log width, log height.
     pub(super) covariance: Option<Matrix6<f64>>,
@@ -37,6 +39,8 @@ pub(super) struct Figures {
     pub(super) facing_deg: Vec<f64>,
     pub(super) wall_m: Vec<f64>,
     pub(super) loop_m: Vec<f64>,
+    /// Distances of landmarks from those of all drives at once.
+    pub(super) apart_m: Vec<f64>,
     /// Mounting: rotation; translation on the floor; focal length.
     pub(super) mounting_deg: Vec<f64>,
     pub(super) mounting_m: Vec<f64>,
@@ -64,6 +68,7 @@ impl Figures {
             (&mut self.facing_deg, other.facing_deg),
             (&mut self.wall_m, other.wall_m),
             (&mut self.loop_m, other.loop_m),
+            (&mut self.apart_m, other.apart_m),
             (&mut self.mounting_deg, other.mounting_deg),
             (&mut self.mounting_m, other.mounting_m),
             (&mut self.focal_percent, other.focal_percent),
@@ -148,6 +153,15 @@ impl Figures {
         Ok(())
     }
 
+    /// Landmarks by one way against those by another.
+    pub(super) fn apart(&mut self, placed: &[Placed], others: &[Placed]) {
+        for p in placed {
+            if let Some(other) = others.iter().find(|other| other.object == p.object) {
+                self.apart_m.push((p.landmark.centre - other.landmark.centre).xy().norm());
+            }
+        }
+    }
+
     /// What became of the candidates.
     pub(super) fn of_closures(&mut self, labelled: &LabelledSurvey, map: &SurveyMap) {
         for (closure, wrong) in map.closures.iter().zip(&labelled.wrong) {
@@ -178,6 +192,7 @@ pub(super) fn best_tracks(labelled: &LabelledSurvey, map: &SurveyMap) -> Result<
     let marginals = Marginals::of(&map.problem, &chosen)?;
     let placed = |(&object, &(_, l)): (&usize, &(usize, usize))| Placed {
         object,
+        variable: l,
         landmark: map.problem.state.landmarks[l],
         covariance: marginals.same_block(Variable::Landmark(l), Variable::Landmark(l)),
     };

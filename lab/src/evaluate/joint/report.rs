@@ -38,6 +38,8 @@ pub(super) struct Row {
     pub(super) facing_deg: Option<Spread>,
     pub(super) wall_mm: Option<Spread>,
     pub(super) loop_mm: Option<Spread>,
+    /// From the landmarks of all drives at once.
+    pub(super) apart_mm: Option<Spread>,
     pub(super) mounting_deg: Option<Spread>,
     pub(super) mounting_mm: Option<Spread>,
     pub(super) focal_percent: Option<Spread>,
@@ -67,6 +69,7 @@ impl Row {
             facing_deg: Spread::of(&f.facing_deg, 1.0),
             wall_mm: Spread::of(&f.wall_m, 1e3),
             loop_mm: Spread::of(&f.loop_m, 1e3),
+            apart_mm: Spread::of(&f.apart_m, 1e3),
             mounting_deg: Spread::of(&f.mounting_deg, 1.0),
             mounting_mm: Spread::of(&f.mounting_m, 1e3),
             focal_percent: Spread::of(&f.focal_percent, 1.0),
@@ -108,6 +111,9 @@ impl Row {
         if self.wrong + self.right > 0 {
             let (kept, wrong, lost, right) = (self.wrong_kept, self.wrong, self.right_lost, self.right);
             line += &format!("; wrong kept {kept} of {wrong}, right lost {lost} of {right}");
+        }
+        if self.apart_mm.is_some() {
+            line += &format!("; from both at once {} mm", whole(self.apart_mm));
         }
         if self.failed > 0 {
             line += &format!("; {} not solved", self.failed);
@@ -204,6 +210,8 @@ fn requirements() -> Vec<Requirement> {
         ("c3", "aligned 95 %, mm", |r| Some(r.aligned_mm?.p95), most(260.0)),
         ("c4", "landmark median, mm", |r| Some(r.landmark_mm?.median), most(80.0)),
         ("c4", "landmark 95 %, mm", |r| Some(r.landmark_mm?.p95), most(220.0)),
+        ("f", "from both drives at once 95 %, mm", |r| Some(r.apart_mm?.p95), most(6.0)),
+        ("f", "NEES of landmarks", |r| r.landmark_nees, band),
         ("w02", "wrong kept", wrong_kept, most(0.0)),
         ("w10", "wrong kept", wrong_kept, most(0.0)),
         ("w30", "wrong kept", wrong_kept, most(0.0)),

@@ -42,7 +42,7 @@ pub(super) fn two_step(
         if let Some(landmark) =
             alone(&map, labelled.survey.camera.camera, &views, wall, params, corner_sigma_px)?
         {
-            placed.push(Placed { object, landmark, covariance: None });
+            placed.push(Placed { object, variable: 0, landmark, covariance: None });
         }
     }
     Ok((map, placed))

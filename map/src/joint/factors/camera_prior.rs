@@ -34,7 +34,7 @@ impl CameraPrior {
 }
 
 /// Derivative of `Log(Exp(d) Exp(phi))` by `d` at 0: the inverse left Jacobian of SO(3).
-fn rotation_by_perturbation(phi: &Vector3<f64>) -> Matrix3<f64> {
+pub(super) fn rotation_by_perturbation(phi: &Vector3<f64>) -> Matrix3<f64> {
     let (angle, cross) = (phi.norm(), phi.cross_matrix());
     // Its limit where the quotient has no digits left.
     let second = if angle < 1e-4 {

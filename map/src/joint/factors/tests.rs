@@ -8,6 +8,7 @@ use super::{
     reprojection::LandmarkView,
     same_object::SameObject,
     sqrt_information,
+    summary::{Estimate, Summary},
     wall_prior::{SizePrior, WallPrior},
 };
 use crate::{
@@ -128,6 +129,17 @@ fn factors() -> Vec<Factor> {
         Factor::Camera(CameraPrior { camera: 0, stated: camera(), sigmas: SVector::from(steps) }),
         Factor::Size(SizePrior { landmark: 0, log_size: Vector2::new(-0.4, -0.2), sigma: 0.002 }),
     ];
+    let landmark = LandmarkState {
+        centre: Vector3::new(-1.0, -2.0, 1.3),
+        theta_rad: 0.1,
+        tilt_rad: 0.0,
+        roll_rad: 0.0,
+        log_size: Vector2::new(-0.4, -0.3),
+    };
+    let estimates =
+        vec![Estimate::Wall(1, plan), Estimate::Landmark(2, landmark), Estimate::Camera(0, camera())];
+    let sqrt_information = nalgebra::DMatrix::from_fn(20, 20, |r, c| 1.0 / (1.0 + r as f64 + 2.0 * c as f64));
+    all.push(Factor::Summary(Box::new(Summary { estimates, sqrt_information })));
     all.extend((0..3).flat_map(|wall| [Factor::Line(line(wall)), Factor::OnWall(on_wall(wall))]));
     all.extend((0..3).map(|landmark| Factor::View(view(landmark))));
     all
@@ -212,6 +224,7 @@ fn numbers_that_are_not_finite_and_spreads_of_zero_are_refused() {
             Factor::Same(f) => f.sigmas[3] = 0.0,
             Factor::Camera(f) => f.sigmas[0] = 0.0,
             Factor::Size(f) => f.log_size.x = f64::NEG_INFINITY,
+            Factor::Summary(f) => f.sqrt_information[(3, 4)] = f64::NAN,
         }
         assert!(!factor.is_valid(), "{factor:?}");
     }

@@ -70,3 +70,46 @@ fn a_second_drive_is_laid_on_the_first() {
     let between: Pose2 = poses[20].between(&poses[map.first_keyframe[1] + 20]);
     assert!(between.position().norm() < 0.02 && between.theta_rad.abs() < 0.01, "{between:?}");
 }
+
+/// Drive 2 on the summary of drive 1, beside both drives at once.
+#[test]
+fn a_summary_stands_for_its_drive() {
+    let golden = Golden::read();
+    let (first, params) = (golden.survey(), golden.params());
+    let tracks = first.drives[0].tracks.len();
+    let mut second = first.clone();
+    // Other noise, and a frame of its own.
+    second.start = Pose2::default();
+    for (i, track) in second.drives[0].tracks.iter_mut().enumerate() {
+        for (k, view) in track.views.iter_mut().enumerate() {
+            let shift = if (i + k) % 2 == 0 { 0.4 } else { -0.4 };
+            view.corners_px.iter_mut().for_each(|p| p.x += shift);
+        }
+    }
+    let mut both = first.clone();
+    both.drives.push(second.drives[0].clone());
+    both.candidates = (0..tracks).map(|track| [track, tracks + track]).collect();
+    let batch = surveyed(&both, &params).unwrap();
+    let alone = surveyed(&first, &params).unwrap();
+    let all: Vec<usize> = (0..tracks).collect();
+    let known = KnownMap::of(&alone, &all).unwrap();
+    let same: Vec<[usize; 2]> = all.iter().map(|track| [*track, *track]).collect();
+    let later = refined(&second, &known, &same, &params).unwrap();
+    assert!(later.closures.iter().all(|closure| closure.weight > 0.9), "{:?}", later.closures);
+    let sigma = |map: &SurveyMap, landmark| {
+        let of = Variable::Landmark(landmark);
+        let block = Marginals::of(&map.problem, &[of]).unwrap().block(of, of).unwrap();
+        (block[(0, 0)] + block[(1, 1)]).sqrt()
+    };
+    for track in 0..tracks {
+        let (a, b) = (batch.landmark_of[tracks + track].unwrap(), later.landmark_of[track].unwrap());
+        let (one, two) = (&batch.problem.state.landmarks[a], &later.problem.state.landmarks[b]);
+        let (apart, sigma_batch) = ((one.centre - two.centre).xy().norm(), sigma(&batch, a));
+        assert!(apart < (0.2 * sigma_batch).max(0.002), "{track}: {apart} of {sigma_batch}");
+        let ratio = sigma(&later, b) / sigma_batch;
+        assert!((0.9..1.1).contains(&ratio), "{track}: {ratio}");
+        // The second drive says something that the first did not.
+        let before = alone.landmark_of[track].unwrap();
+        assert!(sigma(&later, b) < 0.98 * sigma(&alone, before), "{track}");
+    }
+}
