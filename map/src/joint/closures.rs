@@ -16,8 +16,8 @@ use nalgebra::{Matrix6, Vector2};
 /// Two landmarks of different drives agree with a transform within this distance, metres.
 const AGREE_M: f64 = 1.5;
 
-/// Whether each pair of landmarks may be one object by the joint covariance of the problem as it is:
-/// chi2 of the difference at most `gate`.
+/// Whether each pair of landmarks may be one object by the joint covariance of the problem as it
+/// is: chi2 of the difference at most `gate`.
 pub(super) fn agreeing(
     survey: &SurveyProblem,
     pairs: &[[usize; 2]],
@@ -65,7 +65,8 @@ pub(super) fn common_frame(pairs: &[(LandmarkState, LandmarkState)]) -> (Pose2, 
     best
 }
 
-/// Mean weight of the views of each landmark (1 without views), and the weight of each closure in their order.
+/// Mean weight of the views of each landmark (1 without views), and the weight of each closure in
+/// their order.
 pub(super) fn weights(survey: &SurveyProblem) -> (Vec<f64>, Vec<f64>) {
     let mut views = vec![(0.0, 0.0); survey.problem.state.landmarks.len()];
     let mut closures = Vec::new();

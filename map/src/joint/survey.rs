@@ -1,5 +1,5 @@
-//! What drives give to the joint map: motions, lines and tracks of quads, already associated
-//! within each passage, with candidates of what is the same.
+//! What drives give to the joint map: motions, lines and tracks of quads, already associated within
+//! each passage, with candidates of what is the same.
 
 use super::{
     problem::JointError,

@@ -154,8 +154,8 @@ impl Candidates {
         frames.zip(keyframes).map(|(frame, pose)| frame.compose(&pose)).collect()
     }
 
-    /// Solves with the candidates that are tried, drops what contradicts, starts again the landmarks
-    /// that a wrong one pulled away, and tries all that were dropped once more.
+    /// Solves with the candidates that are tried, drops what contradicts, starts again the
+    /// landmarks that a wrong one pulled away, and tries all that were dropped once more.
     pub(super) fn settled(
         mut self,
         survey: &Survey,
