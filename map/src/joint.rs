@@ -18,6 +18,7 @@ mod build;
 mod closures;
 mod survey_map;
 mod known_map;
+mod window;
 
 pub use build::SurveyProblem;
 pub use factor::{Factor, Kernels, Linearised};
@@ -40,6 +41,7 @@ pub use start::landmark_by_rays;
 pub use survey::{CameraStated, DriveRecord, LineSeen, Motion, PlanLine, QuadView, Survey, Track};
 pub use survey_map::{Closure, SurveyMap, surveyed};
 pub use variables::{CameraState, LandmarkState, OdometryErrors, State, Variable, WallLine};
+pub use window::{JointWindow, KeyframeSeen};
 
 #[cfg(test)]
 mod tests;

@@ -118,11 +118,7 @@ impl SurveyProblem {
             let walls = &mut self.problem.state.walls;
             let pose = self.problem.state.keyframes[keyframe];
             let wall = *self.wall_of.entry(survey.same_wall[line.wall]).or_insert_with(|| {
-                let anchor = Point2::from(pose.position());
-                let mut first =
-                    WallLine { anchor, facing_rad: pose.theta_rad + line.facing_rad, offset_m: 0.0 };
-                first.anchor += first.normal() * line.offset_m;
-                walls.push(first);
+                walls.push(WallLine::observed(&pose, line.facing_rad, line.offset_m));
                 walls.len() - 1
             });
             let wrong = JointError::Survey { field: "covariance", what: "line", number };
@@ -220,7 +216,7 @@ impl SurveyProblem {
     }
 }
 
-fn corner_roots(view: &QuadView, border_sigma_px: f64) -> Option<[Matrix2<f64>; 4]> {
+pub(super) fn corner_roots(view: &QuadView, border_sigma_px: f64) -> Option<[Matrix2<f64>; 4]> {
     let border = Matrix2::identity() * border_sigma_px.powi(2);
     let [a, b, c, d] = view.covariance_px2.map(|covariance| sqrt_information(&(covariance + border)));
     Some([a?, b?, c?, d?])

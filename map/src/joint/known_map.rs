@@ -13,7 +13,7 @@ use super::{
     variables::{CameraState, LandmarkState, Variable, WallLine},
 };
 use crate::pose2::Pose2;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 /// Walls, landmarks and camera of a finished map with their joint covariance, in its frame.
 #[derive(Debug, Clone, PartialEq)]
@@ -63,7 +63,8 @@ impl KnownMap {
             estimates.push(Estimate::Landmark(number, *landmark));
         }
         estimates.push(Estimate::Camera(0, self.camera));
-        let summary = Summary { estimates, sqrt_information: self.sqrt_information.clone() };
+        let offset = DVector::zeros(self.sqrt_information.nrows());
+        let summary = Summary { estimates, sqrt_information: self.sqrt_information.clone(), offset };
         joint.problem.fixed.clear();
         joint.problem.factors.push(Factor::Summary(Box::new(summary)));
         joint.without_closures = joint.problem.factors.len();

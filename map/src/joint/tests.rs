@@ -6,6 +6,7 @@
 mod bounds;
 mod closures;
 mod golden;
+mod window;
 
 use super::*;
 use crate::pose2::{Pose2, wrap_rad};

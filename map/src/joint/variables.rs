@@ -52,6 +52,15 @@ pub struct WallLine {
 }
 
 impl WallLine {
+    /// The wall of a line (facing angle and offset in the robot frame) from this pose: its anchor
+    /// is the foot of the robot.
+    pub(super) fn observed(pose: &Pose2, facing_rad: f64, offset_m: f64) -> Self {
+        let anchor = Point2::from(pose.position());
+        let mut made = Self { anchor, facing_rad: wrap_rad(pose.theta_rad + facing_rad), offset_m: 0.0 };
+        made.anchor += made.normal() * offset_m;
+        made
+    }
+
     /// Facing normal.
     pub fn normal(&self) -> Vector2<f64> {
         let (s, c) = self.facing_rad.sin_cos();

@@ -1,9 +1,9 @@
-//! What earlier drives left: a Gaussian over walls, landmarks and camera.
+//! What earlier drives or keyframes left: a Gaussian over some variables.
 
 use super::{Terms, camera_prior::rotation_by_perturbation};
 use crate::{
-    joint::variables::{CameraState, LandmarkState, State, Variable, WallLine},
-    pose2::wrap_rad,
+    joint::variables::{CameraState, LandmarkState, OdometryErrors, State, Variable, WallLine},
+    pose2::{Pose2, wrap_rad},
 };
 use nalgebra::{DMatrix, DVector, Vector3};
 
@@ -14,6 +14,8 @@ pub(in crate::joint) enum Estimate {
     Wall(usize, WallLine),
     Landmark(usize, LandmarkState),
     Camera(usize, CameraState),
+    Keyframe(usize, Pose2),
+    Odometry(usize, OdometryErrors),
 }
 
 impl Estimate {
@@ -22,7 +24,21 @@ impl Estimate {
             Self::Wall(i, _) => Variable::Wall(*i),
             Self::Landmark(i, _) => Variable::Landmark(*i),
             Self::Camera(i, _) => Variable::Camera(*i),
+            Self::Keyframe(i, _) => Variable::Keyframe(*i),
+            Self::Odometry(i, _) => Variable::Odometry(*i),
         }
+    }
+
+    /// A variable as it is; `None` for the height of a ceiling, which no summary has.
+    pub(in crate::joint) fn of(variable: Variable, state: &State) -> Option<Self> {
+        Some(match variable {
+            Variable::Wall(i) => Self::Wall(i, state.walls[i]),
+            Variable::Landmark(i) => Self::Landmark(i, state.landmarks[i]),
+            Variable::Camera(i) => Self::Camera(i, state.cameras[i]),
+            Variable::Keyframe(i) => Self::Keyframe(i, state.keyframes[i]),
+            Variable::Odometry(i) => Self::Odometry(i, state.odometry[i]),
+            Variable::Ceiling(_) => return None,
+        })
     }
 
     /// The step from the mean to the state.
@@ -35,6 +51,12 @@ impl Estimate {
             }
             Self::Landmark(i, mean) => DVector::from_column_slice(state.landmarks[*i].minus(mean).as_slice()),
             Self::Camera(i, mean) => DVector::from_column_slice(state.cameras[*i].minus(mean).as_slice()),
+            Self::Keyframe(i, mean) => DVector::from_column_slice(state.keyframes[*i].minus(mean).as_slice()),
+            Self::Odometry(i, mean) => {
+                let errors = &state.odometry[*i];
+                let drift = errors.drift_rad_per_m - mean.drift_rad_per_m;
+                DVector::from_column_slice(&[errors.scale - mean.scale, drift])
+            }
         }
     }
 }
@@ -45,13 +67,17 @@ pub struct Summary {
     pub(in crate::joint) estimates: Vec<Estimate>,
     /// Root of the information over all parameters, in the order of the estimates.
     pub(in crate::joint) sqrt_information: DMatrix<f64>,
+    /// The residual at the mean: where the mean was no minimum.
+    pub(in crate::joint) offset: DVector<f64>,
 }
 
 impl Summary {
     pub(in crate::joint) fn is_valid(&self) -> bool {
         let parameters: usize = self.variables().iter().map(|v| v.size()).sum();
         let w = &self.sqrt_information;
-        w.shape() == (parameters, parameters) && w.iter().all(|v| v.is_finite())
+        w.shape() == (parameters, parameters)
+            && self.offset.len() == parameters
+            && w.iter().chain(self.offset.iter()).all(|v| v.is_finite())
     }
 
     pub(in crate::joint) fn variables(&self) -> Vec<Variable> {
@@ -60,7 +86,7 @@ impl Summary {
 
     pub(in crate::joint) fn linearised(&self, state: &State) -> Terms {
         let w = &self.sqrt_information;
-        let mut residual = DVector::zeros(w.nrows());
+        let mut residual = self.offset.clone();
         let (mut by, mut first) = (Vec::new(), 0);
         for estimate in &self.estimates {
             let d = estimate.difference(state);

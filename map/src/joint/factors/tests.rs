@@ -136,10 +136,17 @@ fn factors() -> Vec<Factor> {
         roll_rad: 0.0,
         log_size: Vector2::new(-0.4, -0.3),
     };
-    let estimates =
-        vec![Estimate::Wall(1, plan), Estimate::Landmark(2, landmark), Estimate::Camera(0, camera())];
-    let sqrt_information = nalgebra::DMatrix::from_fn(20, 20, |r, c| 1.0 / (1.0 + r as f64 + 2.0 * c as f64));
-    all.push(Factor::Summary(Box::new(Summary { estimates, sqrt_information })));
+    let errors = OdometryErrors { scale: 0.01, drift_rad_per_m: -0.002 };
+    let estimates = vec![
+        Estimate::Wall(1, plan),
+        Estimate::Landmark(2, landmark),
+        Estimate::Camera(0, camera()),
+        Estimate::Keyframe(0, Pose2::new(3.1, -2.1, -3.1)),
+        Estimate::Odometry(0, errors),
+    ];
+    let sqrt_information = nalgebra::DMatrix::from_fn(25, 25, |r, c| 1.0 / (1.0 + r as f64 + 2.0 * c as f64));
+    let offset = DVector::from_element(25, 0.3);
+    all.push(Factor::Summary(Box::new(Summary { estimates, sqrt_information, offset })));
     all.extend((0..3).flat_map(|wall| [Factor::Line(line(wall)), Factor::OnWall(on_wall(wall))]));
     all.extend((0..3).map(|landmark| Factor::View(view(landmark))));
     all
