@@ -38,12 +38,10 @@ fn one_drive_surveys_its_building_and_calibrates_its_camera() {
 
 #[test]
 fn wrong_identities_are_not_kept() {
-    let report = report(&["w30", "v10"]);
-    for case in ["w30", "v10"] {
-        let row = row(&report, case);
-        assert!(row.wrong > 0 && row.wrong_kept == 0, "{row:?}");
-        assert!(row.right > row.wrong && row.right_lost * 10 <= row.right, "{row:?}");
-    }
+    let report = report(&["w30"]);
+    let row = row(&report, "w30");
+    assert!(row.wrong > 0 && row.wrong_kept == 0, "{row:?}");
+    assert!(row.right > row.wrong && row.right_lost == 0, "{row:?}");
 }
 
 #[test]
