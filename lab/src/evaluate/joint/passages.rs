@@ -17,11 +17,10 @@ const TRACK_VIEWS: usize = 3;
 /// Shift of a wrong view: standard deviation, px.
 const WRONG_VIEW_PX: f64 = 60.0;
 
-/// Which sensors count, what is known again in later passages, and what is wrong.
+/// Whether the laser counts, what is known again in later passages, and what is wrong.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Setting {
     pub(super) laser: bool,
-    pub(super) camera: bool,
     /// Walls are known again.
     pub(super) scan_loops: bool,
     /// Objects with an appearance of their own are.
@@ -35,15 +34,8 @@ pub(super) struct Setting {
 }
 
 impl Setting {
-    pub(super) const ALL: Self = Self {
-        laser: true,
-        camera: true,
-        scan_loops: true,
-        object_loops: true,
-        wrong: [0.0; 2],
-        sized: 0,
-        plan: None,
-    };
+    pub(super) const ALL: Self =
+        Self { laser: true, scan_loops: true, object_loops: true, wrong: [0.0; 2], sized: 0, plan: None };
 }
 
 /// A survey with the truth about its numbers.
@@ -105,9 +97,7 @@ pub(super) fn labelled(
         if setting.laser {
             made.lines(drive, number, &mut walls, setting.scan_loops, &mut record);
         }
-        if setting.camera {
-            met.extend(made.tracks(building, drive, number, &mut objects, setting, &mut record, random));
-        }
+        met.extend(made.tracks(building, drive, number, &mut objects, setting, &mut record, random));
         made.survey.drives.push(record);
     }
     if setting.object_loops {

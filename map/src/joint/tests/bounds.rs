@@ -4,6 +4,9 @@ use super::{super::*, golden::Golden};
 use crate::{pose2::Pose2, slam::graph::MAX_POSES};
 use nalgebra::{UnitQuaternion, Vector3};
 
+/// A fault of a survey.
+type Change = fn(&mut Survey);
+
 fn level(landmark: usize) -> Factor {
     Factor::Level(Level { landmark, sigma_rad: 0.01 })
 }
@@ -23,7 +26,6 @@ fn factors_of_missing_variables_and_surveys_of_missing_numbers_are_refused() {
     let mut problem = JointProblem { factors: vec![level(0)], ..JointProblem::default() };
     assert_eq!(problem.solve(&Descent::default()), Err(JointError::Factor(0)));
     let golden = Golden::read();
-    type Change = fn(&mut Survey);
     let cases: [(Change, &str); 7] = [
         (|s| s.drives[0].lines[3].keyframe = 40, "keyframe of line 3"),
         (|s| s.drives[0].lines[3].wall = 99, "wall of line 3"),
@@ -54,7 +56,6 @@ fn a_variable_that_is_fixed_or_missing_has_no_covariance() {
 #[test]
 fn a_poor_drive_gives_the_rest_of_the_map() {
     let golden = Golden::read();
-    type Change = fn(&mut Survey);
     let cases: [Change; 6] = [
         |s| s.drives[0].tracks.clear(),
         |s| s.drives[0].tracks.truncate(1),
