@@ -22,6 +22,7 @@ pub mod modality_stats;
 pub mod fuse;
 pub mod gaze;
 pub mod slam;
+pub mod joint;
 pub mod laser_fix;
 pub mod landmark_health;
 pub mod tracks;

@@ -8,7 +8,7 @@
 
 mod params;
 mod fix;
-mod derivatives;
+pub(crate) mod derivatives;
 pub(crate) mod predict;
 mod planar;
 mod posterior;

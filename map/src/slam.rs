@@ -13,7 +13,7 @@
 pub mod cloud;
 pub(crate) mod surface_index;
 mod information;
-mod normal_equations;
+pub(crate) mod normal_equations;
 pub mod icp;
 pub mod correlative;
 pub mod graph;

@@ -13,6 +13,7 @@ pub(crate) mod calibration;
 pub(crate) mod detection;
 pub(crate) mod placement;
 pub(crate) mod pose;
+pub(crate) mod joint;
 pub(crate) mod mapping;
 pub(crate) mod modalities;
 pub(crate) mod outside;
@@ -85,6 +86,14 @@ pub(crate) enum Command {
     ///   waymark-lab evaluate mapping laser-carmen-corrected laser-intel-raw-odometry --draw maps --plot mapping.svg
     #[command(verbatim_doc_comment)]
     Mapping(mapping::Args),
+    /// The joint map of walls, landmarks and camera in simulated buildings, and what is required of
+    /// it.
+    ///
+    /// One drive and two, loops with and without scans, a bare corridor, no laser, wrong identities;
+    /// beside them the laser map with each landmark placed alone. Needs no data. For example:
+    ///   waymark-lab evaluate joint --buildings 4 --cases a,d,e
+    #[command(verbatim_doc_comment)]
+    Joint(joint::Args),
     /// Occupancy grids imported: share of wall cells explained, and of walls on wall cells.
     ///
     /// For example:
@@ -151,6 +160,7 @@ pub(crate) fn run(command: &Command) -> anyhow::Result<()> {
         Command::Placement(args) => placement::run(args),
         Command::Navigation(args) => navigation::run(args),
         Command::Mapping(args) => mapping::run(args),
+        Command::Joint(args) => joint::run(args),
         Command::Grids(args) => grids::run(args),
         Command::Modalities(args) => modalities::run(args),
         Command::Visibility(args) => visibility::run(args),

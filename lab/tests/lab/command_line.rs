@@ -11,7 +11,7 @@ use tests::{
 };
 
 /// Options that each command must name in its help.
-const OPTIONS: [(&str, &[&str]); 26] = [
+const OPTIONS: [(&str, &[&str]); 27] = [
     (
         "evaluate navigation",
         &["--drives", "--posters", "--length-m", "--rate-hz", "--seed", "--json", "--plot"],
@@ -94,6 +94,7 @@ const OPTIONS: [(&str, &[&str]); 26] = [
         "evaluate mapping",
         &["--odometry-noise", "--seed", "--duration-s", "--params", "--draw", "--plot", "--json", "[LOGS]"],
     ),
+    ("evaluate joint", &["--buildings", "--seed", "--cases", "--json"]),
     ("evaluate grids", &["--min-length-m", "--draw", "--json", "<MAPS>"]),
     ("evaluate visibility", &["--maps", "--points", "--seed", "--plot", "--json"]),
     ("train confidence", &["--quads", "--set", "--photographs", "--rust"]),

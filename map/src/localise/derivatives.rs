@@ -5,7 +5,7 @@ use vision::pose::LandmarkSize;
 
 /// Camera coordinates of a map point by (x, y, theta) of the robot; `from_robot` = point - robot,
 /// map axes.
-pub(super) fn point_by_pose(camera_from_map: &Matrix3<f64>, from_robot: &Vector3<f64>) -> Matrix3<f64> {
+pub(crate) fn point_by_pose(camera_from_map: &Matrix3<f64>, from_robot: &Vector3<f64>) -> Matrix3<f64> {
     let turn = Vector3::z().cross(from_robot);
     -camera_from_map * Matrix3::from_columns(&[Vector3::x(), Vector3::y(), turn])
 }
@@ -25,7 +25,7 @@ pub(super) fn point_by_place(
 
 /// Camera coordinates of a robot point by the mounting's (rotation, translation); `from_camera` =
 /// point - camera, robot axes.
-pub(super) fn point_by_mounting(
+pub(crate) fn point_by_mounting(
     camera_from_robot: &Matrix3<f64>,
     from_camera: &Vector3<f64>,
 ) -> SMatrix<f64, 3, 6> {

@@ -44,7 +44,7 @@ pub enum GraphError {
 }
 
 /// Error of a constraint (x, y, theta).
-fn error(edge: &PoseConstraint, from: &Pose2, to: &Pose2) -> Vector3<f64> {
+pub(crate) fn error(edge: &PoseConstraint, from: &Pose2, to: &Pose2) -> Vector3<f64> {
     let h = from.between(to);
     Vector3::new(
         h.x_m - edge.measured.x_m,
@@ -53,7 +53,8 @@ fn error(edge: &PoseConstraint, from: &Pose2, to: &Pose2) -> Vector3<f64> {
     )
 }
 
-fn jacobians(from: &Pose2, to: &Pose2) -> (Matrix3<f64>, Matrix3<f64>) {
+/// Derivatives of [`error`] by both poses.
+pub(crate) fn jacobians(from: &Pose2, to: &Pose2) -> (Matrix3<f64>, Matrix3<f64>) {
     let (s, c) = from.theta_rad.sin_cos();
     let d = to.position() - from.position();
     let by_from = Matrix3::new(-c, -s, -s * d.x + c * d.y, s, -c, -c * d.x - s * d.y, 0.0, 0.0, -1.0);
@@ -69,18 +70,24 @@ pub fn chi2(edge: &PoseConstraint, poses: &[Pose2]) -> f64 {
 
 /// Weight of a constraint with this chi2: 1, or less if it may be wrong.
 pub fn weight(edge: &PoseConstraint, chi2: f64) -> f64 {
-    edge.doubt_chi2.map_or(1.0, |phi| (2.0 * phi / (phi + chi2)).min(1.0).powi(2))
+    edge.doubt_chi2.map_or(1.0, |phi| scaled_weight(phi, chi2))
+}
+
+/// Weight of dynamic covariance scaling beyond `phi`: 1 below it.
+pub(crate) fn scaled_weight(phi: f64, chi2: f64) -> f64 {
+    (2.0 * phi / (phi + chi2)).min(1.0).powi(2)
+}
+
+/// The cost that belongs to [`scaled_weight`]: its integral over chi2.
+pub(crate) fn scaled_cost(phi: f64, chi2: f64) -> f64 {
+    if chi2 > phi { phi + 4.0 * phi * phi * (1.0 / (2.0 * phi) - 1.0 / (phi + chi2)) } else { chi2 }
 }
 
 /// Robust cost: chi2, bounded for constraints that may be wrong.
 fn cost(edges: &[PoseConstraint], poses: &[Pose2]) -> f64 {
     let one = |e: &PoseConstraint| {
         let c = chi2(e, poses);
-        match e.doubt_chi2 {
-            // Integral of the weight over chi2.
-            Some(phi) if c > phi => phi + 4.0 * phi * phi * (1.0 / (2.0 * phi) - 1.0 / (phi + c)),
-            _ => c,
-        }
+        e.doubt_chi2.map_or(c, |phi| scaled_cost(phi, c))
     };
     edges.iter().map(one).sum()
 }
@@ -108,7 +115,7 @@ impl From<NotPositiveDefinite> for GraphError {
 /// Which blocks the constraints fill; the first pose is fixed and has no row.
 fn pattern(poses: &[Pose2], edges: &[PoseConstraint]) -> BlockPattern {
     let pairs = edges.iter().filter_map(|e| Some((e.from.checked_sub(1)?, e.to.checked_sub(1)?)));
-    BlockPattern::new(poses.len() - 1, pairs)
+    BlockPattern::new(&vec![3; poses.len() - 1], pairs)
 }
 
 /// The normal equations at these poses: matrix and gradient.
@@ -199,7 +206,7 @@ pub fn covariances(
     let factor = normal(&pattern, poses, edges, 0.0).0.factor()?;
     let one = |&i: &usize| match i.checked_sub(1).filter(|k| *k < poses.len() - 1) {
         Some(k) => {
-            let made = factor.inverse_block(k);
+            let made = factor.inverse_of(&[k]).fixed_view::<3, 3>(0, 0).into_owned();
             0.5 * (made + made.transpose())
         }
         None => Matrix3::zeros(),
