@@ -45,7 +45,7 @@ impl Floor {
         let points = walls
             .iter()
             .flat_map(|wall| [wall.a, wall.b])
-            .chain(areas.iter().flat_map(|area| box_of(area)).flatten());
+            .chain(areas.iter().filter_map(|area| box_of(area)).flatten());
         let Some((low, high)) = box_around(points) else {
             let origin = Point2::origin();
             return Ok(Self { cell_m: CELL_M, columns: 0, origin, clearance_m: Vec::new() });
@@ -60,7 +60,9 @@ impl Floor {
         let [columns, rows] = [size.x, size.y].map(|extent| (extent / cell_m + 1.0).floor() as usize);
         let clearance_m = vec![MAX_CLEARANCE_M; columns * rows];
         let mut floor = Self { cell_m, columns, origin: low, clearance_m };
-        walls.iter().for_each(|wall| floor.add(wall));
+        for wall in walls {
+            floor.add(wall);
+        }
         Ok(floor)
     }
 

@@ -200,7 +200,9 @@ impl MapTopology {
                 self.floor.around(cell).map(|(next, _)| self.place_of[next]).filter(|o| *o > place).collect();
             others.sort_unstable();
             others.dedup();
-            others.iter().for_each(|other| borders.entry((place, *other)).or_default().push(cell));
+            for other in others {
+                borders.entry((place, other)).or_default().push(cell);
+            }
         }
         let mut middles: Vec<(usize, [usize; 2])> = Vec::new();
         for ((a, b), cells) in borders {
@@ -251,7 +253,9 @@ impl MapTopology {
         let mut ways = vec![[f64::INFINITY; 2]; middles.len()];
         let mut search = Search::new(&self.floor);
         let mut is_middle = vec![false; self.place_of.len()];
-        middles.iter().for_each(|(cell, _)| is_middle[*cell] = true);
+        for (cell, _) in middles {
+            is_middle[*cell] = true;
+        }
         for (place, described) in self.places.iter().enumerate() {
             let Some(start) = self.cell_at(&described.centre) else { continue };
             let is_inside = |cell: usize| self.place_of[cell] as usize == place + 1;

@@ -73,10 +73,10 @@ pub(super) fn straightened(floor: &Floor, cells: &[usize]) -> Vec<Point2<f64>> {
     let mut corners: Vec<usize> = cells.first().copied().into_iter().collect();
     let mut last = None;
     for cell in cells {
-        if let (Some(anchor), Some(before)) = (corners.last(), last) {
-            if !is_straight(floor, *anchor, *cell) {
-                corners.push(before);
-            }
+        if let (Some(anchor), Some(before)) = (corners.last().copied(), last)
+            && !is_straight(floor, anchor, *cell)
+        {
+            corners.push(before);
         }
         last = Some(*cell);
     }

@@ -47,12 +47,10 @@ impl Plan {
     }
 
     fn candidates(&self) -> Vec<GazeCandidate<'_>> {
-        let candidate = |(landmark, place, visible)| (landmark, place, visible);
         self.posters
             .iter()
-            .map(|(landmark, place, visible)| candidate((*landmark, place, visible)))
             .map(|(landmark, place, visible)| GazeCandidate {
-                landmark,
+                landmark: *landmark,
                 place,
                 visible,
                 saliency: 0.8,
