@@ -38,6 +38,7 @@ mod server_status;
 mod session;
 mod shell;
 pub mod simulated_errors;
+mod site;
 pub mod stopwatch;
 pub mod survey;
 mod traces;
@@ -129,6 +130,8 @@ enum Command {
     Restore(restore::Args),
     /// Maps: create, list, show, locate, delete; walls from laser logs, grids and plans.
     Map(map::Args),
+    /// Sites: places and passages of their maps, routes.
+    Site(site::Args),
     /// Landmarks: teach, list, show, place, size, rename, delete, accept.
     Landmark(landmark::Args),
     /// Changes of a map: list, diff; the way back: rollback, undo; drafts: draft, publish
@@ -253,6 +256,7 @@ pub fn main() -> ExitCode {
         Command::Backup(args) => run(backup::run(args)).map(done),
         Command::Restore(args) => run(restore::run(args)).map(done),
         Command::Map(args) => run(map::run(args)).map(done),
+        Command::Site(args) => run(site::run(args)).map(done),
         Command::Landmark(args) => run(landmark::run(args)).map(done),
         Command::History(args) => run(history::run(args)).map(done),
         Command::View(args) => run(view::run(args)).map(done),

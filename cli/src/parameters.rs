@@ -47,9 +47,9 @@ pub struct ParameterArgs {
     /// What a quad inside another becomes: one of its `alternates`, or one of the `quads`.
     #[arg(long, value_name = "WHAT")]
     nested: Option<String>,
-    /// Leave out sets of three sides (doors, half-hidden posters).
+    /// Also find sets of three sides (doors, half-hidden posters).
     #[arg(long)]
-    no_three_sided: bool,
+    three_sided: bool,
     /// Remove floor tiling before sides are grouped.
     #[arg(long)]
     remove_tiling: bool,
@@ -107,7 +107,7 @@ impl ParameterArgs {
             ("quads.min_side_support", self.min_support.map(Value::from)),
             ("quads.min_probability", self.min_score.map(Value::from)),
             ("quads.nested", self.nested.clone().map(Value::from)),
-            ("quads.three_sided", self.no_three_sided.then_some(Value::from(false))),
+            ("quads.three_sided", self.three_sided.then_some(Value::from(true))),
             ("tiling.remove", self.remove_tiling.then_some(Value::from(true))),
         ]
         .into_iter()
@@ -197,7 +197,7 @@ mod tests {
             "--min-support=0.7",
             "--min-score=0.4",
             "--nested=quads",
-            "--no-three-sided",
+            "--three-sided",
             "--remove-tiling",
         ])
         .unwrap();
@@ -209,7 +209,7 @@ mod tests {
         assert!(
             (p.quads.min_side_support - 0.7).abs() < 1e-12 && (p.quads.min_probability - 0.4).abs() < 1e-12
         );
-        assert!(!p.quads.three_sided && p.tiling.remove);
+        assert!(p.quads.three_sided && p.tiling.remove);
     }
 
     #[test]

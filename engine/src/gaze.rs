@@ -14,7 +14,7 @@ use std::{
     collections::BTreeMap,
     sync::{Mutex, PoisonError},
 };
-use vision::model::LandmarkId;
+use vision::model::{LandmarkId, LandmarkModel};
 
 /// Robots whose target is remembered; the one with the oldest query is dropped for a new one.
 pub const MAX_ROBOTS: usize = 10_000;
@@ -32,19 +32,20 @@ pub struct GazeQuery {
     pub params: GazeParams,
 }
 
+/// The landmarks of a map that are learnt, placed and trusted.
+pub fn candidates(map: &MapSnapshot) -> Vec<GazeCandidate<'_>> {
+    let candidate = |model: &LandmarkModel| {
+        let (info, visible) = (map.landmarks.get(&model.id)?, map.visibility.get(&model.id)?);
+        let place = info.place.as_ref().filter(|_| info.is_trusted())?;
+        let (saliency, v_c) = (model.saliency, model.v_c);
+        Some(GazeCandidate { landmark: model.id, place, visible, saliency, v_c })
+    };
+    map.models.iter().filter_map(|model| candidate(model)).collect()
+}
+
 /// Every landmark that can be looked at, best first. Errors: a query out of range.
 pub fn ranked(map: &MapSnapshot, query: &GazeQuery) -> Result<Vec<GazeTarget>, OutOfRange> {
-    let candidates: Vec<GazeCandidate<'_>> = map
-        .models
-        .iter()
-        .filter_map(|model| {
-            let (info, visible) = (map.landmarks.get(&model.id)?, map.visibility.get(&model.id)?);
-            let place = info.place.as_ref().filter(|_| info.is_trusted())?;
-            let (saliency, v_c) = (model.saliency, model.v_c);
-            Some(GazeCandidate { landmark: model.id, place, visible, saliency, v_c })
-        })
-        .collect();
-    rank(&query.pose, &candidates, &query.camera, &query.pan_tilt, &query.params)
+    rank(&query.pose, &candidates(map), &query.camera, &query.pan_tilt, &query.params)
 }
 
 /// The gaze target of each robot, with the tick of its last query.

@@ -21,6 +21,7 @@ pub mod localise;
 pub mod modality_stats;
 pub mod fuse;
 pub mod gaze;
+pub mod topology;
 pub mod slam;
 pub mod joint;
 pub mod laser_fix;

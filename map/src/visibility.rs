@@ -31,6 +31,7 @@ pub use chance::{DRAWS, PoseDraws};
 pub use coverage::{Coverage, CoverageGap, CoverageSample, MAX_STEPS, coverage};
 pub use obstacle::Obstacle;
 pub use outline::Polygon;
+pub(crate) use outline::distance_to_segment;
 pub use settings::{PanTiltCamera, VisibilityParams, VisibilitySettings};
 
 #[cfg(test)]

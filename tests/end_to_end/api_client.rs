@@ -8,8 +8,8 @@ use client::{
         Distance, FusionModeBody, GazeQueryBody, JobState, LandmarkHealthBody, LandmarkPatch, LandmarkStatus,
         LiveEventBody, MapPatch, MappingStageBody, ModalityBody, ModalityMapPatch, ModalityQuery,
         NewGatheringBody, NewMap, NewMapping, Parent, Place, PoseBody, ReferenceTrajectoryBody, Size,
-        TransformQuery, UploadOutcomeBody, UploadedView, UploadedViews, VisibilitySettingsBody,
-        VisibleRequest, WallsBody,
+        TopologyQuery, TransformQuery, UploadOutcomeBody, UploadedView, UploadedViews,
+        VisibilitySettingsBody, VisibleRequest, WallsBody,
     },
     http::operations,
 };
@@ -92,6 +92,8 @@ async fn maps_are_stored_with_all_their_fields() {
     let patch = MapPatch { site: Some(Some("Works / 1".into())), parent: Some(None), ..MapPatch::default() };
     let attic = maps.locate_map("attic", &patch).await.expect("located");
     assert_eq!((attic.site.as_deref(), &attic.parent), (Some("Works / 1"), &None));
+    let site = maps.site_topology("Works / 1", &TopologyQuery::default()).await.expect("topology");
+    assert_eq!((site.maps.len(), site.places.len()), (1, 0));
     assert_eq!(maps.map("attic").await.expect("map"), attic);
     maps.delete_map("attic").await.expect("deleted");
     assert_eq!(code(maps.map("attic").await), "unknown_map");

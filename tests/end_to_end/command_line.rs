@@ -14,7 +14,7 @@ const SERVER: &[&str] = &["--server", "--token", "--json"];
 const MAP: &[&str] = &["--map", "--server", "--token", "--json"];
 
 /// Options that each command must name in its help, beside those of its group.
-const OPTIONS: [(&str, &[&str], &[&str]); 62] = [
+const OPTIONS: [(&str, &[&str], &[&str]); 64] = [
     ("", &[], &["--log", "--version", "Exit status"]),
     ("demo", &[], &["--robots", "--rate-hz", "--legs", "--seed", "--http", "--data", "--stay", "--json"]),
     ("sample", &[], &["<FOLDER>"]),
@@ -35,7 +35,7 @@ const OPTIONS: [(&str, &[&str], &[&str]); 62] = [
             "--min-support",
             "--min-score",
             "--nested",
-            "--no-three-sided",
+            "--three-sided",
             "--remove-tiling",
             "--set",
             "[IMAGES]",
@@ -100,6 +100,8 @@ const OPTIONS: [(&str, &[&str], &[&str]); 62] = [
     ("map save", SERVER, &["<MAP>", "<FILE>"]),
     ("map load", SERVER, &["<FILE>", "--name", "--no-map-link"]),
     ("map walls", SERVER, &["<MAP>", "--draw"]),
+    ("site places", SERVER, &["<SITE>"]),
+    ("site route", SERVER, &["<SITE>", "<FROM>", "<TO>"]),
     ("map export", SERVER, &["<MAP>", "--out", "--resolution-m"]),
     ("map convert", &[], &["<FILE>", "--out", "--metres-per-unit", "--picture", "--json"]),
     (

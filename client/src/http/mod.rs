@@ -31,6 +31,7 @@ mod tls;
 mod server_events;
 mod stored_answers;
 mod tokens;
+mod topology;
 mod underlay;
 mod views;
 mod visibility;
@@ -74,6 +75,7 @@ pub fn operations() -> impl Iterator<Item = &'static Operation> {
         server_events::OPERATIONS,
         stored_answers::OPERATIONS,
         tokens::OPERATIONS,
+        topology::OPERATIONS,
         underlay::OPERATIONS,
         views::OPERATIONS,
         visibility::OPERATIONS,

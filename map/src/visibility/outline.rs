@@ -72,7 +72,7 @@ impl Polygon {
 }
 
 /// Distance of `q` to the segment from `a` to `b`.
-pub(super) fn distance_to_segment(q: &Point2<f64>, a: &Point2<f64>, b: &Point2<f64>) -> f64 {
+pub(crate) fn distance_to_segment(q: &Point2<f64>, a: &Point2<f64>, b: &Point2<f64>) -> f64 {
     let (d, to) = (b - a, q - a);
     let along = (d.dot(&to) / d.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
     (to - d * along).norm()

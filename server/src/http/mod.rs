@@ -61,6 +61,7 @@ mod security;
 mod servers;
 mod stored_answers;
 mod tokens;
+mod topology;
 mod underlay;
 mod upload;
 mod views;

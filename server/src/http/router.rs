@@ -11,7 +11,7 @@ use super::{
     metrics, modalities, page_session, pages, pose_by_hand, recognise, reference_runs, refused_views,
     relocalisation, replay, reused_answers, revision, robot_activity, robot_certificates, robots, ros2,
     security::with_security,
-    servers, stored_answers, tokens, underlay, views, visibility, visibility_settings, walls,
+    servers, stored_answers, tokens, topology, underlay, views, visibility, visibility_settings, walls,
 };
 use crate::config::Limits;
 use axum::{
@@ -66,6 +66,7 @@ fn api(limits: &Limits) -> OpenApiRouter<AppState> {
         .merge(learning::router())
         .merge(gathering::router())
         .merge(visibility::router())
+        .merge(topology::router())
         .merge(modalities::router())
         .merge(reference_runs::router())
         .merge(visibility_settings::router())

@@ -15,6 +15,7 @@ mod revision;
 mod refused_views;
 mod stored_answers;
 mod teaching;
+mod topology;
 mod uploads;
 
 use super::*;

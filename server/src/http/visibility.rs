@@ -45,7 +45,7 @@ async fn snapshot(app: &AppState, map: &str) -> Result<Arc<MapSnapshot>, ApiErro
     app.store.snapshots().with_visibility(map).await.ok_or_else(gone)
 }
 
-fn name_of(map: &MapSnapshot, id: LandmarkId) -> String {
+pub(super) fn name_of(map: &MapSnapshot, id: LandmarkId) -> String {
     map.landmarks.get(&id).map(|l| l.name.clone()).unwrap_or_default()
 }
 

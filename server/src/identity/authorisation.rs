@@ -99,6 +99,7 @@ pub(crate) const TABLE: &[Rule] = &[
     map("GET", "/maps/{map}/bundle", Teacher),
     server("POST", "/bundles", Operator),
     map("GET", "/maps/{map}/transform", Viewer),
+    own("GET", "/sites/{site}/topology", Viewer),
     map("GET", "/maps/{map}/walls", Viewer),
     map("PUT", "/maps/{map}/walls", Teacher),
     map("POST", "/maps/{map}/walls/read", Teacher),

@@ -6,12 +6,13 @@ use crate::{detect::params::Grouping, params::Params};
 /// 7): 0.6 and 0.7 find no more quads within the noise and more false ones; 0.8 finds fewer.
 const MIN_SCORE: f64 = 0.75;
 
-/// Relaxation over all six cues with G as printed, floor tiling removed, icons compared by the
-/// distances alone, at the detected corners, by the tau of least cost. What the pages of the method list as departures
-/// without a parameter is as in the defaults.
+/// Relaxation over all six cues with G as printed, sets of three sides, floor tiling removed, icons
+/// compared by the distances alone, at the detected corners, by the tau of least cost. What the
+/// pages of the method list as departures without a parameter is as in the defaults.
 pub(crate) fn params() -> Params {
     let mut p = Params::default();
     p.detect.quads.grouping = Grouping::Relaxation;
+    p.detect.quads.three_sided = true;
     p.detect.similarity.weights = [1.0 / 6.0; 6];
     p.detect.similarity.min_score = MIN_SCORE;
     p.detect.relaxation.linear_weight = 0.0;
@@ -26,6 +27,7 @@ pub(crate) fn params() -> Params {
 pub(crate) fn choose(p: &mut Params, preset: Params) {
     let Params { detect, recognise, learn, .. } = preset;
     p.detect.quads.grouping = detect.quads.grouping;
+    p.detect.quads.three_sided = detect.quads.three_sided;
     p.detect.similarity.weights = detect.similarity.weights;
     p.detect.similarity.min_score = detect.similarity.min_score;
     p.detect.relaxation.linear_weight = detect.relaxation.linear_weight;

@@ -32,6 +32,7 @@ export type RobotInput = Schemas["RobotInput"];
 export type Role = Schemas["Role"];
 export type ServerEvent = Schemas["ServerEvent"];
 export type Servers = Schemas["Servers"];
+export type SiteTopology = Schemas["SiteTopologyBody"];
 export type Size = Schemas["Size"];
 export type StorageHealth = Schemas["StorageHealth"];
 export type StoredAnswerSummary = Schemas["StoredAnswerSummary"];

@@ -255,6 +255,20 @@ test("walls are made of a robot's scans, or the drive is given up", async () => 
   assert.deepEqual(page.faults, []);
 });
 
+test("two clicks on a map of a site give a route through its places", async () => {
+  await api("PATCH", `/maps/${MAP}`, { site: "Works" }, { "if-match": "*" });
+  const page = await go(`/maps/${MAP}`);
+  await page.getByRole("button", { name: "Route", exact: true }).click();
+  await page.getByText(/\d+ places?, \d+ passages?\./).waitFor();
+  const box = await page.getByRole("application").boundingBox();
+  await page.mouse.click(box.x + box.width / 3, box.y + box.height / 2);
+  await page.getByText("Now click where the route ends.").waitFor();
+  await page.waitForTimeout(400); // two clicks that follow fast are one double click, which zooms
+  await page.mouse.click(box.x + (3 * box.width) / 4, box.y + box.height / 2);
+  await page.getByRole("list", { name: "Route" }).getByText(new RegExp(`Through ${MAP}/\\d+`)).first().waitFor();
+  await check(page, "route");
+});
+
 test("a map is saved as a file and loaded under another name", async () => {
   const page = await go(`/maps/${MAP}/settings`);
   const [download] = await Promise.all([page.waitForEvent("download"), page.getByRole("link", { name: "Export map" }).click()]);

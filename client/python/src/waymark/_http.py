@@ -105,6 +105,7 @@ OPERATIONS: dict[str, tuple[str, str]] = {
     "locate_map": ("PATCH", "/maps/{map}"),
     "delete_map": ("DELETE", "/maps/{map}"),
     "transform": ("GET", "/maps/{map}/transform"),
+    "site_topology": ("GET", "/sites/{site}/topology"),
     "modalities": ("GET", "/maps/{map}/modalities"),
     "set_modalities": ("PUT", "/maps/{map}/modalities"),
     "modalities_at": ("GET", "/maps/{map}/modalities/at"),

@@ -49,6 +49,8 @@ pub(crate) struct ImageFigures {
     pub(crate) false_quads: usize,
     pub(crate) reviewed_quads: usize,
     pub(crate) images_complete: usize,
+    /// Sets of three sides, and those of them on no labelled quad.
+    pub(crate) three_sided: [usize; 2],
     /// Median processor time of one thread.
     pub(crate) ms_per_image: f64,
     pub(crate) ms_per_image_90: f64,
@@ -246,6 +248,7 @@ impl ImageFigures {
             false_quads,
             reviewed_quads: false_quads - left,
             images_complete: complete.len(),
+            three_sided: [0, 1].map(|i| scores.iter().map(|s| s.three_sided[i]).sum()),
             ms_per_image: median(&mut ms).unwrap_or(0.0),
             ms_per_image_90: quantile(&mut ms, MOST).unwrap_or(0.0),
             ms_per_image_interval: bootstrap(&ms, |drawn| {
@@ -288,6 +291,7 @@ pub(super) mod tests {
             labels,
             found: vec![],
             false_quads: Some(reviewed.iter().copied().map(quad).collect()),
+            three_sided: [3, 2],
             ms: 2.0,
         }
     }

@@ -61,6 +61,8 @@ pub(crate) struct ImageScore {
     pub(crate) found: Vec<Corners>,
     /// None where the labels are not complete.
     pub(crate) false_quads: Option<Vec<FalseQuad>>,
+    /// Sets of three sides, and those of them on no labelled quad.
+    pub(crate) three_sided: [usize; 2],
     /// Processor time of one thread.
     pub(crate) ms: f64,
 }
@@ -99,8 +101,9 @@ pub(crate) fn score<'a>(
     let clock = Clock::start();
     let mut found = detect(picture, params, &mut NoTrace);
     let ms = clock.ms();
-    // Three-sided sets are for topology only: they neither find nor falsify a quad.
-    found.retain(|quad| quad.kind == QuadKind::Full);
+    // Three-sided sets neither find nor falsify a quad.
+    let open: Vec<Quad> = found.extract_if(.., |quad| quad.kind != QuadKind::Full).collect();
+    let astray = open.iter().filter(|q| !is_real(&q.corners_px, image)).count();
     let counts = |l: &&TruthQuad| l.counted && l.corners.min_side_px() >= min_side_px;
     let false_quads = image.quads_complete.then(|| {
         let is_false = |q: &&Quad| !is_real(&q.corners_px, image);
@@ -117,6 +120,7 @@ pub(crate) fn score<'a>(
             .collect(),
         found: found.iter().map(|q| q.corners_px).collect(),
         false_quads,
+        three_sided: [open.len(), astray],
         ms,
     }
 }
@@ -245,6 +249,19 @@ pub(super) mod tests {
         let small =
             scored(&image(vec![labelled(at(BRIGHT), true), labelled(at(DARK), true)], vec![]), 70.0, &[]);
         assert_eq!((small.labels.len(), small.false_left()), (1, 0));
+    }
+
+    #[test]
+    fn sets_of_three_sides_are_counted_apart() {
+        // A door to the lower border of the picture, and the same without a label.
+        let door =
+            GrayImage::from_fn(320, 240, |u, v| if (100..180).contains(&u) && v >= 60 { 40 } else { 200 });
+        let mut params = DetectParams::default();
+        params.quads.three_sided = true;
+        let of = |quads| score(&image(quads, vec![]), &door, &params, 0.0, &[]).three_sided;
+        assert_eq!(of(vec![labelled(corners(99.5, 59.5, 80.0, 180.0), true)]), [1, 0]);
+        assert_eq!(of(vec![]), [1, 1]);
+        assert_eq!(scored(&image(vec![], vec![]), 0.0, &[]).three_sided, [0, 0]);
     }
 
     #[test]

@@ -102,6 +102,10 @@ fn images(i: &ImageFigures) -> Vec<String> {
             i.reviewed_quads
         ));
     }
+    let [found, astray] = i.three_sided;
+    if found > 0 {
+        lines.push(format!("  sets of three sides        {found}, {astray} of them on no labelled quad"));
+    }
     let interval = i.ms_per_image_interval.map_or(String::new(), |i| format!(" ({:.1}-{:.1})", i.0, i.1));
     lines.push(format!(
         "  time                       {:.1} ms{interval} an image, 90 % below {:.1} ms, one thread",
@@ -131,6 +135,7 @@ mod tests {
             "20 to 30 px",
             "1.000 (0.000-2.000): 2 in 2 images",
             "without reviewed quads  0.500",
+            "sets of three sides        6, 4 of them on no labelled quad",
             "could not be read: 2",
             "worst: bad.png 1 missed, 0 loose, 1 false, corners off by up to 1.2 px",
         ] {

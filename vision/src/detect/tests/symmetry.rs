@@ -60,9 +60,11 @@ fn scene(seed: u64, scale: usize) -> GrayImage {
 }
 
 fn both() -> [DetectParams; 2] {
-    let mut paper = DetectParams::default();
+    let mut search = DetectParams::default();
+    search.quads.three_sided = true;
+    let mut paper = search.clone();
     paper.quads.grouping = Grouping::Relaxation;
-    [DetectParams::default(), paper]
+    [search, paper]
 }
 
 /// Largest distance of a corner from that of the nearest quad of the same kind, under the best

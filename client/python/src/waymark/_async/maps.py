@@ -30,6 +30,7 @@ from waymark.api import (
     Replay,
     RollbackOutcome,
     Servers,
+    SiteTopologyBody,
     TransformResponse,
     Underlay,
     UnderlayPlace,
@@ -217,6 +218,14 @@ class AsyncMaps(AsyncBase):
         """How a map lies in another one, and a pose converted by it."""
         query = {"to": to, **(to_json(pose) if pose is not None else {})}
         return await self._send(TransformResponse, "transform", map, params=query)
+
+    async def site_topology(
+        self, site: str, *, route_from: str | None = None, route_to: str | None = None
+    ) -> SiteTopologyBody:
+        """Places and passages of a site's maps; with both ends, each a place `hall/3` or a point `hall/2.5,-1`, a route
+        with the landmarks to look for."""
+        query = query_of({"from": route_from, "to": route_to})
+        return await self._send(SiteTopologyBody, "site_topology", site, params=query)
 
     async def live_events(self, map: str) -> AsyncLiveEvents:
         """Follows a map. Close the stream, or use it as a context manager."""
