@@ -40,7 +40,7 @@ pub fn ranked(map: &MapSnapshot, query: &GazeQuery) -> Result<Vec<GazeTarget>, O
         .filter_map(|model| {
             let (info, visible) = (map.landmarks.get(&model.id)?, map.visibility.get(&model.id)?);
             let place = info.place.as_ref().filter(|_| info.is_trusted())?;
-            let (saliency, v_c) = (model.saliency, model.v_c);
+            let (saliency, v_c) = (model.saliency, model.v_c_for_gaze());
             Some(GazeCandidate { landmark: model.id, place, visible, saliency, v_c })
         })
         .collect();

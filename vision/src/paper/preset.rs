@@ -7,7 +7,7 @@ use crate::{detect::params::Grouping, params::Params};
 const MIN_SCORE: f64 = 0.75;
 
 /// Relaxation over all six cues with G as printed, floor tiling removed, icons compared by the
-/// distances alone, at the detected corners. What the pages of the method list as departures
+/// distances alone, at the detected corners, all gates refuse. What the pages of the method list as departures
 /// without a parameter is as in the defaults.
 pub(crate) fn params() -> Params {
     let mut p = Params::default();
@@ -18,5 +18,7 @@ pub(crate) fn params() -> Params {
     p.detect.tiling.remove = true;
     p.recognise.verdict.points = false;
     p.recognise.verdict.verify_reach = 0.0;
+    p.learn.gates.refuse_one_side = true;
+    p.learn.gates.refuse_few_points = true;
     p
 }
