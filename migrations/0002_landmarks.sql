@@ -39,8 +39,10 @@ CREATE TABLE landmarks (
     -- not a table, because only the present health is acted on.
     health           TEXT    NOT NULL DEFAULT 'sound' CHECK (health IN ('sound', 'flagged', 'quarantined')),
     finding          TEXT,
+    -- JSON: weights and gates of its own, with the reason; NULL: those of the server.
+    learning         TEXT    CHECK (length(learning) <= 1024),
     created_ms       INTEGER NOT NULL,
-    -- Of name, size, place, views and model. A person's word on the health comes with an update of size and place.
+    -- Of name, size, place, views, learning and model. A person's word on the health comes with an update of size and place.
     revision         INTEGER NOT NULL DEFAULT 1 CHECK (revision >= 1),
     changed_ms       INTEGER NOT NULL DEFAULT 0,
     CHECK ((width_m IS NULL) = (height_m IS NULL)),

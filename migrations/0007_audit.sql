@@ -41,6 +41,8 @@ CREATE TABLE audit (
     target  TEXT    NOT NULL CHECK (length(target) <= 512),
     -- Id of the request, as in the log and in its answer.
     request TEXT    CHECK (length(request) <= 64),
+    -- The reason that was given.
+    why     TEXT    CHECK (length(why) BETWEEN 1 AND 200),
     -- Over the digest before and every other column.
     sha256  BLOB    NOT NULL CHECK (length(sha256) = 32)
 ) STRICT;

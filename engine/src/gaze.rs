@@ -37,7 +37,7 @@ pub fn candidates(map: &MapSnapshot) -> Vec<GazeCandidate<'_>> {
     let candidate = |model: &LandmarkModel| {
         let (info, visible) = (map.landmarks.get(&model.id)?, map.visibility.get(&model.id)?);
         let place = info.place.as_ref().filter(|_| info.is_trusted())?;
-        let (saliency, v_c) = (model.saliency, model.v_c);
+        let (saliency, v_c) = (model.saliency, model.v_c_for_gaze());
         Some(GazeCandidate { landmark: model.id, place, visible, saliency, v_c })
     };
     map.models.iter().filter_map(|model| candidate(model)).collect()

@@ -5,7 +5,7 @@ use protos::api::{FailedGate, GateBody, LookAlikeBody};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
-use vision::model::{Gate, GateFailure, LandmarkId, ThresholdError};
+use vision::model::{Gate, GateFailure, LandmarkId, SeenFrom, ThresholdError};
 
 /// A look-alike as it is stored. Its name is that of the time of learning; the number is what
 /// holds.
@@ -133,7 +133,7 @@ fn of_failure(failure: &GateFailure, about: &Evidence) -> FailedGate {
             "Inside its frame there is so little that a blank board would look the same.",
             "Choose something with a picture on it.",
         ),
-        Gate::VisibilityConfidence => seen_from_one_side(about.angle_rad),
+        Gate::VisibilityConfidence(from) => seen_from_one_side(*from, about.angle_rad),
         Gate::CorrelationThreshold(error)
         | Gate::HausdorffThreshold(error)
         | Gate::LikenessThreshold(error) => without_threshold(*error, about.look_alike.as_ref()),
@@ -150,7 +150,8 @@ fn refused(refusal: &Refusal) -> FailedGate {
     FailedGate { look_alike: Some(other.clone()), ..failed(GateBody::LooksLike, sentence, advice) }
 }
 
-fn seen_from_one_side(angle_rad: Option<[f64; 2]>) -> FailedGate {
+/// 40 degrees beside a view from the front pass the gate.
+fn seen_from_one_side(from: SeenFrom, angle_rad: Option<[f64; 2]>) -> FailedGate {
     let gate = GateBody::VisibilityConfidence;
     match angle_rad.map(|range| range.map(|a| a.to_degrees().round())) {
         Some([least, most]) if least < most => {
@@ -160,11 +161,19 @@ fn seen_from_one_side(angle_rad: Option<[f64; 2]>) -> FailedGate {
         Some([only, _]) => {
             failed(gate, format!("Seen only from {only:.0} degrees."), "Drive past from the other side.")
         }
-        None => failed(
-            gate,
-            "All its pictures are from about the same side and distance.",
-            "Photograph it from the other side, too, and from nearer.",
-        ),
+        None => {
+            let (seen, missing) = match from {
+                SeenFrom::Front => ("the front", "the left or the right"),
+                SeenFrom::Left => ("the left", "the right"),
+                SeenFrom::Right => ("the right", "the left"),
+            };
+            let sentence = format!("Seen from one side: all its photographs are from {seen}.");
+            failed(
+                gate,
+                sentence,
+                &format!("Photograph it from {missing}, too, about 40 degrees off its front."),
+            )
+        }
     }
 }
 
@@ -270,19 +279,33 @@ mod tests {
     fn views_from_one_side_are_told_with_their_angles() {
         let words = |angle_rad| {
             let about = Evidence { angle_rad, ..Evidence::default() };
-            in_words(&[failure(Gate::VisibilityConfidence)], &about)[0].to_string()
+            in_words(&[failure(Gate::VisibilityConfidence(SeenFrom::Front))], &about)[0].to_string()
         };
         let range = [62.2_f64, 63.6].map(f64::to_radians);
         assert_eq!(words(Some(range)), "Seen only from 62-64 degrees. Drive past from the other side.");
         assert!(words(Some([range[0]; 2])).starts_with("Seen only from 62 degrees."));
-        assert!(words(None).starts_with("All its pictures are from about the same side"));
+        let without_angles = [
+            (SeenFrom::Front, "from the front. Photograph it from the left or the right, too, about 40"),
+            (SeenFrom::Left, "from the left. Photograph it from the right, too, about 40"),
+            (SeenFrom::Right, "from the right. Photograph it from the left, too, about 40"),
+        ];
+        for (from, missing) in without_angles {
+            let failure = failure(Gate::VisibilityConfidence(from));
+            let said = in_words(&[failure], &Evidence::default())[0].to_string();
+            assert_eq!(
+                said,
+                format!("Seen from one side: all its photographs are {missing} degrees off its front.")
+            );
+        }
     }
 
     #[test]
     fn gates_are_stored_and_read() {
-        let all = [Gate::Saliency, Gate::LikenessThreshold(ThresholdError::Overlap)].map(failure);
+        let all =
+            [Gate::VisibilityConfidence(SeenFrom::Left), Gate::LikenessThreshold(ThresholdError::Overlap)];
+        let all = all.map(failure);
         assert_eq!(from_stored(&stored(&all)), all);
-        let unknown = stored(&all).replace("saliency", "unheard_of");
+        let unknown = stored(&all).replace("visibility_confidence", "unheard_of");
         assert_eq!(from_stored(&unknown), all[1..]);
     }
 

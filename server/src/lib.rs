@@ -19,6 +19,7 @@ mod store;
 mod bundle;
 mod publication;
 mod failed_gates;
+mod learning_rules;
 mod recording_answers;
 mod localise_body;
 mod jobs;

@@ -2,7 +2,10 @@
 //! was learnt of the landmark.
 
 use client::{
-    api::{AnswerStatus, DuplicateQuery, NewMap, NumberOrder, PriorSource, StoredAnswerQuery, ViewQuery},
+    api::{
+        AnswerStatus, DuplicateQuery, LandmarkModelQuery, ModelPictureQuery, NewMap, NumberOrder,
+        PriorSource, StoredAnswerQuery, ViewQuery,
+    },
     v1::Verdict,
 };
 use server::config::Limits;
@@ -49,7 +52,10 @@ async fn an_answer_is_opened_again_with_what_it_rests_on() {
     let agreeing = matched.matches.iter().filter(|m| m.agrees).count();
     assert!(matched.landmark == "poster-0" && agreeing >= 8 && matched.matches.len() <= 100, "{matched:?}");
     let quad_icon = maps.stored_quad_icon(summary.id, quad).await.expect("its icon");
-    let landmark_icon = maps.landmark_icon(MAP, "poster-0").await.expect("the icon of the landmark");
+    let landmark_icon = maps
+        .landmark_icon(MAP, "poster-0", ModelPictureQuery::default())
+        .await
+        .expect("the icon of the landmark");
     for icon in [&quad_icon, &landmark_icon] {
         let icon = image::load_from_memory(icon).expect("a picture");
         assert_eq!((icon.width(), icon.height()), (75, 75));
@@ -75,8 +81,12 @@ async fn an_answer_is_opened_again_with_what_it_rests_on() {
     assert!(check.source == PriorSource::Server && !check.refused && check.seen.is_some(), "{check:?}");
     assert!(check.distance2.is_some_and(|d2| d2 < check.limit), "{check:?}");
 
-    let model = maps.landmark_model(MAP, "poster-0").await.expect("the model");
+    let model = maps
+        .landmark_model(MAP, "poster-0", LandmarkModelQuery { harris: Some(true) })
+        .await
+        .expect("the model");
     assert!(model.in_use && model.correlation.threshold > 0.0 && !model.keypoints.is_empty(), "{model:?}");
+    assert_eq!(model.harris.len(), model.exemplars);
     let distances = maps.landmark_distances(MAP, "poster-0").await.expect("distances");
     assert!(distances.correlation.own.iter().sum::<u32>() > 0, "{distances:?}");
     assert_eq!(maps.duplicates(MAP, &DuplicateQuery::default()).await.expect("pairs").total, 0);

@@ -116,7 +116,8 @@ pub(super) async fn one(session: &Session, map: &str, name: &str) -> anyhow::Res
 /// State, views, size, place and health, and why it is not in use.
 pub(super) fn text(landmark: &Landmark) -> String {
     let reasons = reasons::lines(landmark).into_iter().map(|line| format!("  why     {line}"));
-    std::iter::once(facts(landmark)).chain(reasons).collect::<Vec<_>>().join("\n")
+    let waived = landmark.waived_gates.iter().map(|gate| format!("  but     {gate}"));
+    std::iter::once(facts(landmark)).chain(reasons).chain(waived).collect::<Vec<_>>().join("\n")
 }
 
 /// State, views, size, place and health in lines.
@@ -222,7 +223,8 @@ mod tests {
     fn landmark() -> Landmark {
         serde_json::from_str(
             r#"{"name":"poster","status":"inactive","views":2,"size":{"width_m":0.6,"height_m":0.84},"place":null,
-                "model":null,"health":"flagged","finding":{"kind":"missing","missed_frames":6},"failed_gates":[
+                "model":null,"health":"flagged","finding":{"kind":"missing","missed_frames":6},
+                "waived_gates":[{"gate":"visibility_confidence","sentence":"Seen from one side.","advice":"Go."}],"failed_gates":[
                 {"gate":"looks_like","sentence":"It looks like `first` (97 %).","advice":"Delete one.",
                  "look_alike":{"landmark":"first","gradient_similarity":0.97}}]}"#,
         )
@@ -234,7 +236,8 @@ mod tests {
         let lines = text(&landmark());
         assert!(lines.starts_with("poster: not in use, 2 training views\n  size    0.6 x 0.84 m"), "{lines}");
         assert!(lines.contains("flagged: not found in 6 frames in a row"), "{lines}");
-        assert!(lines.ends_with("  why     It looks like `first` (97 %). Delete one."), "{lines}");
+        let why = "  why     It looks like `first` (97 %). Delete one.\n  but     Seen from one side. Go.";
+        assert!(lines.ends_with(why), "{lines}");
         assert!(!facts(&landmark()).contains("why"), "{lines}");
     }
 

@@ -3,7 +3,8 @@
 use super::{map_client::MapClient, operation::operations};
 use crate::ClientError;
 use protos::api::{
-    DuplicatePair, DuplicateQuery, LandmarkDistances, LandmarkEvidence, LandmarkModelDetail, Page,
+    DuplicatePair, DuplicateQuery, LandmarkDistances, LandmarkEvidence, LandmarkModelDetail,
+    LandmarkModelQuery, ModelPictureQuery, Page,
 };
 
 operations! {
@@ -15,14 +16,15 @@ operations! {
 }
 
 impl MapClient {
-    /// Thresholds, keypoints, points and sizes of a landmark's model. Refused with `not_learnt` if
-    /// there is none.
+    /// Thresholds, keypoints, points and sizes of a landmark's model, and on request the Harris
+    /// points of its icons with descriptors. Refused with `not_learnt` if there is none.
     pub async fn landmark_model(
         &self,
         map: &str,
         landmark: &str,
+        query: LandmarkModelQuery,
     ) -> Result<LandmarkModelDetail, ClientError> {
-        self.send(self.ask(&MODEL, &[&map, &landmark])?).await
+        self.send(self.ask_query(&MODEL, &[&map, &landmark], &query)?).await
     }
 
     /// Histograms of the distances that its thresholds were fitted to.
@@ -43,9 +45,14 @@ impl MapClient {
         self.send(self.ask(&EVIDENCE, &[&map, &landmark])?).await
     }
 
-    /// The learnt icon that is nearest to the mean of its views: PNG.
-    pub async fn landmark_icon(&self, map: &str, landmark: &str) -> Result<Vec<u8>, ClientError> {
-        self.bytes(self.ask(&ICON, &[&map, &landmark])?).await
+    /// A learnt icon, the mean of the views, or a mode: PNG.
+    pub async fn landmark_icon(
+        &self,
+        map: &str,
+        landmark: &str,
+        query: ModelPictureQuery,
+    ) -> Result<Vec<u8>, ClientError> {
+        self.bytes(self.ask_query(&ICON, &[&map, &landmark], &query)?).await
     }
 
     /// A page of the pairs of landmarks that look alike.

@@ -43,9 +43,11 @@ pub fn look_alike_classes(
     if kind != DistanceKind::Both {
         return LookAlikeClasses::default();
     }
-    let limited = learnt.values().map(|l| &l.model).filter(|m| has_look_alikes(m)).take(MAX_LOOK_ALIKES);
-    let lifted: Vec<_> =
-        limited.map(|model| Arc::new(refit_thresholds(model, &[], p))).filter(|m| m.is_active()).collect();
+    let limited = learnt.values().filter(|l| has_look_alikes(&l.model)).take(MAX_LOOK_ALIKES);
+    let lifted: Vec<_> = limited
+        .map(|l| Arc::new(refit_thresholds(&l.model, &[], &l.rules.over(p))))
+        .filter(|m| m.is_active())
+        .collect();
     let classes = connected(&lifted, p);
     let mut by_icons = p.clone();
     by_icons.recognise.verdict.points = false;

@@ -14,6 +14,7 @@ use map::{
 };
 use std::{collections::BTreeMap, f64::consts::FRAC_PI_4, sync::Arc};
 use vision::{
+    learn::LearnRules,
     model::{LandmarkId, ModelSet},
     params::{Params, preset::Preset},
     pose::LandmarkSize,
@@ -154,6 +155,8 @@ pub struct LandmarkInfo {
     /// Revision of the stored row and time of its last edit, ms since the Unix epoch: an equal pair
     /// and an equal health mean an equal row.
     pub stored: (i64, i64),
+    /// Its own weights and gates.
+    pub rules: LearnRules,
 }
 
 impl LandmarkInfo {

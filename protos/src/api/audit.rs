@@ -40,6 +40,8 @@ pub struct AuditEntry {
     pub target: String,
     /// Id of the request, as in the log of the server.
     pub request: Option<String>,
+    /// The reason that was given.
+    pub why: Option<String>,
     /// Digest of this entry and of all before it: SHA-256, hexadecimal.
     pub sha256: String,
 }

@@ -34,6 +34,80 @@ pub struct ThresholdBody {
     pub limited_by: ThresholdLimit,
 }
 
+/// Costs that thresholds of the correlation and the Hausdorff distance weigh.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct ThresholdWeights {
+    /// Of a wrong acceptance.
+    pub lambda: f64,
+    /// Of a refused own view.
+    pub mu: f64,
+}
+
+/// A Harris point of an exemplar with its descriptor.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct HarrisPoint {
+    /// To the right, in icon pixels.
+    pub x_px: f32,
+    /// Downwards, in icon pixels.
+    pub y_px: f32,
+    /// Harris response, grey levels to the fourth.
+    pub response: f32,
+    /// The seven components of the 7-jet, whitened: differences are in standard deviations.
+    pub jet: [f32; 7],
+}
+
+/// Harris points of an exemplar.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct HarrisSet {
+    /// Which exemplar, from 1.
+    pub exemplar: usize,
+    /// At most 60, by falling response.
+    pub points: Vec<HarrisPoint>,
+}
+
+/// What is read of a model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::IntoParams))]
+#[serde(deny_unknown_fields)]
+#[cfg_attr(feature = "openapi", into_params(parameter_in = Query))]
+pub struct LandmarkModelQuery {
+    /// `true` adds `harris`.
+    pub harris: Option<bool>,
+}
+
+/// A stored picture of a model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+#[serde(rename_all = "snake_case")]
+pub enum ModelPicture {
+    /// The real icon nearest to the mean.
+    #[default]
+    Exemplar1,
+    /// The real icon nearest to the first mode.
+    Exemplar2,
+    /// The real icon nearest to the second mode.
+    Exemplar3,
+    /// The mean of the views.
+    Mean,
+    /// The first mode: 128 is 0, and the largest entry is at 1 or 255.
+    Mode1,
+    /// The second mode.
+    Mode2,
+}
+
+/// Which picture of a model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::IntoParams))]
+#[serde(deny_unknown_fields)]
+#[cfg_attr(feature = "openapi", into_params(parameter_in = Query))]
+pub struct ModelPictureQuery {
+    /// `exemplar1` by default.
+    pub which: Option<ModelPicture>,
+}
+
 /// A Harris point of the mean icon.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
@@ -94,19 +168,25 @@ pub struct LandmarkModelDetail {
     pub bits_per_point: u32,
     /// Share of the variance of the views that the leading modes explain, 0 to 1 each, falling.
     pub mode_shares: Vec<f64>,
+    /// Harris points of each exemplar with their descriptors, where they are asked for.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub harris: Vec<HarrisSet>,
     /// Threshold of the correlation distance, 0 to 2.
     pub correlation: ThresholdBody,
     /// Threshold of the Hausdorff distance.
     pub hausdorff: ThresholdBody,
-    /// Threshold of 1 minus the gradient similarity.
+    /// What these two weigh.
+    pub weights: ThresholdWeights,
+    /// Threshold of 1 minus the gradient similarity: its cap, or a share of the nearest negative.
     pub gradient_dissimilarity: ThresholdBody,
     /// Saliency, 0 to 1.
     pub saliency: f64,
     /// Keypoints of the mean icon that are found in the other views, too.
     pub stable_points: usize,
-    /// Spread of the viewpoints of all views (visibility confidence), 0 to 10.
+    /// Spread of the viewpoints of all views, generated ones included, 0 to 10. No gate takes it.
     pub visibility_confidence: f64,
-    /// The same of photographed views only; 0 with fewer than two.
+    /// The same of photographed views only; 0 with fewer than two. The gate and the choice of gaze
+    /// take this one.
     pub photographed_visibility_confidence: f64,
     /// Memory in use.
     pub memory: Vec<MemoryPart>,

@@ -170,6 +170,37 @@ pub struct LandmarkModelBody {
     pub facts: serde_json::Map<String, Value>,
 }
 
+/// Weights and gates of one landmark, where a person wants others than the server has. What is
+/// absent is as there.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+#[serde(deny_unknown_fields)]
+pub struct LearningSettings {
+    /// Why: one line of 1 to 200 characters. The history of the map has it, too.
+    pub reason: String,
+    /// Cost of a wrong acceptance, 0.1 to 1000, where a refused own view costs 1 (lambda : mu).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub false_positive_weight: Option<f64>,
+    /// Fewest views, 1 to 200.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub min_views: Option<usize>,
+    /// Least saliency F, 0 to 1000.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub min_saliency_f: Option<f64>,
+    /// Fewest stable points, 0 to 60.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub min_stable_points: Option<usize>,
+    /// Least visibility confidence of its photographs, 0 to 10.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub min_visibility_confidence: Option<f64>,
+    /// Whether a smaller visibility confidence keeps it out of use.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub refuse_one_side: Option<bool>,
+    /// It is used whatever its measured gates say. Without a threshold it is still not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub use_despite_gates: Option<bool>,
+}
+
 /// How far a landmark is trusted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
@@ -231,6 +262,11 @@ pub struct Landmark {
     pub status: LandmarkStatus,
     /// Why it is not matched; empty unless it is inactive.
     pub failed_gates: Vec<FailedGate>,
+    /// Gates that it does not pass and that do not keep it from being matched.
+    pub waived_gates: Vec<FailedGate>,
+    /// Its own weights and gates, if a person has set some.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub learning: Option<LearningSettings>,
     /// Real views stored.
     pub views: u64,
     /// Width and height, if measured.
@@ -286,6 +322,14 @@ pub struct LandmarkPatch {
     )]
     #[cfg_attr(feature = "openapi", schema(value_type = Option<Place>))]
     pub place: Option<Option<Place>>,
+    /// Weights and gates.
+    #[serde(
+        default,
+        deserialize_with = "super::patch::null_or_value",
+        skip_serializing_if = "Option::is_none"
+    )]
+    #[cfg_attr(feature = "openapi", schema(value_type = Option<LearningSettings>))]
+    pub learning: Option<Option<LearningSettings>>,
     /// A person's decision; a new size or place is sound by itself.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub health: Option<LandmarkHealthBody>,

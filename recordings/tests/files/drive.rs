@@ -126,7 +126,7 @@ fn answer(frame: &v1::Frame, fix: v1::Pose2Covariance) -> v1::Answer {
 /// The landmark of the map.
 pub(crate) fn landmark() -> Landmark {
     serde_json::from_value(serde_json::json!({
-        "name": "poster", "status": "active", "failed_gates": [], "views": 3,
+        "name": "poster", "status": "active", "failed_gates": [], "waived_gates": [], "views": 3,
         "size": { "width_m": 0.6, "height_m": 0.84 },
         "place": { "x_m": 1.0, "y_m": 2.0, "z_m": 1.5, "theta_rad": -std::f64::consts::FRAC_PI_2 },
         "health": "sound",

@@ -1,15 +1,18 @@
 //! Files of a bundle about what is recognised: `landmarks.json`, `views.json`, `distractors.json`.
 
 use super::{BundleError, LANDMARKS, invalid, map_records::parsed};
-use crate::store::{
-    contents::{CropContents, LandmarkContents, ModelContents, ViewContents},
-    landmark_placement::StoredCapture,
-    landmarks::{LandmarkGeometry, ModelSummary, StoredPlace},
-    pictures::hex,
+use crate::{
+    learning_rules,
+    store::{
+        contents::{CropContents, LandmarkContents, ModelContents, ViewContents},
+        landmark_placement::StoredCapture,
+        landmarks::{LandmarkGeometry, ModelSummary, StoredPlace},
+        pictures::hex,
+    },
 };
 use map::landmark_health::LandmarkHealth;
 use nalgebra::Matrix6;
-use protos::Name;
+use protos::{Name, api::LearningSettings};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use vision::{
@@ -36,6 +39,8 @@ pub(super) struct LandmarkRecord {
     pub(super) place: Option<PlaceRecord>,
     health: LandmarkHealth,
     finding: Option<Value>,
+    /// Its own weights and gates.
+    learning: Option<LearningSettings>,
     created_ms: i64,
     pub(super) model: Option<ModelRecord>,
 }
@@ -141,6 +146,7 @@ impl LandmarkRecord {
             place,
             health: landmark.health,
             finding: landmark.finding.as_deref().map(parsed).transpose()?,
+            learning: landmark.learning.as_deref().map(parsed).transpose()?,
             created_ms: landmark.created_ms,
             model: model.map(|model| model_record(number, model)).transpose()?,
         })
@@ -162,6 +168,8 @@ impl LandmarkRecord {
         if finding.as_ref().is_some_and(|text| text.len() > MAX_TEXT_BYTES) {
             return Err(at("finding", format!("at most {MAX_TEXT_BYTES} bytes")));
         }
+        let learning = self.learning.map(|own| learning_rules::text(&own)).transpose();
+        let learning = learning.map_err(|(field, why)| at(&format!("learning.{field}"), why))?;
         let model = match self.model {
             None => None,
             Some(record) => {
@@ -179,6 +187,7 @@ impl LandmarkRecord {
             geometry,
             health: self.health,
             finding,
+            learning,
             created_ms: self.created_ms,
             views: Vec::new(),
             model,

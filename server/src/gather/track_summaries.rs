@@ -114,8 +114,14 @@ fn summary(
 /// where there are few.
 fn failed(model: Option<&LandmarkModel>, place: Option<&EstimatedPlace>) -> Vec<FailedGate> {
     let Some(model) = model else { return vec![failed_gates::no_views()] };
-    let ModelStatus::Candidate(failures) = &model.status else { return vec![] };
-    let measured: Vec<GateFailure> = failures.iter().filter(|f| f.gate != Gate::Views).copied().collect();
+    let failures = match &model.status {
+        ModelStatus::Active => &[][..],
+        ModelStatus::Candidate(failures) => failures,
+    };
+    // Nothing is generated yet: views of a drive from one side speak against it.
+    let sides = model.waived.iter().filter(|f| matches!(f.gate, Gate::VisibilityConfidence(_)));
+    let all = failures.iter().chain(sides);
+    let measured: Vec<GateFailure> = all.filter(|f| f.gate != Gate::Views).copied().collect();
     let about = Evidence { angle_rad: place.map(|p| p.angle_rad), ..Evidence::default() };
     failed_gates::in_words(&measured, &about)
 }

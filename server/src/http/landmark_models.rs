@@ -9,13 +9,14 @@ use super::{
     landmarks::shown,
     pictures::{ASK_AGAIN, IfNoneMatch, PictureHead},
 };
-use crate::store::{StoreError, kind::Kind, landmarks, maps, pictures::hex, stored_answers};
+use crate::store::{StoreError, kind::Kind, landmarks, maps, models, pictures::hex, stored_answers};
 use axum::{Json, extract::State, http::StatusCode, response::Response};
 use engine::{picture, snapshot::StoredModel};
 use protos::api::{
-    DistanceHistogram, DuplicatePair, DuplicateQuery, IconKeypoint, Landmark, LandmarkDistances,
-    LandmarkEvidence, LandmarkModelDetail, LandmarkPoint, LandmarkStatus, LookAlikeBody, MemoryPart, Page,
-    Problem, ThresholdBody, ThresholdLimit,
+    DistanceHistogram, DuplicatePair, DuplicateQuery, HarrisPoint, HarrisSet, IconKeypoint, Landmark,
+    LandmarkDistances, LandmarkEvidence, LandmarkModelDetail, LandmarkModelQuery, LandmarkPoint,
+    LandmarkStatus, LookAlikeBody, MemoryPart, ModelPicture, ModelPictureQuery, Page, Problem, ThresholdBody,
+    ThresholdLimit, ThresholdWeights,
 };
 use protos::v1;
 use std::{
@@ -24,10 +25,10 @@ use std::{
 };
 use utoipa_axum::{router::OpenApiRouter, routes};
 use vision::{
-    model::{DistanceSamples, LandmarkId, LandmarkModel, LimitedBy, Threshold},
+    model::{DistanceSamples, LandmarkId, LandmarkModel, LimitedBy, Threshold, components},
     params::Params,
     points::{descriptor::VALUES, taught::TaughtPoint},
-    recognise::LOG10_EPSILON,
+    recognise::{IconFeatures, LOG10_EPSILON},
 };
 
 pub(super) fn router() -> OpenApiRouter<AppState> {
@@ -76,10 +77,20 @@ fn threshold(of: &Threshold) -> ThresholdBody {
     }
 }
 
-fn model_shown(landmark: String, learnt: &Learnt) -> LandmarkModelDetail {
+/// The Harris points of an icon with their descriptors: they follow from the icon, and are computed.
+fn harris_set((index, icon): (usize, &IconFeatures)) -> HarrisSet {
+    let points = &icon.points;
+    let each = points.xy_px().iter().zip(points.responses()).zip(points.descriptors());
+    let points = each.map(|((&[x_px, y_px], &response), &jet)| HarrisPoint { x_px, y_px, response, jet });
+    HarrisSet { exemplar: index + 1, points: points.collect() }
+}
+
+fn model_shown(landmark: String, learnt: &Learnt, with_harris: bool) -> LandmarkModelDetail {
     let (model, params): (&LandmarkModel, _) = (&learnt.stored.model, &learnt.params);
-    let mean = model.exemplars.first().map(|mean| mean.features(&params.recognise));
-    let keypoints = mean.iter().flat_map(|mean| mean.points.xy_px());
+    let icons = if with_harris { &model.exemplars[..] } else { model.exemplars.get(..1).unwrap_or_default() };
+    let icons: Vec<IconFeatures> = icons.iter().map(|icon| icon.features(&params.recognise)).collect();
+    let keypoints = icons.first().into_iter().flat_map(|mean| mean.points.xy_px());
+    let rules = learnt.stored.rules.over(params);
     let total = model.total_variance;
     let mut memory = BTreeMap::<&str, usize>::new();
     for (purpose, bytes) in model.memory_parts() {
@@ -103,6 +114,8 @@ fn model_shown(landmark: String, learnt: &Learnt) -> LandmarkModelDetail {
             .collect(),
         bits_per_point: 2 * VALUES as u32,
         mode_shares: model.eigenvalues.iter().filter(|_| total > 0.0).map(|e| e / total).collect(),
+        harris: icons.iter().enumerate().filter(|_| with_harris).map(harris_set).collect(),
+        weights: ThresholdWeights { lambda: rules.learn.threshold.false_positive_weight, mu: 1.0 },
         correlation: threshold(&model.correlation),
         hausdorff: threshold(&model.hausdorff),
         gradient_dissimilarity: threshold(&model.likeness),
@@ -117,20 +130,22 @@ fn model_shown(landmark: String, learnt: &Learnt) -> LandmarkModelDetail {
     }
 }
 
-/// What was learnt of a landmark: thresholds with their error rates, keypoints, points, saliency,
-/// sizes.
+/// What was learnt of a landmark: thresholds with their error rates and weights, keypoints, points,
+/// saliency, sizes; on request the Harris points of each exemplar with their descriptors.
 #[utoipa::path(get, path = "/maps/{map}/landmarks/{landmark}/model", operation_id = "getLandmarkModel",
     tag = "landmarks",
-    params(("map" = String, Path), ("landmark" = String, Path)),
+    params(("map" = String, Path), ("landmark" = String, Path), LandmarkModelQuery),
     responses((status = 200, body = LandmarkModelDetail),
     (status = 404, body = Problem, description = "unknown_map, unknown_landmark, not_learnt")))]
 async fn model(
     State(app): State<AppState>,
     PathParams((map, landmark)): PathParams<(String, String)>,
+    QueryParams(query): QueryParams<LandmarkModelQuery>,
 ) -> Result<Json<LandmarkModelDetail>, ApiError> {
     let learnt = learnt(&app, &map, &landmark).await?;
-    // The keypoints of the mean icon are computed.
-    let shown = app.on_vision_thread(move |_| model_shown(landmark, &learnt)).await?;
+    // Harris points are computed.
+    let harris = query.harris.unwrap_or_default();
+    let shown = app.on_vision_thread(move |_| model_shown(landmark, &learnt, harris)).await?;
     Ok(Json(shown))
 }
 
@@ -233,25 +248,58 @@ async fn evidence(
     Ok(Json(evidence_in(&answers, name)))
 }
 
-/// The learnt icon of a landmark that is nearest to the mean of its views, as PNG. `ETag` is the
-/// digest of its model.
+/// A picture of what was learnt of a landmark, as PNG: one of up to three real icons, the mean of
+/// its views, or one of up to two modes. `ETag` is the digest of its model.
 #[utoipa::path(get, path = "/maps/{map}/landmarks/{landmark}/icon", operation_id = "getLandmarkIcon",
     tag = "landmarks",
-    params(("map" = String, Path), ("landmark" = String, Path)),
+    params(("map" = String, Path), ("landmark" = String, Path), ModelPictureQuery),
     responses((status = 200, content_type = "image/png"), (status = 304, description = "`If-None-Match` has it"),
-    (status = 404, body = Problem, description = "unknown_map, unknown_landmark, not_learnt")))]
+    (status = 404, body = Problem, description = "unknown_map, unknown_landmark, not_learnt; no_picture: \
+     so few views have no such mode or exemplar")))]
 async fn icon(
     State(app): State<AppState>,
     PathParams((map, landmark)): PathParams<(String, String)>,
+    QueryParams(query): QueryParams<ModelPictureQuery>,
     known: IfNoneMatch,
 ) -> Result<Response, ApiError> {
-    let Learnt { stored: StoredModel { digest, model }, .. } = learnt(&app, &map, &landmark).await?;
+    let Learnt { stored: StoredModel { digest, model, .. }, .. } = learnt(&app, &map, &landmark).await?;
     let png = async {
-        let mean = model.exemplars.first();
-        let png = mean.map_or(Ok(Vec::new()), |mean| picture::png(mean.size(), mean.size(), mean.pixels()));
-        png.map_err(|e| ApiError::internal(&e))
+        let picture = picture_of(&app, &model, query.which.unwrap_or_default()).await?;
+        let (side, grey) = picture.ok_or_else(|| {
+            let detail = format!("the model of landmark `{landmark}` has no such picture");
+            ApiError::new(StatusCode::NOT_FOUND, "no_picture", detail).field("which")
+        })?;
+        picture::png(side, side, &grey).map_err(|e| ApiError::internal(&e))
     };
     PictureHead::new("png", &digest, ASK_AGAIN).answer(&known, png).await
+}
+
+/// Side and grey levels of a picture of a model. Mean and modes are in the database only.
+async fn picture_of(
+    app: &AppState,
+    model: &LandmarkModel,
+    which: ModelPicture,
+) -> Result<Option<(usize, Vec<u8>)>, ApiError> {
+    let exemplar = |index: usize| model.exemplars.get(index).map(|e| (e.size(), e.pixels().to_vec()));
+    Ok(match which {
+        ModelPicture::Exemplar1 => exemplar(0),
+        ModelPicture::Exemplar2 => exemplar(1),
+        ModelPicture::Exemplar3 => exemplar(2),
+        ModelPicture::Mean => component(app, model.id, 0).await?,
+        ModelPicture::Mode1 => component(app, model.id, 1).await?,
+        ModelPicture::Mode2 => component(app, model.id, 2).await?,
+    })
+}
+
+/// The mean of the views (0) or a mode.
+async fn component(
+    app: &AppState,
+    id: LandmarkId,
+    index: usize,
+) -> Result<Option<(usize, Vec<u8>)>, ApiError> {
+    let bytes = models::get(app.store.reads(), id).await?;
+    let of = components(&bytes).map_err(|e| ApiError::internal(&e))?;
+    Ok(of.pictures().get(index).map(|grey| (of.size(), grey.clone())))
 }
 
 /// The pairs of look-alikes that the landmarks of a map name, each once, by the two names.

@@ -10,8 +10,10 @@ use super::{
 };
 use crate::{
     failed_gates::{self, Evidence, Refusal, StoredLookAlike},
-    jobs::Learning,
+    jobs::{Learning, thresholds_shown},
+    learning_rules,
     store::{
+        landmark_learning,
         landmark_merge::{self, Merge},
         landmarks::{self, LandmarkGeometry, LandmarkRow},
         maps,
@@ -27,12 +29,15 @@ use map::{
 use nalgebra::Vector3;
 use protos::api::{
     FailedGate, Landmark, LandmarkHealthBody, LandmarkMerge, LandmarkModelBody, LandmarkPatch, LandmarkQuery,
-    LandmarkStatus, ListOrder, ListQuery, LookAlikeBody, NewLandmark, Page, Place, PlaceSigma, Problem, Size,
-    SizeAndPlace,
+    LandmarkStatus, LearningSettings, ListOrder, ListQuery, LookAlikeBody, NewLandmark, Page, Place,
+    PlaceSigma, Problem, Size, SizeAndPlace,
 };
 use serde_json::{Map, Value, json};
 use utoipa_axum::{router::OpenApiRouter, routes};
-use vision::{model::LandmarkId, pose::LandmarkSize};
+use vision::{
+    model::{LandmarkId, LandmarkModel, ModelStatus},
+    pose::LandmarkSize,
+};
 
 pub(super) fn router() -> OpenApiRouter<AppState> {
     OpenApiRouter::new()
@@ -98,6 +103,8 @@ struct Context<'a> {
     unusable: Option<String>,
     /// A job has it in work.
     learning: bool,
+    /// Its model, if that can be read and it is not refused.
+    model: Option<&'a LandmarkModel>,
     /// The version of the map that is in use.
     snapshot: Option<&'a MapSnapshot>,
 }
@@ -121,18 +128,27 @@ fn look_alikes_shown(stored: &mut Value, snapshot: Option<&MapSnapshot>) -> Vec<
 }
 
 fn landmark_shown(row: LandmarkRow, context: &Context<'_>) -> Landmark {
-    let (mut failed_gates, mut is_active) = (Vec::<FailedGate>::new(), false);
+    let (mut failed_gates, mut waived_gates, mut is_active) = (Vec::<FailedGate>::new(), Vec::new(), false);
     let model = row.model.map(|m| {
         let mut facts: Map<String, Value> = serde_json::from_str(&m.facts).unwrap_or_default();
+        facts.extend(context.model.map(thresholds_shown).unwrap_or_default());
         let look_alikes = facts.get_mut("look_alikes").map(|l| look_alikes_shown(l, context.snapshot));
-        is_active = m.active && context.unusable.is_none();
+        // By the rules of today, which may be others than those of the lesson.
+        is_active = context.model.map_or(m.active, LandmarkModel::is_active) && context.unusable.is_none();
         failed_gates = if let Some(reason) = &context.unusable {
             vec![failed_gates::stored_model(reason)]
         } else {
             let look_alike = look_alikes.into_iter().flatten().next();
             let refusal = m.looks_like.as_deref().map(|text| refusal(text, context.snapshot));
             let about = Evidence { look_alike, refusal, ..Evidence::default() };
-            failed_gates::in_words(&failed_gates::from_stored(&m.reasons), &about)
+            waived_gates =
+                context.model.map(|m| failed_gates::in_words(&m.waived, &about)).unwrap_or_default();
+            let failures = match context.model.map(|model| &model.status) {
+                Some(ModelStatus::Active) => vec![],
+                Some(ModelStatus::Candidate(failures)) => failures.clone(),
+                None => failed_gates::from_stored(&m.reasons),
+            };
+            failed_gates::in_words(&failures, &about)
         };
         let (views, generated_views) = (m.views, m.generated_views);
         LandmarkModelBody { views, generated_views, learnt_ms: m.learnt_ms, facts }
@@ -152,6 +168,8 @@ fn landmark_shown(row: LandmarkRow, context: &Context<'_>) -> Landmark {
         revision: row.revision,
         status,
         failed_gates,
+        waived_gates,
+        learning: learning_rules::shown(row.learning.as_deref()),
         views: row.views,
         size,
         place,
@@ -171,9 +189,11 @@ fn landmark_shown(row: LandmarkRow, context: &Context<'_>) -> Landmark {
 pub(super) fn shown(app: &App, learning: &Learning, map: &str, row: LandmarkRow) -> Landmark {
     let snapshot = app.store.snapshots().get(map);
     let snapshot = snapshot.as_deref();
-    let unusable = snapshot.and_then(|s| s.unusable_models.get(&LandmarkId(row.id as u64)).cloned());
+    let id = LandmarkId(row.id as u64);
+    let unusable = snapshot.and_then(|s| s.unusable_models.get(&id).cloned());
     let learning = learning.has(&row.name) && row.views > 0;
-    landmark_shown(row, &Context { unusable, learning, snapshot })
+    let model = snapshot.and_then(|s| s.learnt.get(&id)).map(|learnt| &*learnt.model);
+    landmark_shown(row, &Context { unusable, learning, model, snapshot })
 }
 
 /// Creates a landmark without views.
@@ -255,8 +275,8 @@ async fn get(
     Ok(Revised(revision, landmark))
 }
 
-/// Renames it; sets or forgets size and place; sets how far it is trusted. Everything that belongs
-/// to it follows the name. A size whose ratio of sides its photographs contradict is refused.
+/// Renames it; sets or forgets size, place, and weights and gates of its own; sets how far it is
+/// trusted. Everything that belongs to it follows the name. A size whose ratio of sides its photographs contradict is refused.
 #[utoipa::path(patch, path = "/maps/{map}/landmarks/{landmark}", operation_id = "updateLandmark", tag = "landmarks",
     params(("map" = String, Path), ("landmark" = String, Path)), request_body = LandmarkPatch,
     responses((status = 200, body = Landmark), (status = 404, body = Problem),
@@ -278,6 +298,7 @@ async fn patch(
     let new_name = changes.name.map(|new| name("name", new)).transpose()?;
     let (size, place) = (changes.size.is_some(), changes.place.is_some());
     let (map_name, health) = (map.clone(), changes.health.map(health));
+    let learning = changes.learning.map(|own| own.map(learning_text).transpose()).transpose()?;
     let write = app.store.write(move |tx| {
         Box::pin(async move {
             revisions::check(tx, &map, &Subject::Landmark(landmark.clone()), &is).await?;
@@ -287,6 +308,13 @@ async fn patch(
             };
             let changed =
                 landmarks::update(tx, &map, &landmark, |old| old.edited(&checked, (size, place))).await?;
+            let changed = match learning {
+                Some(own) => {
+                    let (text, reason) = own.unzip();
+                    landmark_learning::set(tx, (&map, &landmark), text.as_deref(), reason).await?
+                }
+                None => changed,
+            };
             match health {
                 Some(health) => landmarks::set_health(tx, &map, &landmark, health, None).await,
                 None => Ok(changed),
@@ -299,6 +327,15 @@ async fn patch(
     let mut landmark = shown(&app, &learning, &map_name, changed);
     landmark_aspect::add_fact(&mut landmark, by_views);
     Ok(Revised(revision, landmark))
+}
+
+/// Weights and gates as they are stored, and their reason. Errors: `out_of_range`, `invalid_value`.
+fn learning_text(own: LearningSettings) -> Result<(String, String), ApiError> {
+    let text = learning_rules::text(&own).map_err(|(field, why)| {
+        let code = if field == "reason" { "invalid_value" } else { "out_of_range" };
+        ApiError::invalid(code, format!("learning.{field}"), why)
+    })?;
+    Ok((text, own.reason))
 }
 
 /// Makes two landmarks one: this one gets the views of `from`, and the size and place that it

@@ -5,6 +5,7 @@ mod creation;
 mod events;
 mod lists;
 mod metrics;
+mod learning_settings;
 mod localise;
 mod numbers;
 mod objects;

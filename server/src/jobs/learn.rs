@@ -141,6 +141,13 @@ async fn read_material(
     })
 }
 
+impl Material {
+    /// The parameters with a landmark's own weights and gates.
+    fn params_of(&self, id: LandmarkId) -> Params {
+        self.snapshot.landmarks.get(&id).map(|l| l.rules).unwrap_or_default().over(&self.params)
+    }
+}
+
 fn targets(
     snapshot: &MapSnapshot,
     views: &BTreeMap<LandmarkId, Vec<TrainingViewRow>>,
@@ -184,7 +191,7 @@ fn compute(m: &Material, reporter: &ProgressReporter) -> Result<Learnt, JobError
     let mut negatives = collect_negatives(m, &views, reporter)?;
     let p = &m.params;
     let made = each_of(&m.targets, m.workers, reporter, (0.4, 0.8, "models"), |id| {
-        let model = learn(*id, &views[id], &[], p).map_err(|e| e.to_string())?;
+        let model = learn(*id, &views[id], &[], &m.params_of(*id)).map_err(|e| e.to_string())?;
         Ok::<_, String>(model.with_points(&points[id]))
     })?;
     let (mut models, mut failed) = (Vec::new(), Vec::new());
@@ -210,8 +217,8 @@ fn fit(
     negatives: &Negatives,
     reporter: &ProgressReporter,
 ) -> Result<Fitted, JobError> {
-    let p = &m.params;
     let models = each_of(models, m.workers, reporter, (0.8, 0.9, "thresholds"), |model| {
+        let p = &m.params_of(model.id);
         let (before, after) = negatives.others(model.id);
         let model = add_negatives(&add_negatives(model, before, p), after, p);
         negatives.with_distractors(&model, p)
@@ -221,13 +228,14 @@ fn fit(
     // A landmark that is learnt again is added a second time, and its older icons stay: thresholds
     // only become stricter. Learning the whole map resets them.
     let refitted = each_of(&others, m.workers, reporter, (0.9, 0.99, "thresholds of the others"), |id| {
+        let p = &m.params_of(*id);
         m.targets.iter().fold(LandmarkModel::clone(&m.snapshot.learnt[id].model), |model, target| {
             add_negatives(&model, negatives.of(*target), p)
         })
     })?;
     let all: Vec<&LandmarkModel> = models.iter().chain(&refitted).collect();
     let found = each_of(&all, m.workers, reporter, (0.99, 0.99, "look-alikes"), |model| {
-        look_alikes(model, negatives, p)
+        look_alikes(model, negatives, &m.params)
     })?;
     let look_alikes = all.iter().map(|m| m.id).zip(found).filter(|(_, found)| !found.is_empty()).collect();
     Ok(Fitted { models, refitted, look_alikes })
@@ -246,7 +254,7 @@ fn suspects(m: &Material, models: &[LandmarkModel], fitted: &Fitted) -> Vec<Susp
     let suspect = |id: LandmarkId| {
         let stored = m.snapshot.learnt.get(&id).map(|l| &*l.model);
         let taught = models.iter().find(|model| model.id == id);
-        let model = taught.cloned().or_else(|| Some(refit_thresholds(stored?, &[], &m.params)))?;
+        let model = taught.cloned().or_else(|| Some(refit_thresholds(stored?, &[], &m.params_of(id))))?;
         Some(Suspect {
             model,
             place: m.snapshot.landmarks.get(&id).and_then(|l| l.place),

@@ -15,9 +15,9 @@ use crate::{
         refused_views::{self, SkippedView},
     },
 };
-use serde_json::json;
+use serde_json::{Map, Value, json};
 use std::{collections::BTreeMap, time::Instant};
-use vision::model::{LandmarkId, LandmarkModel, ModelStatus};
+use vision::model::{LandmarkId, LandmarkModel, ModelStatus, components};
 
 /// Models with fitted thresholds.
 pub(super) struct Fitted {
@@ -83,9 +83,22 @@ pub(super) async fn commit(
     let of = |model: &LandmarkModel| -> Vec<StoredLookAlike> {
         fitted.look_alikes.get(&model.id).into_iter().flatten().map(stored).collect()
     };
-    let models = fitted.models.iter().chain(&fitted.refitted);
-    let rows: Vec<NewModel> =
-        models.map(|model| row(model, &of(model), refused.get(&model.id).map(stored))).collect();
+    let rows_of = |models: &[LandmarkModel]| -> Vec<NewModel> {
+        models.iter().map(|model| row(model, &of(model), refused.get(&model.id).map(stored))).collect()
+    };
+    let mut refitted = fitted.refitted.clone();
+    for model in &mut refitted {
+        // They are not in memory. A landmark that was deleted meanwhile stores nothing.
+        let bytes = match models::get(store.reads(), model.id).await {
+            Err(StoreError::NotFound { .. }) => continue,
+            bytes => bytes?,
+        };
+        model.components = components(&bytes).map_err(|e| StoreError::Damaged {
+            what: format!("the model of landmark number {}", model.id.0),
+            reason: e.to_string(),
+        })?;
+    }
+    let rows: Vec<NewModel> = [rows_of(&fitted.models), rows_of(&refitted)].concat();
     let write = store.write(move |tx| {
         Box::pin(async move {
             let map = maps::recheck(tx, map).await?;
@@ -103,6 +116,16 @@ pub(super) async fn commit(
     write.await
 }
 
+/// The thresholds of a model, as they are among its facts.
+pub(crate) fn thresholds_shown(model: &LandmarkModel) -> Map<String, Value> {
+    let thresholds = [
+        ("correlation", model.correlation),
+        ("hausdorff", model.hausdorff),
+        ("gradient_similarity", model.likeness),
+    ];
+    thresholds.map(|(name, threshold)| (name.to_owned(), json!(threshold))).into_iter().collect()
+}
+
 fn row(
     model: &LandmarkModel,
     look_alikes: &[StoredLookAlike],
@@ -112,10 +135,7 @@ fn row(
         ModelStatus::Active => &[][..],
         ModelStatus::Candidate(failures) => failures,
     };
-    let facts = json!({
-        "correlation": model.correlation,
-        "hausdorff": model.hausdorff,
-        "gradient_similarity": model.likeness,
+    let mut facts = json!({
         "look_alikes": look_alikes,
         "saliency": model.saliency,
         "saliency_f": model.saliency_f,
@@ -124,6 +144,7 @@ fn row(
         "photographed_v_c": model.photographed_v_c,
         "points": model.points.len(),
     });
+    facts.as_object_mut().into_iter().for_each(|facts| facts.extend(thresholds_shown(model)));
     NewModel {
         landmark: model.id,
         bytes: model.to_bytes(),

@@ -14,6 +14,8 @@ mod pictures;
 pub(crate) mod request;
 mod spread_work;
 
+pub(crate) use lesson_result::thresholds_shown;
+
 use crate::{
     config::Config,
     publication::Catalogue,

@@ -2,13 +2,16 @@
 //! before: walls by their version number, models by their digests, visibility areas by place, walls
 //! and camera. A damaged or outdated model is named and left out, never matched.
 
-use crate::store::{
-    StoreError,
-    map_rows::{self, LandmarkHead, MapHead, RowState},
-    maps::MapPipeline,
-    modality_stats,
-    models::{self, ModelDigest},
-    walls,
+use crate::{
+    learning_rules,
+    store::{
+        StoreError,
+        map_rows::{self, LandmarkHead, MapHead, RowState},
+        maps::MapPipeline,
+        modality_stats,
+        models::{self, ModelDigest},
+        walls,
+    },
 };
 use engine::{
     panics::{Edge, Panics},
@@ -20,7 +23,8 @@ use map::{
 use sqlx::SqliteConnection;
 use std::{collections::BTreeMap, sync::Arc};
 use vision::{
-    model::{LandmarkId, LandmarkModel, ModelSet},
+    learn::LearnRules,
+    model::{Components, LandmarkId, LandmarkModel, ModelSet},
     params::Params,
     recognise::DistanceKind,
 };
@@ -44,7 +48,7 @@ pub(super) async fn snapshot(
     tests::planted(&head.name);
     let MapPipeline { preset, distance } = head.pipeline;
     let params = preset.map_or_else(|| params.clone(), |preset| Arc::new(preset.over(params)));
-    let (learnt, unusable_models) = models(conn, id, before, &params, panics).await?;
+    let (learnt, unusable_models) = models(conn, (id, &landmarks), before, &params, panics).await?;
     for (id, reason) in &unusable_models {
         let landmark = landmarks.get(id).map_or("", |l: &LandmarkInfo| l.name.as_str());
         tracing::warn!(map = head.name, landmark, reason, "model_not_used");
@@ -102,9 +106,13 @@ async fn landmarks(
         if let Some(info) = known(&state) {
             return Some((state.id, info.clone()));
         }
-        let LandmarkHead { name, geometry } = read.remove(&state.id)?;
+        let LandmarkHead { name, geometry, learning } = read.remove(&state.id)?;
         let (size, place) = (geometry.size, geometry.landmark_place());
-        Some((state.id, LandmarkInfo { name, size, place, health: state.health, stored: state.edited }))
+        let rules = learning_rules::rules(learning.as_deref());
+        Some((
+            state.id,
+            LandmarkInfo { name, size, place, health: state.health, stored: state.edited, rules },
+        ))
     };
     Ok(states.into_iter().filter_map(info).collect())
 }
@@ -152,11 +160,11 @@ async fn modalities(
     Ok((Arc::new(modalities), numbers))
 }
 
-/// Digest of every learnt model.
+/// Digest of every learnt model, with the rules that it was read by.
 pub(super) fn digests(
     learnt: &BTreeMap<LandmarkId, StoredModel>,
-) -> impl Iterator<Item = (LandmarkId, ModelDigest)> + '_ {
-    learnt.iter().map(|(id, model)| (*id, model.digest))
+) -> impl Iterator<Item = (LandmarkId, ModelDigest, LearnRules)> + '_ {
+    learnt.iter().map(|(id, model)| (*id, model.digest, model.rules))
 }
 
 /// The look-alike classes if they are known, and whether they are to be computed.
@@ -202,14 +210,16 @@ type Models = (BTreeMap<LandmarkId, StoredModel>, BTreeMap<LandmarkId, String>);
 /// must not be used.
 async fn models(
     conn: &mut SqliteConnection,
-    map_id: i64,
+    (map_id, landmarks): (i64, &BTreeMap<LandmarkId, LandmarkInfo>),
     before: Option<&MapSnapshot>,
     params: &Params,
     panics: &Panics,
 ) -> Result<Models, StoreError> {
     let (mut learnt, mut unusable) = Models::default();
     for (id, digest) in models::digests(&mut *conn, map_id).await? {
-        let same = before.and_then(|map| map.learnt.get(&id)).filter(|l| l.digest == digest);
+        let rules = landmarks.get(&id).map(|l| l.rules).unwrap_or_default();
+        let same = before.and_then(|map| map.learnt.get(&id));
+        let same = same.filter(|l| l.digest == digest && l.rules == rules);
         if let Some(same) = same {
             learnt.insert(id, same.clone());
             continue;
@@ -219,11 +229,11 @@ async fn models(
         let read = panics.catch(Edge::Publication, &what, "it is not used", || {
             #[cfg(test)]
             tests::planted(&what);
-            read_model(&bytes, digest, id, params)
+            read_model(&bytes, digest, id, &rules.over(params))
         });
         match read.unwrap_or_else(|| Err("the server failed on the stored model; see its log".to_owned())) {
             Ok(model) => {
-                learnt.insert(id, StoredModel { digest, model: Arc::new(model) });
+                learnt.insert(id, StoredModel { digest, rules, model: Arc::new(model) });
             }
             Err(reason) => {
                 unusable.insert(id, reason);
@@ -242,7 +252,9 @@ fn read_model(
     if models::digest(bytes) != digest {
         return Err("the stored model is damaged: its digest does not fit".to_owned());
     }
-    let model = LandmarkModel::from_bytes(bytes, p).map_err(|e| e.to_string())?;
+    let mut model = LandmarkModel::from_bytes(bytes, p).map_err(|e| e.to_string())?;
+    // Only people look at them: the icons of a landmark would take twice the memory.
+    model.components = Components::default();
     if model.id == id {
         Ok(model)
     } else {

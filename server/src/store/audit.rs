@@ -3,8 +3,8 @@
 //! whole.
 //!
 //! The digest of an entry is SHA-256 over the digest before it, `seq`, `time_ms`, `actor`, `token`,
-//! `action`, `target` and `request`: numbers as 8 bytes little-endian, texts as their length in
-//! bytes (so, too) and their bytes, an absent value as the length `u64::MAX`.
+//! `action`, `target`, `request` and `why`: numbers as 8 bytes little-endian, texts as their length
+//! in bytes (so, too) and their bytes, an absent value as the length `u64::MAX`.
 
 use super::{StoreError, Tx, actor::Actor, now_ms, pictures::hex, statements::statements};
 use futures::TryStreamExt as _;
@@ -17,12 +17,12 @@ statements! {
     HEAD = "SELECT seq, sha256 FROM audit WHERE seq = (SELECT max(seq) FROM audit) \
             UNION ALL SELECT seq, sha256 FROM audit_start ORDER BY seq DESC LIMIT 1";
     START = "SELECT seq, sha256 FROM audit_start";
-    INSERT = "INSERT INTO audit (seq, time_ms, actor, token, action, target, request, sha256) \
-              VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)";
+    INSERT = "INSERT INTO audit (seq, time_ms, actor, token, action, target, request, why, sha256) \
+              VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)";
     NEW_START = "UPDATE audit_start SET (seq, sha256) = (SELECT seq, sha256 FROM audit ORDER BY seq LIMIT 1)";
     FORGET = "DELETE FROM audit WHERE seq = (SELECT seq FROM audit_start)";
-    ALL_ENTRIES = "SELECT seq, time_ms, actor, token, action, target, request, sha256 FROM audit ORDER BY seq";
-    PAGE = "SELECT seq, time_ms, actor, token, action, target, request, sha256 FROM audit WHERE seq < ?1 \
+    ALL_ENTRIES = "SELECT seq, time_ms, actor, token, action, target, request, why, sha256 FROM audit ORDER BY seq";
+    PAGE = "SELECT seq, time_ms, actor, token, action, target, request, why, sha256 FROM audit WHERE seq < ?1 \
             AND (?2 IS NULL OR actor = ?2) AND (?3 IS NULL OR substr(target, 1, length(?3)) = ?3) \
             AND (?4 IS NULL OR time_ms >= ?4) AND (?5 IS NULL OR time_ms < ?5) ORDER BY seq DESC LIMIT ?6";
     COUNT = "SELECT count(*) FROM audit WHERE (?1 IS NULL OR actor = ?1) \
@@ -55,6 +55,7 @@ pub(crate) struct AuditRow {
     pub(crate) action: String,
     pub(crate) target: String,
     pub(crate) request: Option<String>,
+    pub(crate) why: Option<String>,
     pub(crate) sha256: EntryDigest,
 }
 
@@ -85,6 +86,7 @@ impl AuditRow {
         bytes(Some(self.action.as_bytes()));
         bytes(Some(self.target.as_bytes()));
         bytes(self.request.as_ref().map(String::as_bytes));
+        bytes(self.why.as_ref().map(String::as_bytes));
         digest.finalize().into()
     }
 }
@@ -105,6 +107,7 @@ fn audit_row(row: &SqliteRow) -> Result<AuditRow, sqlx::Error> {
         action: row.try_get("action")?,
         target: row.try_get("target")?,
         request: row.try_get("request")?,
+        why: row.try_get("why")?,
         sha256,
     })
 }
@@ -127,6 +130,7 @@ pub(super) async fn append(tx: &mut Tx, actor: &Actor, max: usize) -> Result<(),
         action: actor.action.clone(),
         target: actor.target.clone(),
         request: actor.request.clone(),
+        why: tx.author.why.clone(),
         sha256: [0; 32],
     };
     row.sha256 = row.digest(&before.sha256);
@@ -138,6 +142,7 @@ pub(super) async fn append(tx: &mut Tx, actor: &Actor, max: usize) -> Result<(),
         .bind(row.action)
         .bind(row.target)
         .bind(row.request)
+        .bind(row.why)
         .bind(&row.sha256[..]);
     insert.execute(&mut tx.conn).await.map_err(at())?;
     let kept = row.seq - start(&mut tx.conn).await?.seq;
@@ -261,8 +266,8 @@ impl From<ChainLink> for AuditHead {
 
 impl From<AuditRow> for AuditEntry {
     fn from(row: AuditRow) -> Self {
-        let AuditRow { seq, time_ms, actor, token, action, target, request, sha256 } = row;
-        Self { seq, time_ms, actor, token, action, target, request, sha256: hex(&sha256) }
+        let AuditRow { seq, time_ms, actor, token, action, target, request, why, sha256 } = row;
+        Self { seq, time_ms, actor, token, action, target, request, why, sha256: hex(&sha256) }
     }
 }
 

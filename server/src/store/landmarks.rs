@@ -26,7 +26,8 @@ pub(super) use geometry_columns;
 macro_rules! select {
     ($tail:literal) => {
         concat!(
-            "SELECT l.id, l.name, l.id || '.' || l.revision AS revision, l.changed_ms, l.health, l.finding, ",
+            "SELECT l.id, l.name, l.id || '.' || l.revision AS revision, l.changed_ms, l.health, l.finding, \
+             l.learning, ",
             geometry_columns!("l."),
             ", (SELECT count(*) FROM views v WHERE v.landmark_id = l.id) AS views, \
              m.active, m.looks_like, m.reasons, m.facts, m.views AS model_views, m.generated_views, m.learnt_ms \
@@ -130,7 +131,7 @@ impl LandmarkGeometry {
 
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct ModelSummary {
-    /// The model passed all quality gates.
+    /// The model passed all quality gates of its lesson.
     pub(crate) active: bool,
     /// Refused: JSON of the landmark in use that it looks like.
     pub(crate) looks_like: Option<String>,
@@ -157,6 +158,8 @@ pub(crate) struct LandmarkRow {
     pub(crate) health: LandmarkHealth,
     /// JSON: the finding that led to this health.
     pub(crate) finding: Option<String>,
+    /// JSON of `LearningSettings`: weights and gates of its own.
+    pub(crate) learning: Option<String>,
 }
 
 /// The word for a landmark's health in the database.
@@ -256,6 +259,7 @@ fn landmark_row(row: &SqliteRow) -> Result<LandmarkRow, sqlx::Error> {
         model,
         health: health_of(&row.try_get::<String, _>("health")?),
         finding: row.try_get("finding")?,
+        learning: row.try_get("learning")?,
     })
 }
 

@@ -18,7 +18,7 @@ statements! {
     MAP_IDS = "SELECT id FROM maps ORDER BY id";
     ROWS = "SELECT coalesce(group_concat(id || ' ' || revision || ' ' || changed_ms || ' ' || health, ';'), '') \
             FROM landmarks WHERE map_id = ?1";
-    LANDMARKS = concat!("SELECT id, name, ", geometry_columns!(""), " FROM landmarks WHERE map_id = ?1 \
+    LANDMARKS = concat!("SELECT id, name, learning, ", geometry_columns!(""), " FROM landmarks WHERE map_id = ?1 \
                 AND id IN (SELECT value FROM json_each(?2))");
 }
 
@@ -50,6 +50,8 @@ pub(crate) struct RowState {
 pub(crate) struct LandmarkHead {
     pub(crate) name: String,
     pub(crate) geometry: landmarks::LandmarkGeometry,
+    /// JSON of its own weights and gates.
+    pub(crate) learning: Option<String>,
 }
 
 /// Numbers of all maps.
@@ -117,7 +119,8 @@ pub(crate) async fn landmarks(
     let rows = sqlx::query(LANDMARKS).bind(id).bind(wanted).fetch_all(conn).await.map_err(at())?;
     let head = |row: &sqlx::sqlite::SqliteRow| {
         let id = LandmarkId(row.try_get::<i64, _>("id")? as u64);
-        Ok((id, LandmarkHead { name: row.try_get("name")?, geometry: landmarks::geometry(row)? }))
+        let (name, learning) = (row.try_get("name")?, row.try_get("learning")?);
+        Ok((id, LandmarkHead { name, geometry: landmarks::geometry(row)?, learning }))
     };
     rows.iter().map(head).collect::<Result<_, _>>().map_err(at())
 }

@@ -29,6 +29,7 @@ pub(crate) mod pictures;
 pub(crate) mod views;
 pub(crate) mod models;
 pub(crate) mod walls;
+pub(crate) mod landmark_learning;
 pub(crate) mod landmark_merge;
 pub(crate) mod landmark_placement;
 pub(crate) mod aspect_views;

@@ -24,6 +24,7 @@ async fn every_statement_prepares_on_the_migrated_schema() {
         models::ALL,
         walls::ALL,
         underlays::ALL,
+        landmark_learning::ALL,
         landmark_merge::ALL,
         landmark_placement::ALL,
         teaching::ALL,

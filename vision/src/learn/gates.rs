@@ -5,12 +5,15 @@
 //! limits. The consequence of a failed gate is defined by
 //! [`crate::model::landmark_model::ModelStatus`].
 
-use crate::recognise::features::descriptor::PointSet;
+use crate::{model::seen_from::SeenFrom, recognise::features::descriptor::PointSet};
 use nalgebra::{Matrix3, Point2, Vector2};
 use serde::{Deserialize, Serialize};
 
 /// Grey-level standard deviation to which every icon is normalised before saliency.
 const NORMAL_DEVIATION: f64 = 50.0;
+/// Smallest mean of ln(left side / right side) that is no view from the front: 15 to 20 degrees off
+/// at 2 to 3 m.
+const MIN_LEAN: f64 = 0.05;
 /// Value of `v_c` where the homography's last element all but vanishes, and its upper bound.
 pub const V_C_CAP: f64 = 10.0;
 
@@ -27,10 +30,17 @@ pub struct GateParams {
     /// to distinguish texture from a blank panel (1.1), while their corner noise and light vary
     /// more than in a robot's own views.
     pub min_saliency_f_generated: f64,
-    /// Fewest stable points, where neither of the paper's distances has a threshold.
+    /// Fewest stable points.
     pub min_stable_points: usize,
-    /// Least visibility confidence `v_c`.
+    /// Fewer stable points keep a landmark out of use even where one of the paper's distances has a
+    /// threshold.
+    pub refuse_few_points: bool,
+    /// Least visibility confidence `v_c` of the photographs.
     pub min_v_c: f64,
+    /// A smaller one keeps a landmark out of use; otherwise it is only said.
+    pub refuse_one_side: bool,
+    /// No measured gate keeps a landmark out of use: all are only said.
+    pub refuse_nothing: bool,
     /// Largest displacement of a stable point, in icon pixels.
     pub stable_within_px: f64,
     /// Largest descriptor distance of a stable point.
@@ -46,7 +56,10 @@ impl Default for GateParams {
             min_saliency_f: 6.0,
             min_saliency_f_generated: 3.0,
             min_stable_points: 10,
+            refuse_few_points: false,
             min_v_c: 0.5,
+            refuse_one_side: false,
+            refuse_nothing: false,
             stable_within_px: 1.5,
             stable_within_nu: 3.0,
             stable_share: 0.6,
@@ -125,6 +138,18 @@ pub fn v_c(views: &[([Point2<f64>; 4], [f64; 2])]) -> f64 {
     largest
 }
 
+/// From where photographs with these corners (TL, TR, BR, BL, px) show a landmark, in the mean: the
+/// nearer side is the longer one.
+pub(crate) fn seen_from<'a>(views: impl Iterator<Item = &'a [Point2<f64>; 4]>) -> SeenFrom {
+    let leans: Vec<f64> = views.map(|[tl, tr, br, bl]| ((tl - bl).norm() / (tr - br).norm()).ln()).collect();
+    let mean = leans.iter().sum::<f64>() / leans.len().max(1) as f64;
+    match mean {
+        left if left > MIN_LEAN => SeenFrom::Left,
+        right if right < -MIN_LEAN => SeenFrom::Right,
+        _ => SeenFrom::Front,
+    }
+}
+
 /// `||H / H(3,3) - I||`, capped.
 fn departure(h: &Matrix3<f64>) -> f64 {
     let last = h[(2, 2)];
@@ -195,6 +220,23 @@ mod tests {
         assert!((v(&[(0.0, 2.0), (0.0, 6.0)]) - 8.0f64.sqrt()).abs() < 1e-9);
         // Independent of the order of the views.
         assert!((v(&[(0.0, 6.0), (0.0, 2.0)]) - 8.0f64.sqrt()).abs() < 1e-9);
+    }
+
+    /// The side at +y is the right one of who faces the landmark. 40 degrees pass the gate, 30 do not.
+    #[test]
+    fn the_side_of_the_views_is_that_of_the_longer_side() {
+        let from = |bearings: &[f64]| {
+            let views: Vec<_> = bearings.iter().map(|b| view_from(*b, 3.0).0).collect();
+            seen_from(views.iter())
+        };
+        assert_eq!(from(&[40.0]), SeenFrom::Right);
+        assert_eq!(from(&[-40.0, -30.0, 5.0]), SeenFrom::Left);
+        for front in [&[][..], &[0.0], &[9.0], &[40.0, -40.0]] {
+            assert_eq!(from(front), SeenFrom::Front, "{front:?}");
+        }
+        let limit = GateParams::default().min_v_c;
+        let beside_front = |bearing| v_c(&[view_from(0.0, 3.0), view_from(bearing, 3.0)]);
+        assert!(beside_front(40.0) > limit && beside_front(30.0) < limit);
     }
 
     /// In-plane turn by `a` about the image centre: ||R - I|| = sqrt(8) sin(a / 2).

@@ -5,12 +5,13 @@
 use crate::{
     icon::Icon,
     learn::{
-        gates::{saliency, saliency_f, stable_points, v_c},
+        gates::{saliency, saliency_f, seen_from, stable_points, v_c},
         pca::{exemplars, modes},
         threshold_fit::{Templates, prepared, refit_thresholds},
         training_view::TrainingView,
     },
     model::{
+        components::Components,
         exemplar::Exemplar,
         landmark_id::LandmarkId,
         landmark_model::{DistanceSamples, LandmarkModel, MAX_VIEWS, ModelStatus, distances},
@@ -73,6 +74,7 @@ pub fn learn(
         own_distances(&icons, (&chosen, &exemplar_features), exemplar, p).ok_or(LearnError::NoComponents)?;
     let exemplars: Vec<Exemplar> = exemplar_features.iter().map(|k| Exemplar::new(&k.icon)).collect();
 
+    let photographed = corners_and_sizes(views, false);
     let saliency_f = saliency_f(&pixels);
     let points: Vec<_> = icons.iter().map(|i| &i.points).collect();
     let stable_points = chosen.first().map_or(0, |mean| stable_points(*mean, &points, &p.learn.gates));
@@ -81,6 +83,7 @@ pub fn learn(
         params_hash: p.distance_hash(),
         views: views.len(),
         generated_views: views.iter().filter(|v| v.generated).count(),
+        components: Components::new(p.icon.size, &components),
         eigenvalues: components.eigenvalues,
         total_variance: components.total_variance,
         correlation: Threshold::NEVER,
@@ -102,8 +105,10 @@ pub fn learn(
         stable_points,
         saliency: saliency(saliency_f, stable_points),
         v_c: v_c(&corners_and_sizes(views, true)),
-        photographed_v_c: v_c(&corners_and_sizes(views, false)),
+        photographed_v_c: v_c(&photographed),
+        seen_from: seen_from(photographed.iter().map(|(corners, _)| corners)),
         status: ModelStatus::Candidate(vec![]),
+        waived: vec![],
         points: vec![],
         knows_points: false,
         exemplars,

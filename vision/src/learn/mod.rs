@@ -11,9 +11,11 @@ pub mod pca;
 pub mod threshold;
 pub mod gates;
 pub mod threshold_fit;
+pub mod rules;
 pub mod lesson;
 
 pub use lesson::{LearnError, learn};
 pub use params::{LearnParams, SynthesisParams};
+pub use rules::LearnRules;
 pub use threshold_fit::{add_negatives, refit_thresholds, unlikeness_of};
 pub use training_view::TrainingView;

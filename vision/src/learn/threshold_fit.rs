@@ -62,7 +62,7 @@ pub fn add_negatives(model: &LandmarkModel, negatives: &[IconFeatures], p: &Para
         hausdorff.err().map(Gate::HausdorffThreshold),
         likeness.err().map(Gate::LikenessThreshold),
     ];
-    model.status = status(&model, missing, p);
+    (model.status, model.waived) = status(&model, missing, p);
     model
 }
 
@@ -184,12 +184,13 @@ fn fitted_likeness(evidence: &DistanceSamples, p: &Params) -> Result<Threshold, 
 }
 
 /// The quality gates of method 9.
-// Departs from method 9: stable points, and a threshold for each of the paper's distances, are
-// required only where neither distance has one; content beyond the frame is required in addition.
-// The likeness decides, and one of the two must agree; for a picture of few points the other
-// distance suffices. Where a map's kind is one of the paper's, landmarks with too few stable points
-// are excluded (recognise/retrieval/nearest.rs).
-fn status(model: &LandmarkModel, missing: [Option<Gate>; 3], p: &Params) -> ModelStatus {
+// Departs from method 9 unless the parameters say otherwise: a landmark seen from one side is used;
+// stable points, and a threshold for each of the paper's distances, are required only where neither
+// distance has one; content beyond the frame is required in addition. The likeness decides, and one
+// of the two must agree; for a picture of few points the other distance suffices. Where a map's
+// kind is one of the paper's, landmarks with too few stable points are excluded
+// (recognise/retrieval/nearest.rs).
+fn status(model: &LandmarkModel, missing: [Option<Gate>; 3], p: &Params) -> (ModelStatus, Vec<GateFailure>) {
     let g = &p.learn.gates;
     let photographed = model.views - model.generated_views;
     let observed = if photographed > 1 { photographed as f64 / model.views as f64 } else { 0.0 };
@@ -197,23 +198,33 @@ fn status(model: &LandmarkModel, missing: [Option<Gate>; 3], p: &Params) -> Mode
     let min_saliency_f = generated_f + observed * (g.min_saliency_f - generated_f);
     let shown = |e: &Exemplar| shown(&Smoothed::new(&e.icon()), &p.recognise.correlation);
     let content = model.exemplars.iter().map(shown).fold(0.0, f64::max);
-    let mut measured = vec![
-        (Gate::Views, model.views as f64, g.min_views as f64),
-        (Gate::Saliency, model.saliency_f, min_saliency_f),
-        (Gate::Content, content, p.recognise.verdict.min_content),
-        (Gate::VisibilityConfidence, model.v_c, g.min_v_c),
-    ];
     let [correlation, hausdorff, likeness] = missing;
     let mut thresholds: Vec<Gate> = likeness.into_iter().collect();
-    if let (Some(correlation), Some(hausdorff)) = (correlation, hausdorff) {
-        measured.push((Gate::StablePoints, model.stable_points as f64, g.min_stable_points as f64));
-        thresholds.extend([correlation, hausdorff]);
-    }
-    let mut failures: Vec<GateFailure> = measured
-        .into_iter()
-        .filter(|(_, value, limit)| value < limit)
-        .map(|(gate, value, limit)| GateFailure { gate, value, limit })
-        .collect();
+    let papers = correlation.zip(hausdorff);
+    thresholds.extend(papers.into_iter().flat_map(|(correlation, hausdorff)| [correlation, hausdorff]));
+    let stable_points = model.stable_points as f64;
+    let sides = Gate::VisibilityConfidence(model.seen_from);
+    // Gate, value, limit, and whether failing it refuses the landmark.
+    let measured = [
+        (Gate::Views, model.views as f64, g.min_views as f64, true),
+        (Gate::Saliency, model.saliency_f, min_saliency_f, true),
+        (Gate::Content, content, p.recognise.verdict.min_content, true),
+        (sides, model.photographed_v_c, g.min_v_c, g.refuse_one_side),
+        (
+            Gate::StablePoints,
+            stable_points,
+            g.min_stable_points as f64,
+            g.refuse_few_points || papers.is_some(),
+        ),
+    ];
+    let failed = |refusing: bool| {
+        let failed = measured.iter().filter(move |(_, value, limit, refuses)| {
+            value < limit && (*refuses && !g.refuse_nothing) == refusing
+        });
+        failed.map(|&(gate, value, limit, _)| GateFailure { gate, value, limit })
+    };
+    let mut failures: Vec<GateFailure> = failed(true).collect();
     failures.extend(thresholds.into_iter().map(|gate| GateFailure { gate, value: 0.0, limit: 0.0 }));
-    if failures.is_empty() { ModelStatus::Active } else { ModelStatus::Candidate(failures) }
+    let status = if failures.is_empty() { ModelStatus::Active } else { ModelStatus::Candidate(failures) };
+    (status, failed(false).collect())
 }

@@ -3,8 +3,10 @@
 
 use crate::{
     model::{
+        components::Components,
         exemplar::Exemplar,
         landmark_id::LandmarkId,
+        seen_from::SeenFrom,
         threshold::{Threshold, ThresholdError},
     },
     params::Params,
@@ -20,6 +22,10 @@ use serde::{Deserialize, Serialize};
 pub const MAX_VIEWS: usize = 200;
 /// Exemplars of a model: the mean and two modes.
 pub const MAX_EXEMPLARS: usize = 3;
+
+/// Least `v_c` of a landmark for the choice of gaze, half the gate: few photographs do not say that
+/// it cannot be seen from elsewhere.
+const V_C_FLOOR: f64 = 0.25;
 
 /// Both distances of one icon to one landmark.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -88,10 +94,17 @@ pub struct LandmarkModel {
     /// Visibility confidence `v_c`: the spread of the viewpoints. Over all views, generated ones
     /// included.
     pub v_c: f64,
-    /// The same over photographed views only; 0 with fewer than two.
+    /// The same over photographed views only; 0 with fewer than two. The gate and the choice of
+    /// gaze take this one.
     pub photographed_v_c: f64,
+    /// From where the photographs show it.
+    pub seen_from: SeenFrom,
+    /// Mean and modes of its views, for people. Empty where the caller needs none in memory.
+    pub components: Components,
     /// Whether it may be used.
     pub status: ModelStatus,
+    /// Gates that it does not pass and that do not keep it out of use.
+    pub waived: Vec<GateFailure>,
     /// Points of up to three photographed views (`points/`). Empty where none were given: see
     /// [`LandmarkModel::knows_points`].
     pub points: Vec<TaughtPoint>,
@@ -107,6 +120,11 @@ impl LandmarkModel {
         self.points = landmark_points(views);
         self.knows_points = true;
         self
+    }
+
+    /// `v_c` for the choice of gaze (method 14): that of the photographs, and a floor.
+    pub fn v_c_for_gaze(&self) -> f64 {
+        self.photographed_v_c.max(V_C_FLOOR)
     }
 
     /// Whether it has so many points that its icons never identify it.
@@ -184,12 +202,12 @@ pub enum Gate {
     Views,
     /// Saliency F.
     Saliency,
-    /// Stable points: where neither of the paper's distances has a threshold.
+    /// Stable points.
     StablePoints,
     /// Content beyond its frame.
     Content,
-    /// Visibility confidence `v_c`.
-    VisibilityConfidence,
+    /// Visibility confidence `v_c` of the photographs, which show it from there.
+    VisibilityConfidence(SeenFrom),
     /// C^r has no threshold.
     CorrelationThreshold(ThresholdError),
     /// H^r has no threshold.
@@ -209,7 +227,7 @@ impl Gate {
             | Self::Saliency
             | Self::StablePoints
             | Self::Content
-            | Self::VisibilityConfidence => None,
+            | Self::VisibilityConfidence(_) => None,
         }
     }
 }
@@ -236,12 +254,10 @@ impl std::fmt::Display for GateFailure {
                 f,
                 "content beyond its frame in {value:.1} of 21 parts, at least {limit} needed: a blank board would look like it"
             ),
-            Gate::VisibilityConfidence => {
-                write!(
-                    f,
-                    "visibility confidence {value:.3}, at least {limit} needed: add views from other viewpoints"
-                )
-            }
+            Gate::VisibilityConfidence(_) => write!(
+                f,
+                "visibility confidence {value:.3} of the photographs, at least {limit} needed: add some from other viewpoints"
+            ),
             Gate::CorrelationThreshold(reason) => write!(f, "no threshold for the correlation: {reason}"),
             Gate::HausdorffThreshold(reason) => write!(f, "no threshold for the point distance: {reason}"),
             Gate::LikenessThreshold(reason) => write!(f, "no threshold for the likeness: {reason}"),

@@ -6,9 +6,11 @@ use crate::{
     icon::{Icon, MAX_ICON_SIZE},
     learn::threshold_fit::add_negatives,
     model::{
+        components::Components,
         exemplar::Exemplar,
         landmark_id::LandmarkId,
         landmark_model::{DistanceSamples, LandmarkModel, MAX_EXEMPLARS, MAX_VIEWS, ModelStatus},
+        seen_from::SeenFrom,
         threshold::Threshold,
     },
     params::Params,
@@ -17,9 +19,12 @@ use crate::{
 use std::ops::Range;
 
 /// Largest stored model, in bytes.
-const MAX_BYTES: usize = 3 * MAX_ICON_SIZE * MAX_ICON_SIZE + MAX_LANDMARK_POINTS * POINT_BYTES + 8 * 1024;
+const MAX_BYTES: usize = MAX_EXEMPLARS * MAX_ICON_SIZE * MAX_ICON_SIZE
+    + MAX_LANDMARK_POINTS * POINT_BYTES
+    + Components::MAX_BYTES
+    + 8 * 1024;
 const MAGIC: [u8; 4] = *b"WMLM";
-const VERSION: u16 = 3;
+const VERSION: u16 = 4;
 const DIGEST_BYTES: usize = 8;
 /// Where the landmark's number is, in every format: after the magic, the version and the hash of
 /// the parameters.
@@ -70,6 +75,7 @@ impl LandmarkModel {
         for number in [self.total_variance, self.saliency_f, self.saliency, self.v_c, self.photographed_v_c] {
             out.extend(number.to_le_bytes());
         }
+        out.push(SIDES.iter().position(|side| *side == self.seen_from).unwrap_or_default() as u8);
         out.push(self.eigenvalues.len() as u8);
         out.extend(self.eigenvalues.iter().flat_map(|value| value.to_le_bytes()));
         for evidence in [&self.correlation_evidence, &self.hausdorff_evidence, &self.likeness_evidence] {
@@ -88,6 +94,7 @@ impl LandmarkModel {
         out.push(u8::from(self.knows_points));
         out.extend((self.points.len() as u16).to_le_bytes());
         self.points.iter().for_each(|p| p.write(&mut out));
+        self.components.write(&mut out);
         out.extend(digest(&out).to_le_bytes());
         out
     }
@@ -107,11 +114,14 @@ impl LandmarkModel {
         if stored_digest != digest(content).to_le_bytes() {
             return Err(StoredModelError::Damaged);
         }
+        let components;
+        (reader.rest, components) = split_components(reader.rest)?;
         let (found, expected) = (u64::from_le_bytes(reader.take("params_hash")?), p.distance_hash());
         if found != expected {
             return Err(StoredModelError::Params { found, expected });
         }
         let mut model = reader.model(expected, p)?;
+        model.components = components;
         (model.knows_points, model.points) = reader.points()?;
         if !reader.rest.is_empty() {
             return Err(StoredModelError::Malformed { field: "length" });
@@ -120,9 +130,26 @@ impl LandmarkModel {
     }
 }
 
+fn split_components(content: &[u8]) -> Result<(&[u8], Components), StoredModelError> {
+    Components::split(content).ok_or(StoredModelError::Malformed { field: "components" })
+}
+
+/// The components in the bytes of a model of whatever parameters.
+pub fn components(bytes: &[u8]) -> Result<Components, StoredModelError> {
+    Ok(split_components(whole_content(bytes)?)?.1)
+}
+
 /// Bytes of the model of a landmark as those of the same model of another one, of whatever
 /// parameters. Done twice, with the first number the second time, it gives the first bytes.
 pub fn renumbered(bytes: &[u8], id: LandmarkId) -> Result<Vec<u8>, StoredModelError> {
+    let mut made = whole_content(bytes)?.to_vec();
+    made[ID_AT].copy_from_slice(&id.0.to_le_bytes());
+    made.extend(digest(&made).to_le_bytes());
+    Ok(made)
+}
+
+/// What is before the digest of a model of this format, up to the number of its landmark at least.
+fn whole_content(bytes: &[u8]) -> Result<&[u8], StoredModelError> {
     if bytes.len() > MAX_BYTES || bytes.len() < ID_AT.end + DIGEST_BYTES || !bytes.starts_with(&MAGIC) {
         return Err(StoredModelError::NotAModel);
     }
@@ -134,11 +161,11 @@ pub fn renumbered(bytes: &[u8], id: LandmarkId) -> Result<Vec<u8>, StoredModelEr
     if found != VERSION {
         return Err(StoredModelError::Version { found });
     }
-    let mut made = content.to_vec();
-    made[ID_AT].copy_from_slice(&id.0.to_le_bytes());
-    made.extend(digest(&made).to_le_bytes());
-    Ok(made)
+    Ok(content)
 }
+
+/// Sides by their byte.
+const SIDES: [SeenFrom; 3] = [SeenFrom::Front, SeenFrom::Left, SeenFrom::Right];
 
 /// Reads bytes in order; every read is checked.
 struct Reader<'a> {
@@ -155,6 +182,7 @@ impl Reader<'_> {
         let saliency_f = self.number("saliency_f")?;
         let saliency = self.number("saliency")?;
         let (v_c, photographed_v_c) = (self.number("v_c")?, self.number("photographed_v_c")?);
+        let seen_from = SIDES[self.byte("seen_from", SIDES.len() - 1)?];
         let eigenvalues = (0..self.byte("eigenvalues", crate::learn::pca::MODES)?)
             .map(|_| self.number("eigenvalues"))
             .collect::<Result<_, _>>()?;
@@ -184,7 +212,10 @@ impl Reader<'_> {
             saliency,
             v_c,
             photographed_v_c,
+            seen_from,
+            components: Components::default(),
             status: ModelStatus::Candidate(vec![]),
+            waived: vec![],
             points: vec![],
             knows_points: false,
         })

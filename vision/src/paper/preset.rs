@@ -7,8 +7,9 @@ use crate::{detect::params::Grouping, params::Params};
 const MIN_SCORE: f64 = 0.75;
 
 /// Relaxation over all six cues with G as printed, sets of three sides, floor tiling removed, icons
-/// compared by the distances alone, at the detected corners, by the tau of least cost. What the
-/// pages of the method list as departures without a parameter is as in the defaults.
+/// compared by the distances alone, at the detected corners, by the tau of least cost; every gate
+/// refuses. What the pages of the method list as departures without a parameter is as in the
+/// defaults.
 pub(crate) fn params() -> Params {
     let mut p = Params::default();
     p.detect.quads.grouping = Grouping::Relaxation;
@@ -20,6 +21,8 @@ pub(crate) fn params() -> Params {
     p.learn.threshold.limited = false;
     p.recognise.verdict.points = false;
     p.recognise.verdict.verify_reach = 0.0;
+    p.learn.gates.refuse_one_side = true;
+    p.learn.gates.refuse_few_points = true;
     p
 }
 
@@ -33,6 +36,8 @@ pub(crate) fn choose(p: &mut Params, preset: Params) {
     p.detect.relaxation.linear_weight = detect.relaxation.linear_weight;
     p.detect.tiling.remove = detect.tiling.remove;
     p.learn.threshold.limited = learn.threshold.limited;
+    p.learn.gates.refuse_one_side = learn.gates.refuse_one_side;
+    p.learn.gates.refuse_few_points = learn.gates.refuse_few_points;
     p.recognise.verdict.points = recognise.verdict.points;
     p.recognise.verdict.verify_reach = recognise.verdict.verify_reach;
 }

@@ -86,6 +86,7 @@ mod tests {
         assert!(paper.detect.quads.three_sided && !Params::default().detect.quads.three_sided);
         assert!(paper.detect.tiling.remove && paper.detect.relaxation.linear_weight.abs() < 1e-15);
         assert!(!paper.recognise.verdict.points && paper.recognise.verdict.verify_reach.abs() < 1e-15);
+        assert!(paper.learn.gates.refuse_one_side && paper.learn.gates.refuse_few_points);
         assert_eq!(Preset::Paper.distance(), DistanceKind::Hausdorff);
         assert_eq!(paper.distance_hash(), Params::default().distance_hash());
     }

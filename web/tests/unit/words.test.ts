@@ -46,7 +46,7 @@ test("the gate of the known position is told with its number and limit", () => {
 });
 
 const landmark = (fields: Partial<Landmark>): Landmark => ({
-  name: "a", status: "active", health: "sound", views: 3, failed_gates: [], size: { width_m: 1, height_m: 1 },
+  name: "a", status: "active", health: "sound", views: 3, failed_gates: [], waived_gates: [], size: { width_m: 1, height_m: 1 },
   place: { x_m: 0, y_m: 0, z_m: 1, theta_rad: 0 }, ...fields,
 });
 

@@ -91,6 +91,12 @@ impl Class {
 
     /// Teaches all `pictures` together.
     pub(crate) fn new(pictures: Vec<Picture>, how: Taught, seed: u64, p: &Params) -> anyhow::Result<Self> {
+        let mut p = p.clone();
+        if how == Taught::Photograph {
+            // Every landmark would be refused.
+            p.learn.gates.refuse_one_side = false;
+        }
+        let p = &p;
         let wall = plaster(seed);
         let sights = of_each(&pictures, "views", |i, picture| {
             let draw = |n: u64| mixed(&[seed, 1, i as u64, n]);

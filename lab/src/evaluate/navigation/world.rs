@@ -23,7 +23,7 @@ use sim::{
 };
 use std::{collections::BTreeMap, sync::Arc};
 use vision::{
-    learn::{TrainingView, add_negatives, learn, synthesis},
+    learn::{LearnRules, TrainingView, add_negatives, learn, synthesis},
     model::{LandmarkId, LandmarkModel, ModelSet, ModelStatus},
     params::Params,
     points::taught::TaughtPoint,
@@ -181,7 +181,9 @@ fn snapshot(
     let learnt: BTreeMap<LandmarkId, StoredModel> = models
         .into_iter()
         .flatten()
-        .map(|model| (model.id, StoredModel { digest: [0; 32], model: Arc::new(model) }))
+        .map(|model| {
+            (model.id, StoredModel { digest: [0; 32], rules: LearnRules::default(), model: Arc::new(model) })
+        })
         .collect();
     let models = ModelSet::in_use(learnt.values().map(|l| l.model.clone()), &params)?;
     let look_alikes = Arc::new(look_alike_classes(&learnt, DistanceKind::Both, &params));

@@ -58,18 +58,18 @@ impl Service {
         read(self.ask(request).await).await
     }
 
-    async fn patch(&self, landmark: &str, body: Value) -> (u16, Value) {
+    pub(super) async fn patch(&self, landmark: &str, body: Value) -> (u16, Value) {
         let path = format!("/api/v1/maps/hall/landmarks/{landmark}");
         read(self.ask(request("PATCH", &path, body.to_string())).await).await
     }
 
-    async fn landmark(&self, name: &str) -> (u16, Value) {
+    pub(super) async fn landmark(&self, name: &str) -> (u16, Value) {
         self.get(&format!("/api/v1/maps/hall/landmarks/{name}")).await
     }
 }
 
-const WHOLE: (&str, &str) = ("whole_image", "true");
-const CREATE: (&str, &str) = ("create", "true");
+pub(super) const WHOLE: (&str, &str) = ("whole_image", "true");
+pub(super) const CREATE: (&str, &str) = ("create", "true");
 const SIZE: [(&str, &str); 2] = [("width_m", "0.6"), ("height_m", "0.84")];
 
 #[tokio::test]

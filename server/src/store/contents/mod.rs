@@ -69,6 +69,8 @@ pub(crate) struct LandmarkContents {
     pub(crate) health: LandmarkHealth,
     /// JSON: what led to this health.
     pub(crate) finding: Option<String>,
+    /// JSON of its own weights and gates.
+    pub(crate) learning: Option<String>,
     pub(crate) created_ms: i64,
     /// By rising number.
     pub(crate) views: Vec<ViewContents>,

@@ -20,7 +20,7 @@ use vision::model::LandmarkId;
 
 statements! {
     SETTINGS = "SELECT fusion, areas, sight FROM maps WHERE id = ?1";
-    LANDMARKS = concat!("SELECT id, name, health, finding, created_ms, ", geometry_columns!(""), " FROM landmarks \
+    LANDMARKS = concat!("SELECT id, name, health, finding, learning, created_ms, ", geometry_columns!(""), " FROM landmarks \
                 WHERE map_id = ?1 ORDER BY id");
     VIEWS = "SELECT v.landmark_id, v.image_sha256, v.image_kind, v.width_px, v.height_px, v.corners_px, v.created_ms, \
              v.icon_side, v.icon_scale, v.capture, v.icon FROM views v JOIN landmarks l ON l.id = v.landmark_id \
@@ -118,6 +118,7 @@ fn landmark(row: &SqliteRow) -> Result<(i64, LandmarkContents), sqlx::Error> {
             geometry: landmarks::geometry(row)?,
             health: landmarks::health_of(row.try_get("health")?),
             finding: row.try_get("finding")?,
+            learning: row.try_get("learning")?,
             created_ms: row.try_get("created_ms")?,
             views: Vec::new(),
             model: None,

@@ -22,7 +22,8 @@ use vision::model::LandmarkId;
 
 statements! {
     SETTINGS = "UPDATE maps SET fusion = ?2, areas = ?3, sight = ?4, preset = ?5, distance = ?6 WHERE id = ?1";
-    LANDMARK = "INSERT INTO landmarks (map_id, name, created_ms, health, finding) VALUES (?1, ?2, ?3, ?4, ?5) RETURNING id";
+    LANDMARK = "INSERT INTO landmarks (map_id, name, created_ms, health, finding, learning) \
+                VALUES (?1, ?2, ?3, ?4, ?5, ?6) RETURNING id";
     VIEW = "INSERT INTO views (landmark_id, image_sha256, image_kind, width_px, height_px, corners_px, created_ms, icon_side, \
             icon_scale, capture, icon) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11)";
     MODEL_BYTES = "INSERT INTO model_contents (sha256, bytes) VALUES (?1, ?2) ON CONFLICT (sha256) DO NOTHING";
@@ -128,6 +129,7 @@ pub(in crate::store) async fn landmark(
         .bind(new.created_ms)
         .bind(landmarks::health_word(new.health))
         .bind(&new.finding)
+        .bind(&new.learning)
         .fetch_one(&mut tx.conn)
         .await
         .map_err(StoreError::inserting("store landmark", crate::store::kind::Kind::Landmark, &new.name))?;

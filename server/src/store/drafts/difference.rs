@@ -76,7 +76,11 @@ fn landmark_change(
     (change.present, change.geometry) = (whole.present, whole.geometry);
     change.names = [old.map(|l| l.name.clone()), new.or(old).map(|l| l.name.clone())];
     match key {
-        RowKey::Landmark(_) => change.fields = whole.fields,
+        RowKey::Landmark(_) => {
+            change.fields = whole.fields;
+            let differ = old.zip(new).is_some_and(|(old, new)| old.learning != new.learning);
+            change.fields.extend(differ.then_some("learning"));
+        }
         RowKey::View(..) => change.views[usize::from(is_there)] += 1,
         RowKey::Model(_) => change.model = true,
         _ => {}

@@ -14,7 +14,7 @@ use crate::{
         contents::{self, LandmarkContents, MapContents, Numbers},
         history,
         kind::Kind,
-        landmarks, map_locations,
+        landmark_learning, landmarks, map_locations,
         map_locations::MapLocation,
         maps::{self, MapRow},
         modality_stats,
@@ -313,11 +313,12 @@ impl<'a> Publication<'a> {
     }
 }
 
-/// Gives a landmark the name, size and place that it has in the draft. A finding stays with the
+/// Gives a landmark the name, size, place and gates that it has in the draft. A finding stays with the
 /// place that it is about.
 async fn change(tx: &mut Tx, old: &LandmarkContents, new: &LandmarkContents) -> Result<(), StoreError> {
     let id = old.number.0 as i64;
     landmarks::set_geometry(tx, id, &new.geometry).await?;
+    landmark_learning::put(tx, id, new.learning.as_deref()).await?;
     if old.geometry != new.geometry {
         let health = landmarks::health_word(new.health);
         let done = sqlx::query(HEALTH).bind(id).bind(health).bind(&new.finding).execute(&mut tx.conn).await;

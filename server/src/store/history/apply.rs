@@ -95,7 +95,7 @@ fn steps(table: &KeptTable, columns: &[KeptColumn]) -> Vec<String> {
     if *name == LANDMARKS.name {
         steps.push(SET_ASIDE.to_owned());
         // A finding stays with the place that it is about.
-        let place = versioned.iter().filter(|column| **column != "name");
+        let place = versioned.iter().filter(|column| !["name", "learning"].contains(*column));
         let differs: Vec<String> = place.map(|c| format!("f.{c} IS NOT landmarks.{c}")).collect();
         let health = change(table, &["health", "finding"]);
         steps.push(format!("{health} AND ({})", differs.join(" OR ")));

@@ -74,6 +74,9 @@ statements! {
     MODELS = concat!(with_later!("models", "landmark_id", "sha256, active"),
              "SELECT f.landmark_id FROM f LEFT JOIN n ON n.landmark_id = f.landmark_id \
              WHERE f.sha256 IS NOT n.sha256 OR f.active IS NOT n.active");
+    LEARNING = concat!(with_later!("landmarks", "id", "learning"),
+               "SELECT f.id FROM f JOIN n ON n.id = f.id WHERE f.present = 1 AND n.present = 1 \
+               AND f.learning IS NOT n.learning");
     RUNS = concat!("SELECT coalesce(sum(was = 0 AND is_now = 1), 0) AS added, coalesce(sum(was = 1 AND is_now = 0), 0) AS removed \
            FROM (SELECT f.present AS was, ", is_present!("runs"), " AS is_now FROM ",
            before!("runs", "id"), " f)");
@@ -125,7 +128,7 @@ pub(crate) struct LandmarkChange {
     /// Size and place before and after; of one whose row has not changed, absent until
     /// [`fill_unchanged`].
     pub(crate) geometry: [Option<SizeAndPlace>; 2],
-    /// Of a landmark that stays: which of `name`, `size` and `place` differ.
+    /// Of a landmark that stays: which of `name`, `size`, `place` and `learning` differ.
     pub(crate) fields: Vec<&'static str>,
     /// Views added, views removed.
     pub(crate) views: [u64; 2],
@@ -212,6 +215,9 @@ pub(crate) async fn between(
     }
     for row in rows(conn, MODELS, map, (from, to)).await? {
         made.landmarks.entry(row.try_get(0).map_err(at())?).or_default().model = true;
+    }
+    for row in rows(conn, LEARNING, map, (from, to)).await? {
+        made.landmarks.entry(row.try_get(0).map_err(at())?).or_default().fields.push("learning");
     }
     for row in rows(conn, SETTINGS, map, (from, to)).await? {
         for word in SETTINGS_OF_MAP {

@@ -5,14 +5,16 @@ use crate::{
     frame::GrayImage,
     geometry::corners::Corners,
     learn::{
-        synthesis,
+        LearnRules, synthesis,
         threshold_fit::{add_negatives, fitted, unlikeness_of},
     },
     model::{
-        landmark_model::{Gate, MAX_EXEMPLARS},
-        model_bytes::{StoredModelError, renumbered},
+        landmark_model::{Gate, GateFailure, MAX_EXEMPLARS},
+        model_bytes::{StoredModelError, components, renumbered},
+        seen_from::SeenFrom,
         threshold::{LimitedBy, ThresholdError},
     },
+    params::preset::Preset,
     points::taught::view_points,
     random::Random,
 };
@@ -197,6 +199,8 @@ fn a_failed_gate_is_reported_with_value_and_limit() {
     // One of the paper's distances has a threshold, so the gates of both are not applied.
     let overlap = Gate::LikenessThreshold(ThresholdError::Overlap);
     assert_eq!(gates, [Gate::Saliency, Gate::Content, overlap]);
+    let waived: Vec<Gate> = model.waived.iter().map(|f| f.gate).collect();
+    assert_eq!(waived, [Gate::VisibilityConfidence(SeenFrom::Front), Gate::StablePoints]);
     assert!(model.hausdorff.tau.abs() < 1e-12, "accepts nothing");
 
     let one = TrainingView::photographed(&poster(1), &whole(), &p).unwrap();
@@ -204,7 +208,53 @@ fn a_failed_gate_is_reported_with_value_and_limit() {
     let ModelStatus::Candidate(failures) = &model.status else { panic!("two equal views are not enough") };
     let views = failures.iter().find(|f| f.gate == Gate::Views).unwrap();
     assert_eq!(views.to_string(), "2 views, at least 20 needed");
-    assert!(failures.iter().any(|f| f.gate == Gate::VisibilityConfidence && f.value.abs() < 1e-9));
+}
+
+#[test]
+fn rules_of_a_landmark_change_weights_and_gates_and_excuse_no_missing_threshold() {
+    let p = Params::default();
+    let blank = GrayImage::from_fn(300, 400, |u, _| 120 + (u / 60) as u8);
+    let views = synthesis::views(&blank, &whole(), 20, &p, 1);
+    let model = learn(LandmarkId(1), &views, &[], &p).unwrap();
+    let rules = LearnRules { use_despite_gates: true, ..LearnRules::default() };
+    let used = add_negatives(&model, &[], &rules.over(&p));
+    let gates = |failures: &[GateFailure]| failures.iter().map(|f| f.gate).collect::<Vec<_>>();
+    let ModelStatus::Candidate(failures) = &used.status else { panic!("nothing tells it apart") };
+    assert_eq!(gates(failures), [Gate::LikenessThreshold(ThresholdError::Overlap)]);
+    assert!(gates(&used.waived).contains(&Gate::Saliency), "{:?}", used.waived);
+
+    let poster = lesson(3, 20, &[]);
+    let strict = LearnRules { min_saliency_f: Some(900.0), ..LearnRules::default() }.over(&p);
+    let refused = add_negatives(&poster, &[], &strict);
+    let ModelStatus::Candidate(failures) = &refused.status else { panic!("F is below 900") };
+    assert_eq!((failures[0].gate, failures[0].limit), (Gate::Saliency, 900.0));
+    let again = LearnRules { use_despite_gates: true, ..LearnRules::default() }.over(&strict);
+    assert!(add_negatives(&poster, &[], &again).is_active());
+    assert_eq!(LearnRules::default().over(&p), p);
+    let cheap = LearnRules { false_positive_weight: Some(0.5), ..LearnRules::default() };
+    assert!((cheap.over(&p).learn.threshold.false_positive_weight - 0.5).abs() < 1e-12);
+}
+
+/// Generated views are no proof of another side; the paper refuses, the product says so.
+#[test]
+fn one_photograph_is_seen_from_one_side_whatever_is_generated() {
+    let paper = Preset::Paper.params();
+    let mut views = synthesis::views(&poster(1), &whole(), 24, &paper, 1);
+    views.push(TrainingView::photographed(&poster(1), &whole(), &paper).unwrap());
+    let side = GateFailure { gate: Gate::VisibilityConfidence(SeenFrom::Front), value: 0.0, limit: 0.5 };
+    let model = learn(LandmarkId(1), &views, &[], &Params::default()).unwrap();
+    assert!(model.is_active() && model.waived == [side], "{:?} {:?}", model.status, model.waived);
+    assert!((model.v_c_for_gaze() - 0.25).abs() < 1e-12 && model.v_c > 0.5);
+    let refused = learn(LandmarkId(1), &views, &[], &paper).unwrap();
+    assert_eq!((refused.status, refused.waived), (ModelStatus::Candidate(vec![side]), vec![]));
+    // A second photograph from elsewhere passes.
+    let mut beside = views[24].clone();
+    beside.corners_px =
+        Corners::try_from([[20.0, 20.0], [160.0, -10.0], [160.0, 430.0], [20.0, 380.0]]).unwrap();
+    views.push(beside);
+    let passed = learn(LandmarkId(1), &views, &[], &paper).unwrap();
+    assert_eq!((passed.status.clone(), passed.waived.clone()), (ModelStatus::Active, vec![]));
+    assert!((passed.v_c_for_gaze() - passed.photographed_v_c).abs() < 1e-12);
 }
 
 #[test]
@@ -273,6 +323,11 @@ fn a_stored_model_is_the_same_bit_for_bit() {
     let bytes = model.to_bytes();
     assert!(bytes.len() < 64 * 1024, "{}", bytes.len());
     assert_eq!(LandmarkModel::from_bytes(&bytes, &p).unwrap(), model);
+    assert_eq!(components(&bytes).unwrap(), model.components);
+    assert_eq!(
+        (model.components.size(), model.components.pictures().len()),
+        (75, 1 + model.eigenvalues.len())
+    );
 
     let mut other = p.clone();
     other.recognise.correlation.rank += 1;
@@ -297,7 +352,7 @@ fn a_stored_model_is_the_same_bit_for_bit() {
 
     let mut later = bytes.clone();
     later[4] += 1;
-    assert_eq!(LandmarkModel::from_bytes(&later, &p), Err(StoredModelError::Version { found: 4 }));
+    assert_eq!(LandmarkModel::from_bytes(&later, &p), Err(StoredModelError::Version { found: 5 }));
     for at in (6..bytes.len()).step_by(97).chain([bytes.len() - 1]) {
         let mut damaged = bytes.clone();
         damaged[at] ^= 0x10;

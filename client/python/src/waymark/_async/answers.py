@@ -11,6 +11,7 @@ from waymark.api import (
     LandmarkEvidence,
     LandmarkModelDetail,
     LocaliseResult,
+    ModelPicture,
     StoredAnswer,
     StoredAnswerSummary,
 )
@@ -60,9 +61,11 @@ class AsyncAnswers(AsyncBase):
         parts = localise_parts(image, intrinsics, mounting, scan)
         return await self._send(LocaliseResult, "localise", map, **parts)
 
-    async def landmark_model(self, map: str, landmark: str) -> LandmarkModelDetail:
-        """Thresholds, keypoints, points and sizes of a landmark's model. Refused with `not_learnt` if there is none."""
-        return await self._send(LandmarkModelDetail, "landmark_model", map, landmark)
+    async def landmark_model(self, map: str, landmark: str, *, harris: bool = False) -> LandmarkModelDetail:
+        """Thresholds, keypoints, points and sizes of a landmark's model, and on request the Harris points of its icons
+        with descriptors. Refused with `not_learnt` if there is none."""
+        query = {"harris": "true"} if harris else None
+        return await self._send(LandmarkModelDetail, "landmark_model", map, landmark, params=query)
 
     async def landmark_distances(self, map: str, landmark: str) -> LandmarkDistances:
         """Histograms of the distances that its thresholds were fitted to."""
@@ -72,9 +75,9 @@ class AsyncAnswers(AsyncBase):
         """How strongly points spoke for it in the newest stored answers."""
         return await self._send(LandmarkEvidence, "landmark_evidence", map, landmark)
 
-    async def landmark_icon(self, map: str, landmark: str) -> bytes:
-        """The learnt icon that is nearest to the mean of its views: PNG."""
-        return await self._bytes("landmark_icon", map, landmark)
+    async def landmark_icon(self, map: str, landmark: str, which: ModelPicture = "exemplar1") -> bytes:
+        """A learnt icon, the mean of the views, or a mode: PNG."""
+        return await self._bytes("landmark_icon", map, landmark, params={"which": which})
 
     async def duplicates(
         self, map: str, *, landmark: str | None = None, in_use: bool | None = None

@@ -165,8 +165,8 @@ class AsyncBase:
     async def _done(self, call: str, *at: str | int) -> None:
         await self._checked(call, at)
 
-    async def _bytes(self, call: str, *at: str | int) -> bytes:
-        return (await self._checked(call, at)).content
+    async def _bytes(self, call: str, *at: str | int, **parts: Any) -> bytes:
+        return (await self._checked(call, at, **parts)).content
 
     async def _save(self, path: str | PathLike[str], call: str, *at: str | int) -> int:
         """Writes the answer to a new file; returns its size."""

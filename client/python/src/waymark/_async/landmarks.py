@@ -18,6 +18,7 @@ from waymark.api import (
     LandmarkDeletion,
     LandmarkHealth,
     LandmarkStatus,
+    LearningSettings,
     NewLandmark,
     NumberOrder,
     Order,
@@ -94,10 +95,11 @@ class AsyncLandmarks(AsyncBase):
         name: str | Unset = UNSET,
         size: Size | Unset | None = UNSET,
         place: Place | Unset | None = UNSET,
+        learning: LearningSettings | Unset | None = UNSET,
         health: LandmarkHealth | Unset = UNSET,
     ) -> Landmark:
-        """Renames a landmark; sets size, place and health. What is not given stays; `None` forgets."""
-        body = given(name=name, size=size, place=place, health=health)
+        """Renames a landmark; sets size, place, gates and health. What is not given stays; `None` forgets."""
+        body = given(name=name, size=size, place=place, learning=learning, health=health)
         return await self._send(Landmark, "update_landmark", map, landmark, json=body)
 
     async def merge_landmarks(self, map: str, into: str, origin: str) -> Landmark:
