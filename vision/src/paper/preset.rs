@@ -7,8 +7,8 @@ use crate::{detect::params::Grouping, params::Params};
 const MIN_SCORE: f64 = 0.75;
 
 /// Relaxation over all six cues with G as printed, floor tiling removed, icons compared by the
-/// distances alone, at the detected corners, all gates refuse. What the pages of the method list as departures
-/// without a parameter is as in the defaults.
+/// distances alone, at the detected corners, all gates refuse. What the pages of the method list as
+/// departures without a parameter is as in the defaults.
 pub(crate) fn params() -> Params {
     let mut p = Params::default();
     p.detect.quads.grouping = Grouping::Relaxation;
