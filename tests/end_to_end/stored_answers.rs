@@ -52,10 +52,8 @@ async fn an_answer_is_opened_again_with_what_it_rests_on() {
     let agreeing = matched.matches.iter().filter(|m| m.agrees).count();
     assert!(matched.landmark == "poster-0" && agreeing >= 8 && matched.matches.len() <= 100, "{matched:?}");
     let quad_icon = maps.stored_quad_icon(summary.id, quad).await.expect("its icon");
-    let landmark_icon = maps
-        .landmark_icon(MAP, "poster-0", ModelPictureQuery::default())
-        .await
-        .expect("the icon of the landmark");
+    let landmark_icon =
+        maps.landmark_icon(MAP, "poster-0", ModelPictureQuery::default()).await.expect("icon");
     for icon in [&quad_icon, &landmark_icon] {
         let icon = image::load_from_memory(icon).expect("a picture");
         assert_eq!((icon.width(), icon.height()), (75, 75));
@@ -81,10 +79,8 @@ async fn an_answer_is_opened_again_with_what_it_rests_on() {
     assert!(check.source == PriorSource::Server && !check.refused && check.seen.is_some(), "{check:?}");
     assert!(check.distance2.is_some_and(|d2| d2 < check.limit), "{check:?}");
 
-    let model = maps
-        .landmark_model(MAP, "poster-0", LandmarkModelQuery { harris: Some(true) })
-        .await
-        .expect("the model");
+    let query = LandmarkModelQuery { harris: Some(true) };
+    let model = maps.landmark_model(MAP, "poster-0", query).await.expect("the model");
     assert!(model.in_use && model.correlation.threshold > 0.0 && !model.keypoints.is_empty(), "{model:?}");
     assert_eq!(model.harris.len(), model.exemplars);
     let distances = maps.landmark_distances(MAP, "poster-0").await.expect("distances");

@@ -95,7 +95,7 @@ pub struct LandmarkDifference {
     pub old_name: Option<String>,
     /// Whether it is new, gone, or differs.
     pub change: ChangeKind,
-    /// Of one that stays: name, size, place.
+    /// Of one that stays: name, size, place, learning.
     pub fields: Vec<String>,
     /// Its size and place before; absent if it is new.
     pub before: Option<SizeAndPlace>,

@@ -77,7 +77,7 @@ fn threshold(of: &Threshold) -> ThresholdBody {
     }
 }
 
-/// The Harris points of an icon with their descriptors: they follow from the icon, and are computed.
+/// The Harris points of an icon with their descriptors: computed, since they follow from the icon.
 fn harris_set((index, icon): (usize, &IconFeatures)) -> HarrisSet {
     let points = &icon.points;
     let each = points.xy_px().iter().zip(points.responses()).zip(points.descriptors());

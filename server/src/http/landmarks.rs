@@ -276,7 +276,8 @@ async fn get(
 }
 
 /// Renames it; sets or forgets size, place, and weights and gates of its own; sets how far it is
-/// trusted. Everything that belongs to it follows the name. A size whose ratio of sides its photographs contradict is refused.
+/// trusted. Everything that belongs to it follows the name. A size whose ratio of sides its
+/// photographs contradict is refused.
 #[utoipa::path(patch, path = "/maps/{map}/landmarks/{landmark}", operation_id = "updateLandmark", tag = "landmarks",
     params(("map" = String, Path), ("landmark" = String, Path)), request_body = LandmarkPatch,
     responses((status = 200, body = Landmark), (status = 404, body = Problem),

@@ -86,18 +86,7 @@ pub(super) async fn commit(
     let rows_of = |models: &[LandmarkModel]| -> Vec<NewModel> {
         models.iter().map(|model| row(model, &of(model), refused.get(&model.id).map(stored))).collect()
     };
-    let mut refitted = fitted.refitted.clone();
-    for model in &mut refitted {
-        // They are not in memory. A landmark that was deleted meanwhile stores nothing.
-        let bytes = match models::get(store.reads(), model.id).await {
-            Err(StoreError::NotFound { .. }) => continue,
-            bytes => bytes?,
-        };
-        model.components = components(&bytes).map_err(|e| StoreError::Damaged {
-            what: format!("the model of landmark number {}", model.id.0),
-            reason: e.to_string(),
-        })?;
-    }
+    let refitted = with_components(store, fitted.refitted.clone()).await?;
     let rows: Vec<NewModel> = [rows_of(&fitted.models), rows_of(&refitted)].concat();
     let write = store.write(move |tx| {
         Box::pin(async move {
@@ -114,6 +103,25 @@ pub(super) async fn commit(
         })
     });
     write.await
+}
+
+/// Stored models with their mean and modes, which are not in memory.
+async fn with_components(
+    store: &Catalogue,
+    mut all: Vec<LandmarkModel>,
+) -> Result<Vec<LandmarkModel>, StoreError> {
+    for model in &mut all {
+        let bytes = match models::get(store.reads(), model.id).await {
+            // It was deleted meanwhile: nothing is stored of it.
+            Err(StoreError::NotFound { .. }) => continue,
+            bytes => bytes?,
+        };
+        model.components = components(&bytes).map_err(|e| StoreError::Damaged {
+            what: format!("the model of landmark number {}", model.id.0),
+            reason: e.to_string(),
+        })?;
+    }
+    Ok(all)
 }
 
 /// The thresholds of a model, as they are among its facts.

@@ -1,5 +1,5 @@
-//! Mean and leading modes of the views of a landmark, as pictures (method 7.2). Recognition compares
-//! with the exemplars, never with these; they are stored at the end of a model's bytes.
+//! Mean and leading modes of the views of a landmark, as pictures (method 7.2). Recognition
+//! compares with the exemplars, never with these; they are stored at the end of a model's bytes.
 
 use crate::{
     icon::MAX_ICON_SIZE,

@@ -81,7 +81,7 @@ async fn a_failed_gate_is_overruled_for_a_reason_that_the_history_keeps() {
     assert_eq!(audit["items"][0]["why"], "nothing else hangs there", "{audit}");
     let id = newest["id"].as_i64().unwrap();
     let (_, differs) = service.get(&format!("/api/v1/maps/hall/difference?from={}", id - 1)).await;
-    assert_eq!(differs["landmarks"][0]["fields"], json!(["learning"]), "{differs}");
+    assert_eq!(differs["landmarks"]["items"][0]["fields"], json!(["learning"]), "{differs}");
 
     let undo = request("POST", &format!("/api/v1/maps/hall/commits/{id}/undo"), "{}");
     assert_eq!(service.ask(undo).await.status(), StatusCode::OK);

@@ -313,8 +313,8 @@ impl<'a> Publication<'a> {
     }
 }
 
-/// Gives a landmark the name, size, place and gates that it has in the draft. A finding stays with the
-/// place that it is about.
+/// Gives a landmark the name, size, place and gates that it has in the draft. A finding stays with
+/// the place that it is about.
 async fn change(tx: &mut Tx, old: &LandmarkContents, new: &LandmarkContents) -> Result<(), StoreError> {
     let id = old.number.0 as i64;
     landmarks::set_geometry(tx, id, &new.geometry).await?;

@@ -108,7 +108,7 @@ fn model_digest(model: &ModelContents) -> RowDigest {
     digest([&model.bytes[..], &model.params_hash, said.as_bytes()])
 }
 
-/// Name, size, place and gates. Health is found out by robots, and is not part of what is published.
+/// Name, size, place and gates. Health is found out by robots, and is no part of what is published.
 fn landmark_digest(landmark: &LandmarkContents) -> RowDigest {
     digest_of(&(&landmark.name, &landmark.geometry, &landmark.learning))
 }
