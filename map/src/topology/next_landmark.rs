@@ -23,15 +23,15 @@ pub struct NextLandmark {
 }
 
 /// The landmark of the largest utility by the paper's product, at the first pose along a path from
-/// which any has one. `None` if there is none on the whole path. Errors: camera or unit out of
-/// range.
+/// which any has one; where all are 0 (models without visibility confidence), at the first pose
+/// that sees any. `None` if none is seen on the whole path. Errors: camera or unit out of range.
 pub fn next_landmark(
     path: &[Point2<f64>],
     candidates: &[GazeCandidate<'_>],
     viewer: &PanTiltCamera,
     head: &PanTiltUnit,
 ) -> Result<Option<NextLandmark>, OutOfRange> {
-    let mut walked_m = 0.0;
+    let (mut walked_m, mut seen) = (0.0, None);
     let single = path.first().map(|point| [*point, *point]).filter(|_| path.len() == 1);
     for [a, b] in single.into_iter().chain(path.array_windows::<2>().copied()) {
         let (along, length_m) = (b - a, (b - a).norm());
@@ -43,13 +43,14 @@ pub fn next_landmark(
             let target = best(&pose, candidates, viewer, head)?;
             let found =
                 |target| NextLandmark { map_from_robot: pose, along_m: walked_m + share * length_m, target };
-            if let Some(found) = target.map(found) {
-                return Ok(Some(found));
+            match target.map(found) {
+                Some(found) if found.target.utility > 0.0 => return Ok(Some(found)),
+                other => seen = seen.or(other),
             }
         }
         walked_m += length_m;
     }
-    Ok(None)
+    Ok(seen)
 }
 
 fn best(
@@ -63,6 +64,5 @@ fn best(
     let near: Vec<GazeCandidate<'_>> =
         candidates.iter().filter(|c| c.visible.contains(&camera)).copied().collect();
     let pose = Pose2Covariance { pose: *pose, covariance: Matrix3::zeros() };
-    let ranked = rank(&pose, &near, viewer, head, &GazeParams::default())?;
-    Ok(ranked.into_iter().next().filter(|target| target.utility > 0.0))
+    Ok(rank(&pose, &near, viewer, head, &GazeParams::default())?.into_iter().next())
 }

@@ -159,6 +159,9 @@ fn a_route_goes_from_passage_to_passage_with_the_landmark_to_look_for() {
     let ranked = rank(&sure, &candidates, &viewer, &head, &GazeParams::default()).unwrap();
     assert_eq!(ranked[0], next.target);
     assert!(next.along_m <= legs[1].length_m);
+    let unsure: Vec<_> = candidates.iter().map(|c| GazeCandidate { v_c: 0.0, ..*c }).collect();
+    let seen = next_landmark(&legs[1].path, &unsure, &viewer, &head).unwrap().unwrap();
+    assert!(seen.target.landmark.0 == 1 && seen.target.utility.abs() < 1e-15 && seen.along_m <= next.along_m);
     assert_eq!(next_landmark(&legs[2].path, &candidates[1..], &viewer, &head).unwrap(), None);
     let stay = site.route(&at("hall", 1), None, &at("hall", 1)).unwrap();
     assert_eq!((stay.len(), stay[0].passage, stay[0].path.len()), (1, None, 1));
