@@ -1,30 +1,19 @@
-//! Errors that a simulated robot makes: in its intrinsics, its extrinsics, and on a survey in its
-//! pose. A covariance can only be evaluated where the errors that it states are made.
+//! Errors that a simulated robot makes in its intrinsics and extrinsics. A covariance can only be
+//! evaluated where the errors that it states are made.
 
-use map::{
-    check::OutOfRange,
-    extrinsics::CameraExtrinsics,
-    pose2::{Pose2, Pose2Covariance},
-};
-use nalgebra::{Isometry3, Matrix3, Vector3, Vector6};
+use map::{check::OutOfRange, extrinsics::CameraExtrinsics};
+use nalgebra::{Isometry3, Vector6};
 use vision::{
     frame::{Intrinsics, IntrinsicsSigmas},
     pose::reprojection::perturbed,
     random::Random,
 };
 
-/// How well a surveying robot knows its pose: standard deviations of x, y (metres) and heading
-/// (radians).
-const SURVEY_SIGMA: [f64; 3] = [0.01, 0.01, 0.002];
-
-/// The errors of one robot: those of intrinsics and extrinsics are the same in every picture, those
-/// of the pose are new each time.
+/// The errors of one robot, the same in every picture.
 #[derive(Debug, Clone)]
 pub struct SimulatedRobotErrors {
     /// The intrinsics that it states.
     pub camera: Intrinsics,
-    /// `None`: no errors.
-    random: Option<Random>,
     /// Error of the extrinsics: left perturbation (rotation, translation; rad and m), robot frame.
     extrinsics_error: Vector6<f64>,
 }
@@ -32,11 +21,11 @@ pub struct SimulatedRobotErrors {
 impl SimulatedRobotErrors {
     /// A robot without errors. It states exact intrinsics, and the usual covariances for the rest.
     pub fn none(camera: &Intrinsics) -> Self {
-        Self { camera: *camera, random: None, extrinsics_error: Vector6::zeros() }
+        Self { camera: *camera, extrinsics_error: Vector6::zeros() }
     }
 
-    /// A robot with errors as large as it states: those of a usual calibration, of default
-    /// extrinsics, of a survey.
+    /// A robot with errors as large as it states: those of a usual calibration and of default
+    /// extrinsics.
     pub fn drawn(camera: &Intrinsics, seed: u64) -> Self {
         let mut random = Random::new(seed);
         let sigmas = IntrinsicsSigmas::usual(camera.fx_px);
@@ -47,7 +36,7 @@ impl SimulatedRobotErrors {
             Intrinsics { fx_px, fy_px, cx_px: camera.cx_px + e.y, cy_px: camera.cy_px + e.z, ..usual };
         let (a, t) = (CameraExtrinsics::DEFAULT_ANGLE_SIGMA_RAD, CameraExtrinsics::DEFAULT_POSITION_SIGMA_M);
         let extrinsics_error = Vector6::new(a, a, a, t, t, t).map(|s| s * random.normal());
-        Self { camera: stated, random: Some(random), extrinsics_error }
+        Self { camera: stated, extrinsics_error }
     }
 
     /// Without errors if `exact`.
@@ -63,14 +52,6 @@ impl SimulatedRobotErrors {
         );
         CameraExtrinsics::new(perturbed(robot_from_camera, &turn, &shift))
     }
-
-    /// The pose that it states on a survey (map frame).
-    pub fn surveyed(&mut self, map_from_robot: &Pose2) -> Result<Pose2Covariance, OutOfRange> {
-        let sigmas = Vector3::from(SURVEY_SIGMA);
-        let error = self.random.as_mut().map_or_else(Vector3::zeros, |r| sigmas.map(|s| s * r.normal()));
-        let covariance = Matrix3::from_diagonal(&sigmas.component_mul(&sigmas));
-        Pose2Covariance::new(map_from_robot.plus(&error), covariance)
-    }
 }
 
 #[cfg(test)]
@@ -81,23 +62,19 @@ mod tests {
     #[test]
     fn errors_are_as_large_as_they_are_said_to_be() {
         let camera = Intrinsics::new(500.0, 500.0, 320.0, 240.0, Distortion::None).unwrap();
-        let (at, seat) = (Pose2::new(3.0, 1.0, 0.5), Isometry3::translation(0.1, 0.0, 1.2));
+        let seat = Isometry3::translation(0.1, 0.0, 1.2);
         let n = 500_u32;
-        let (mut focal, mut turn, mut nees) = (0.0, 0.0, 0.0);
+        let (mut focal, mut turn) = (0.0, 0.0);
         for seed in 0..n {
-            let mut robot = SimulatedRobotErrors::drawn(&camera, u64::from(seed));
+            let robot = SimulatedRobotErrors::drawn(&camera, u64::from(seed));
             focal += ((robot.camera.fx_px / 500.0 - 1.0) / IntrinsicsSigmas::USUAL_FOCAL_SHARE).powi(2);
             let angle = robot.extrinsics(&seat).unwrap().robot_from_camera.rotation.angle();
             turn += (angle / CameraExtrinsics::DEFAULT_ANGLE_SIGMA_RAD).powi(2);
-            let said = robot.surveyed(&at).unwrap();
-            let e = said.pose.minus(&at);
-            nees += e.dot(&said.covariance.cholesky().unwrap().solve(&e));
             assert!(robot.camera.sigmas.is_some());
         }
         let of = |sum: f64| sum / f64::from(n);
         assert!((0.8..1.2).contains(&of(focal)) && (2.6..3.4).contains(&of(turn)), "{focal} {turn}");
-        assert!((2.6..3.4).contains(&of(nees)), "{nees}");
-        let mut exact = SimulatedRobotErrors::none(&camera);
-        assert_eq!((exact.surveyed(&at).unwrap().pose, exact.camera), (at, camera));
+        let exact = SimulatedRobotErrors::none(&camera);
+        assert_eq!((exact.extrinsics(&seat).unwrap().robot_from_camera, exact.camera), (seat, camera));
     }
 }

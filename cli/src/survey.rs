@@ -1,6 +1,6 @@
-//! A first drive: a robot with a known pose maps the walls by laser and takes frames of every
-//! poster from several sides. In: stops. Out: walls, and views of each poster with its detected
-//! quad. The demo teaches them to a server, an evaluation to itself.
+//! A first drive: a robot maps the walls by laser and takes frames of every poster from several
+//! sides. In: stops, and the pose that it states at each. Out: walls, and views of each poster with
+//! its detected quad. The demo teaches them to a server, an evaluation to itself.
 //!
 //! In the field a person gives the name of the poster and clicks on its quad; here the simulator's
 //! truth replaces the click. Corners, places and sizes are measured, not taken from the truth.
@@ -15,6 +15,7 @@ use map::{
     segments::LaserSegment,
     walls::{WallParams, Walls},
 };
+use nalgebra::{Matrix3, Vector3};
 use sim::{
     lesson::Stop,
     robot::{Robot, SensorReadings},
@@ -29,6 +30,10 @@ use vision::{
 
 /// The person clicks on the quad that is the poster.
 const IOU_CLICKED: f64 = 0.7;
+
+/// How well a surveying robot with a known pose says to know it: standard deviations of x, y
+/// (metres) and heading (radians).
+const KNOWN_SIGMA: [f64; 3] = [0.01, 0.01, 0.002];
 
 /// A frame in which a poster was found.
 #[derive(Debug)]
@@ -53,21 +58,37 @@ pub struct Survey {
     pub missed: usize,
 }
 
-/// Drives to all stops. Errors: a scan or a pose is out of range.
-pub fn survey(mut robot: Robot, stops: &[Stop], mut errors: SimulatedRobotErrors) -> anyhow::Result<Survey> {
+/// Stops with their true poses, as a robot states them that knows its pose.
+pub fn known_poses(stops: Vec<Stop>) -> Vec<(Stop, Pose2Covariance)> {
+    let sigmas = Vector3::from(KNOWN_SIGMA);
+    let covariance = Matrix3::from_diagonal(&sigmas.component_mul(&sigmas));
+    let known = |stop: Stop| {
+        let pose = stop.step.map_from_robot;
+        (stop, Pose2Covariance { pose, covariance })
+    };
+    stops.into_iter().map(known).collect()
+}
+
+/// Drives to all stops, each with the pose that the robot states there. Errors: a scan or a pose is
+/// out of range.
+pub fn survey(
+    mut robot: Robot,
+    stops: &[(Stop, Pose2Covariance)],
+    errors: &SimulatedRobotErrors,
+    p: &DetectParams,
+) -> anyhow::Result<Survey> {
     let progress = screen::progress(stops.len(), "first drive");
     let mut walls = Walls::new(WallParams::default());
     let (mut views, mut missed) = (BTreeMap::<String, Vec<SurveyView>>::new(), 0);
-    for stop in stops {
+    for (stop, map_from_robot) in stops {
         let readings = robot.look(&stop.step);
-        let map_from_robot = errors.surveyed(&readings.step.map_from_robot)?;
         let extrinsics = errors.extrinsics(&readings.step.robot_from_camera)?;
-        walls.add(&map_from_robot, &lines::segments(&readings.scan, &LineParams::default()))?;
-        match clicked(&readings, &stop.landmark) {
+        walls.add(map_from_robot, &lines::segments(&readings.scan, &LineParams::default()))?;
+        match clicked(&readings, &stop.landmark, p) {
             Some(quad) => views.entry(stop.landmark.clone()).or_default().push(SurveyView {
                 quad,
                 readings,
-                map_from_robot,
+                map_from_robot: *map_from_robot,
                 extrinsics,
             }),
             None => missed += 1,
@@ -79,9 +100,9 @@ pub fn survey(mut robot: Robot, stops: &[Stop], mut errors: SimulatedRobotErrors
 }
 
 /// The detected quad that a person would click on.
-fn clicked(readings: &SensorReadings, name: &str) -> Option<Quad> {
+fn clicked(readings: &SensorReadings, name: &str, p: &DetectParams) -> Option<Quad> {
     let truth = readings.frame.truth.landmark(name)?;
-    detect(&readings.frame.image, &DetectParams::default(), &mut NoTrace)
+    detect(&readings.frame.image, p, &mut NoTrace)
         .into_iter()
         .filter(|quad| quad.kind == QuadKind::Full)
         .find(|quad| polygon::iou(quad.corners_px.points(), truth.corners_px.points()) >= IOU_CLICKED)

@@ -1,5 +1,6 @@
 //! A robot drives up and down a corridor: true pose, odometry and camera direction, step by step.
-//! It follows its true path; [`crate::robot`] adds what camera and laser measure.
+//! It follows its true path, unlike [`crate::steered`]; [`crate::robot`] adds what camera and laser
+//! measure.
 
 use std::sync::Arc;
 
@@ -216,7 +217,7 @@ impl Iterator for Drive {
     }
 }
 
-fn clamped(p: &DriveParams) -> DriveParams {
+pub(crate) fn clamped(p: &DriveParams) -> DriveParams {
     let within = |x: f64, low: f64, high: f64| if x.is_finite() { x.clamp(low, high) } else { low };
     DriveParams {
         start_m: within(p.start_m, 0.0, 1e6),
@@ -231,7 +232,7 @@ fn clamped(p: &DriveParams) -> DriveParams {
 }
 
 /// The middle line of the walls' bounding box along its longer side, `gap_m` short of both ends.
-fn middle(building: &Building, gap_m: f64) -> [Point2<f64>; 2] {
+pub fn middle(building: &Building, gap_m: f64) -> [Point2<f64>; 2] {
     let ends = || building.walls().iter().flat_map(|w| [w.a_m, w.b_m]);
     let bound =
         |f: fn(f64, f64) -> f64, of: fn(&Point2<f64>) -> f64| ends().map(|p| of(&p)).reduce(f).unwrap_or(0.0);

@@ -1,5 +1,5 @@
-//! Ideal gaze controller on ground-truth poses; not `map::gaze`. The camera is aimed at the poster
-//! with the best view, at the speed of the pan-tilt unit, otherwise ahead.
+//! The pan-tilt unit, and an ideal gaze controller on ground-truth poses, which is not `map::gaze`:
+//! the camera is aimed at the poster with the best view, at the speed of the unit, otherwise ahead.
 
 use map::extrinsics::pan_tilt;
 use map::pose2::{Pose2, wrap_rad};
@@ -81,12 +81,17 @@ impl Gaze {
             .max_by(|a, b| a.1.total_cmp(&b.1));
         let (pan, tilt) = best.map_or((0.0, 0.0), |(l, _)| aim(map_from_robot, self.p.camera_height_m, l));
         self.target = best.map(|(l, _)| l.name.clone());
+        self.turn_to(pan, tilt, dt_s);
+        self.target.clone()
+    }
+
+    /// Turns towards these angles for `dt_s` seconds, or at once if `None`.
+    pub(crate) fn turn_to(&mut self, pan: f64, tilt: f64, dt_s: Option<f64>) {
         let most = dt_s.map_or(f64::INFINITY, |dt| (self.p.rate_radps * dt).max(0.0));
         let turn =
             |from: f64, to: f64, limit: f64| from + (to.clamp(-limit, limit) - from).clamp(-most, most);
         self.pan_rad = turn(self.pan_rad, pan, self.p.max_pan_rad.abs());
         self.tilt_rad = turn(self.tilt_rad, tilt, self.p.max_tilt_rad.abs());
-        self.target.clone()
     }
 
     /// Quality of the view of a poster; `None` without a view. The present target gets a bonus

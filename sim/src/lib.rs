@@ -54,6 +54,7 @@ pub mod laser;
 pub mod odometry;
 pub mod gaze;
 pub mod drive;
+pub mod steered;
 pub mod robot;
 pub mod lesson;
 pub mod office;

@@ -5,7 +5,7 @@ use super::MAP;
 use crate::{
     pictures, screen,
     simulated_errors::SimulatedRobotErrors,
-    survey::{place_on_walls, survey},
+    survey::{known_poses, place_on_walls, survey},
 };
 use client::{
     LandmarkRegion, MapClient,
@@ -18,6 +18,7 @@ use sim::{
     robot::{Robot, RobotParams},
 };
 use std::{sync::Arc, time::Duration};
+use vision::detect::DetectParams;
 
 /// Longest wait for the lesson.
 const LESSON_TIMEOUT: Duration = Duration::from_mins(10);
@@ -45,10 +46,10 @@ pub(super) async fn teach(
     maps.create_map(&NewMap::new(MAP)).await?;
     let robot = Robot::new(building.clone(), &RobotParams::default());
     let camera = *robot.camera().intrinsics();
-    let stops = stops(building, &LessonParams { seed, ..LessonParams::default() });
-    let survey =
-        tokio::task::spawn_blocking(move || survey(robot, &stops, SimulatedRobotErrors::none(&camera)))
-            .await??;
+    let stops = known_poses(stops(building, &LessonParams { seed, ..LessonParams::default() }));
+    let exact = SimulatedRobotErrors::none(&camera);
+    let work = move || survey(robot, &stops, &exact, &DetectParams::default());
+    let survey = tokio::task::spawn_blocking(work).await??;
 
     let mut taught = Taught { walls: survey.walls.len(), views_missed: survey.missed, ..Taught::default() };
     let walls: WallsBody = survey.walls.iter().map(|w| [w.a.into(), w.b.into()]).collect();

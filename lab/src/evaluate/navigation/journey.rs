@@ -1,37 +1,31 @@
-//! One drive, with the code of the server's workers: scans and frames through the engine's motion
-//! tracker, landmarks checked, changes of landmark health put into the map. No transport, no
-//! threads; at equal times the scan comes before the frame. Compared with the truth; the start pose
-//! is unknown to the robot.
+//! One drive: scans and frames go to the server's code, landmarks are checked, changes of landmark
+//! health put into the map. At equal times the scan comes before the frame. Compared with the
+//! truth; the start pose is unknown to the server.
 
 use super::{
     super::experiment::mixed,
+    body::Body,
     kidnap::{Kidnap, KidnapOutcome},
-    world::{MAP, World},
+    server::Server,
+    world::World,
 };
 use cli::simulated_errors::SimulatedRobotErrors;
 use engine::{
     analysis::{StageTimes, analyse_frame, frame_camera},
-    context::FrameContext,
-    guided::{GuidedResult, recognise_guided},
-    landmark_checks::{LandmarkChecks, evaluate_frame},
-    live::LiveHub,
-    motion::{Corrections, FrameStamp as At, MotionTracker},
-    scan_job::ScanJob,
-    snapshot::{MapSnapshot, Snapshots},
+    guided::GuidedResult,
+    motion::{Corrections, RunRecording},
 };
 use map::{
-    landmark_health::{HealthChange, LandmarkHealth},
+    landmark_health::LandmarkHealth,
     pose2::{Pose2, Pose2Covariance},
 };
 use nalgebra::Matrix2;
-use protos::Name;
 use sim::{
     building::LandmarkKind,
-    drive::DriveParams,
-    robot::{Robot, RobotParams, SensorReadings},
+    robot::SensorReadings,
     truth::{LandmarkView, ViewState},
 };
-use std::{collections::BTreeMap, sync::Arc, time::Instant};
+use std::collections::BTreeMap;
 use vision::{
     geometry::{Corners, polygon},
     model::LandmarkId,
@@ -48,21 +42,19 @@ const MIN_SIDE_PX: f64 = 38.0;
 const MAX_VIEW_ANGLE_RAD: f64 = 1.309;
 /// A cut or hidden landmark counts if at least this share of it is visible.
 const MIN_SHARE: f64 = 0.25;
-/// Start beyond any corridor: the simulator clamps it to the end.
-const FAR_END_M: f64 = 1e3;
-/// One run of the robot's software.
-const EPOCH: u64 = 1;
 
 /// True and estimated poses at one time.
 pub(super) struct Moment {
     pub(super) time_s: f64,
     pub(super) truth: Pose2,
-    /// Odometry alone, from the true start.
+    /// Odometry alone: from the true start, or from the start of the planned path.
     pub(super) odometry: Pose2,
     /// None before the first fix.
     pub(super) fused: Option<Pose2Covariance>,
     /// A landmark corrected it here.
     pub(super) corrected: bool,
+    /// How far the true pose is to the left of the planned path; none for a scripted drive.
+    pub(super) off_path_m: Option<f64>,
 }
 
 #[derive(Default)]
@@ -89,6 +81,10 @@ pub(super) struct Journey {
     pub(super) quarantined: usize,
     /// Outcome of kidnapping the robot, if it was.
     pub(super) kidnapped: Option<KidnapOutcome>,
+    /// It came to the end of its path.
+    pub(super) arrived: bool,
+    /// All that the robot's fusion got.
+    pub(super) recording: Option<Box<RunRecording>>,
 }
 
 /// Views of taught landmarks of one kind.
@@ -112,119 +108,25 @@ pub(super) struct DriveSettings {
     pub(super) rate_hz: f64,
     /// They have a laser.
     pub(super) laser: bool,
-    /// Intrinsics and extrinsics of the cameras are exact.
-    pub(super) exact: bool,
     /// Distance that the robot is carried forwards, m; 0: none.
     pub(super) kidnap_m: f64,
 }
 
-/// The server's side: one robot in one map.
-struct Server {
-    snapshots: Arc<Snapshots>,
-    motion: MotionTracker,
-    robot: Name,
-    camera: Name,
-    /// Constant: no time of the computer passes in a drive.
-    now: Instant,
-}
-
-impl Server {
-    fn new(map: &MapSnapshot) -> anyhow::Result<Self> {
-        let name = |text| Name::new(text).map_err(|refusal| anyhow::anyhow!("{refusal:?}"));
-        let (robot, camera) = (name("robot")?, name("front")?);
-        let snapshots = Arc::new(Snapshots::default());
-        snapshots.publish(Arc::new(map.clone()));
-        snapshots.set_robot(robot.as_ref(), Some(MAP));
-        let motion = MotionTracker::new(snapshots.clone(), Arc::new(LiveHub::default()));
-        Ok(Self { snapshots, motion, robot, camera, now: Instant::now() })
-    }
-
-    fn map(&self) -> anyhow::Result<Arc<MapSnapshot>> {
-        self.snapshots.get(MAP).ok_or_else(|| anyhow::anyhow!("the map is gone"))
-    }
-
-    fn scan(&self, seen: &SensorReadings, odom_from_robot: Pose2, captured_ns: i64) {
-        let scan = seen.scan.clone();
-        self.motion.fix_by_scan(
-            &self.robot,
-            &ScanJob { map: MAP.to_owned(), epoch: EPOCH, captured_ns, odom_from_robot, scan },
-            self.now,
-        );
-    }
-
-    /// Applies a frame to the robot's pose; returns changes of landmark health and guided names.
-    fn frame(
-        &self,
-        map: &MapSnapshot,
-        analysis: &FrameAnalysis,
-        (seen, odom_from_robot): (&SensorReadings, Pose2),
-        (wrong, captured_ns): (&SimulatedRobotErrors, i64),
-    ) -> (Vec<HealthChange>, Option<GuidedResult>) {
-        let at = At { map: MAP, epoch: EPOCH, captured_ns, odometry: Some(odom_from_robot), now: self.now };
-        let extrinsics = wrong.extrinsics(&seen.step.robot_from_camera).ok();
-        let image = &seen.frame.image;
-        let frame = FrameContext {
-            is_whole: true,
-            analysis,
-            map,
-            extrinsics: extrinsics.as_ref(),
-            camera: Some(&wrong.camera),
-            image_px: [image.width() as f64, image.height() as f64],
-            prior: None,
-        };
-        let prior = self.motion.prior_pose(&self.robot, &self.camera, at);
-        let guide = prior.as_ref().filter(|p| p.plan.guided).map(|p| p.pose);
-        let guided = guide.map(|pose| recognise_guided(image, &frame, &pose));
-        let evaluation = evaluate_frame(&frame, prior, guided.as_ref().unwrap_or(&GuidedResult::default()));
-        self.motion.apply_frame(&self.robot, &self.camera, at, &evaluation.fixes());
-        let changes = |c: LandmarkChecks| {
-            self.motion.update_landmark_health(&self.robot, at, &c.prior, &c.observed, &c.missed)
-        };
-        (evaluation.checks.map_or_else(Vec::new, changes), guided)
-    }
-
-    /// As the store does.
-    fn change(&self, map: &MapSnapshot, changes: &[HealthChange]) {
-        let mut next = map.clone();
-        next.version += 1;
-        for change in changes {
-            if let Some(info) = next.landmarks.get_mut(&change.landmark) {
-                info.health = change.health;
-            }
-        }
-        self.snapshots.publish(Arc::new(next));
-    }
-
-    /// Fixes by landmarks that corrected the pose so far.
-    fn corrections(&self) -> u64 {
-        let log = self.motion.corrections(&self.robot);
-        of(&log, "landmarks", &["started", "applied", "reset"])
-    }
-}
-
-/// How often a modality had one of these outcomes.
-pub(super) fn of(log: &Corrections, modality: &str, outcomes: &[&str]) -> u64 {
-    let counts = log.totals.get(modality);
-    counts.map_or(0, |counts| outcomes.iter().filter_map(|o| counts.get(o)).sum())
-}
-
 /// Drives the length of the corridor once.
 pub(super) fn drive(world: &World, way: DriveSettings) -> anyhow::Result<Journey> {
-    let start_m = if way.back { FAR_END_M } else { 0.0 };
-    let (seed, reverse, rate_hz) = (way.seed, way.back, way.rate_hz);
-    let drive = DriveParams { seed, start_m, reverse, rate_hz, ..DriveParams::default() };
-    let robot = Robot::new(world.building.clone(), &RobotParams { drive, ..RobotParams::default() });
-    let wrong = SimulatedRobotErrors::of(robot.camera().intrinsics(), way.exact, mixed(&[way.seed, 14]));
+    let mut body = Body::new(world, way);
+    let wrong = SimulatedRobotErrors::of(body.camera(), !world.course.closed, mixed(&[way.seed, 14]));
     let server = Server::new(&world.map)?;
+    server.record()?;
     let mut journey = Journey::default();
     let mut kidnap = Kidnap::new(way.kidnap_m);
     let mut frames_that_show = 0;
-    for seen in robot {
+    while let Some(seen) = body.sense() {
         let captured_ns = (seen.step.time_s * 1e9) as i64;
         let before = server.corrections();
         let odom_from_robot = kidnap.odometry(seen.step.time_s, seen.step.odom_from_robot);
         if way.laser {
-            server.scan(&seen, odom_from_robot, captured_ns);
+            server.scan(&seen.scan, odom_from_robot, captured_ns);
         }
         let map = server.map()?;
         let mounting = wrong.extrinsics(&seen.step.robot_from_camera).ok();
@@ -241,23 +143,37 @@ pub(super) fn drive(world: &World, way: DriveSettings) -> anyhow::Result<Journey
             journey.quarantined += of(LandmarkHealth::Quarantined);
             server.change(&map, &changes);
         }
-        let fused = server.motion.pose(&server.robot, MAP, server.now);
+        let fused = server.pose();
         if fused.is_some() && journey.frames_to_fix.is_none() {
             journey.frames_to_fix = Some(frames_that_show);
         }
         let misled = journey.guided_false - misled;
-        kidnap.count_frame(seen.step.time_s, (shows, misled), (fused.as_ref(), &seen.step.map_from_robot));
+        let truth = seen.step.map_from_robot;
+        kidnap.count_frame(seen.step.time_s, (shows, misled), (fused.as_ref(), &truth));
         journey.moments.push(Moment {
             time_s: seen.step.time_s,
-            truth: seen.step.map_from_robot,
+            truth,
             odometry: odom_from_robot,
             fused,
             corrected: server.corrections() > before,
+            off_path_m: body.off_path_m(&truth),
         });
+        body.steer(&server, &odom_from_robot, &named(&analysis, guided.as_ref()))?;
     }
+    journey.arrived = body.has_arrived();
     journey.kidnapped = kidnap.outcome;
-    journey.log = server.motion.corrections(&server.robot);
+    journey.log = server.log();
+    journey.recording = server.recording();
     Ok(journey)
+}
+
+/// The landmarks that a frame's answer names, right or wrong.
+fn named(analysis: &FrameAnalysis, guided: Option<&GuidedResult>) -> Vec<LandmarkId> {
+    let by_picture = analysis.quads.iter().filter_map(|quad| match quad.recognition.as_ref()?.verdict {
+        Verdict::Unique(id) => Some(id),
+        _ => None,
+    });
+    by_picture.chain(guided.iter().flat_map(|g| &g.observations).map(|o| o.landmark)).collect()
 }
 
 impl Journey {

@@ -1,19 +1,29 @@
 //! `waymark-lab evaluate navigation` (method 18, E10 and E12): the paper's corridor, 25 m long with
-//! four posters. A first drive teaches; then robots drive through it, each from an unknown start
-//! pose, localised by landmarks, odometry and a laser, which does not constrain the pose along the
-//! corridor. It runs in this program, with the code that the server runs, without a server, from a
+//! four posters. A first drive maps the walls, a second one teaches; then robots drive through it,
+//! each from a start pose that the server does not know, localised by landmarks, odometry and a
+//! laser, which does not constrain the pose along the corridor. Wheels and camera follow the
+//! estimate. It runs in this program, with the code that the server runs, without a server, from a
 //! seed.
 
-mod journey;
+mod server;
+mod exploration;
+mod world;
+mod pilot;
+mod body;
 mod kidnap;
+mod journey;
+mod reference_runs;
+mod names;
 mod plot;
 mod report;
-mod world;
 
 use super::experiment::{mixed, of_each, say, write_plot};
 use journey::{DriveSettings, Journey, drive};
+use map::modality_stats::FusionMode;
+use reference_runs::learnt;
 use report::Report;
-use std::path::PathBuf;
+use std::{path::PathBuf, sync::Arc};
+use vision::params::preset::Preset;
 use world::{Course, World};
 
 /// `waymark-lab evaluate navigation`.
@@ -32,15 +42,22 @@ pub(crate) struct Args {
     /// With --pictures: number of last posters that show a picture of their own.
     #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=64))]
     unique: u32,
-    /// Icons decide, not points (`algorithm.recognise.verdict.points = false`).
-    #[arg(long)]
-    icons: bool,
+    /// The pipeline of the server: the `default`, or that of the `paper`, where H^r decides.
+    #[arg(long, value_name = "NAME", default_value = "default")]
+    preset: Preset,
+    /// Reference runs with a known path before the drives, from which the best modality of every
+    /// place is learnt (method 15).
+    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=100))]
+    runs: u32,
+    /// With --runs: fuse `all` modalities, `near_best` or the `best` of every place.
+    #[arg(long, value_name = "MODE", default_value = "all", value_parser = fusion)]
+    fusion: FusionMode,
     /// Teach doors and windows, too.
     #[arg(long)]
     fittings: bool,
     /// Teach exact corners of photographs and exact places of landmarks. Needed to compare the
     /// errors of named corners with their covariances.
-    #[arg(long)]
+    #[arg(long, requires = "open_loop")]
     true_lessons: bool,
     /// Photographs that the first drive takes of each landmark.
     #[arg(long, default_value_t = 12, value_parser = clap::value_parser!(u32).range(1..=100))]
@@ -57,14 +74,14 @@ pub(crate) struct Args {
     /// Robots without a laser.
     #[arg(long)]
     no_laser: bool,
-    /// Draw errors of intrinsics, extrinsics and survey poses by their stated standard deviations;
-    /// otherwise they are exact. Needed to evaluate covariances.
+    /// The robots drive their true path and their camera is aimed by the truth; walls and lessons
+    /// come from true poses, cameras and mountings are exact. For figures about names and corners.
     #[arg(long)]
-    own_errors: bool,
+    open_loop: bool,
     /// Kidnap every robot: carry it so far forwards, while its odometry stands still, 8 s after its
     /// first pose. The report says after how many frames the wrong pose is detected.
-    #[arg(long, value_name = "M", default_value_t = 0.0, value_parser = kidnap, allow_negative_numbers = true)]
-    kidnap_m: f64,
+    #[arg(long, value_name = "M", value_parser = kidnap, allow_negative_numbers = true, requires = "open_loop")]
+    kidnap_m: Option<f64>,
     /// Print one JSON object instead of a table.
     #[arg(long)]
     json: bool,
@@ -93,6 +110,10 @@ fn kidnap(text: &str) -> Result<f64, String> {
     within(text, [-10.0, 10.0])
 }
 
+fn fusion(word: &str) -> Result<FusionMode, String> {
+    serde_json::from_value(word.into()).map_err(|_| "one of: all, near_best, best".to_owned())
+}
+
 /// Teaches, drives, reports.
 pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let course = Course {
@@ -100,28 +121,27 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
         posters: args.posters as usize,
         pictures: args.pictures as usize,
         unique: args.unique as usize,
-        points: !args.icons,
+        preset: args.preset,
         fittings: args.fittings,
         true_lessons: args.true_lessons,
         views: args.views as usize,
-        exact: !args.own_errors,
+        closed: !args.open_loop,
         seed: args.seed,
     };
-    let world = World::taught(course)?;
-    let seeds: Vec<u64> = (0..args.drives).map(|n| mixed(&[args.seed, 10, u64::from(n)])).collect();
-    let (rate_hz, laser, exact) = (args.rate_hz, !args.no_laser, !args.own_errors);
-    let kidnap_m = args.kidnap_m;
-    let way = |n: usize, seed: &u64| DriveSettings {
-        seed: *seed,
-        back: n % 2 == 1,
-        rate_hz,
-        laser,
-        exact,
-        kidnap_m,
+    let mut world = World::taught(course)?;
+    let drives = |world: &World, what: u64, count: u32| -> anyhow::Result<Vec<Journey>> {
+        let seeds: Vec<u64> = (0..count).map(|n| mixed(&[args.seed, what, u64::from(n)])).collect();
+        let (rate_hz, laser, kidnap_m) = (args.rate_hz, !args.no_laser, args.kidnap_m.unwrap_or(0.0));
+        let way =
+            |n: usize, seed: &u64| DriveSettings { seed: *seed, back: n % 2 == 1, rate_hz, laser, kidnap_m };
+        of_each(&seeds, "drives", |n, seed| drive(world, way(n, seed))).into_iter().collect()
     };
-    let journeys = of_each(&seeds, "drives", |n, seed| drive(&world, way(n, seed)));
-    let journeys = journeys.into_iter().collect::<anyhow::Result<Vec<Journey>>>()?;
-    let report = Report::new(&world, &journeys, (laser, exact), args.seed);
+    if args.runs > 0 {
+        let runs = drives(&world, 17, args.runs)?;
+        world.map.modalities = Arc::new(learnt(runs, args.fusion)?);
+    }
+    let journeys = drives(&world, 10, args.drives)?;
+    let report = Report::new(&world, &journeys, (!args.no_laser, args.runs as usize));
     say(args.json, &report, || report.lines())?;
     write_plot(args.plot.as_deref(), || plot::svg(&world, &journeys[0]))
 }

@@ -1,15 +1,20 @@
-//! Figures of all drives: errors along and across the corridor, consistency of the covariance,
-//! names.
+//! Figures of all drives: errors along and across the corridor, consistency of the covariance.
 
 use super::{
-    journey::{Journey, Moment, Named, of},
+    journey::{Journey, Moment},
     kidnap::KidnapOutcome,
+    names::{CornerErrors, Row, corner_errors, rows},
+    server::of,
     world::World,
 };
 use crate::evaluate::statistics::quantile;
-use map::pose2::{Pose2Covariance, wrap_rad};
+use map::{
+    modality_stats::FusionMode,
+    pose2::{Pose2Covariance, wrap_rad},
+};
 use serde::Serialize;
 use std::collections::BTreeMap;
+use vision::params::preset::Preset;
 
 /// Outcomes that changed the pose.
 const APPLIED: [&str; 3] = ["started", "applied", "reset"];
@@ -36,87 +41,6 @@ impl Errors {
     }
 }
 
-/// Names of one kind of landmark in one state.
-#[derive(Debug, Serialize)]
-struct Row {
-    kind: &'static str,
-    state: &'static str,
-    #[serde(flatten)]
-    named: Named,
-}
-
-impl Row {
-    fn in_words(&self) -> String {
-        let Named { shown, global, shown_to_pose, guided } = self.named;
-        let share = |count: usize, of: usize| 100.0 * count as f64 / of.max(1) as f64;
-        let what = format!("{} {}", self.kind, self.state);
-        let (alone, with) = (share(global, shown), share(guided, shown_to_pose));
-        format!("  {what:<33} {alone:>5.1} % of {shown:<6} {with:>5.1} % of {shown_to_pose}")
-    }
-}
-
-fn rows(journeys: &[Journey]) -> Vec<Row> {
-    let mut all: BTreeMap<(&'static str, &'static str), Named> = BTreeMap::new();
-    for (key, named) in journeys.iter().flat_map(|j| &j.named) {
-        let sum = all.entry(*key).or_default();
-        sum.shown += named.shown;
-        sum.global += named.global;
-        sum.shown_to_pose += named.shown_to_pose;
-        sum.guided += named.guided;
-    }
-    all.into_iter().map(|((kind, state), named)| Row { kind, state, named }).collect()
-}
-
-/// Corners of rightly named landmarks.
-#[derive(Debug, Serialize)]
-struct CornerErrors {
-    named: &'static str,
-    corners: usize,
-    median_px: f64,
-    p90_px: f64,
-    /// Squared Mahalanobis distance of a corner: mean (2 expected), median (1.39 expected); share
-    /// of corners within 95 %.
-    nees: f64,
-    median_square: f64,
-    within_95: f64,
-}
-
-/// 95 % of chi2 with 2 degrees of freedom.
-const CHI2_2_95: f64 = 5.991;
-
-impl CornerErrors {
-    fn of(named: &'static str, all: &[(f64, f64)]) -> Option<Self> {
-        let mut errors: Vec<f64> = all.iter().map(|(px, _)| *px).collect();
-        let mut squares: Vec<f64> = all.iter().map(|(_, d2)| *d2).collect();
-        let count = all.len().max(1) as f64;
-        Some(Self {
-            named,
-            corners: all.len(),
-            median_px: quantile(&mut errors, 0.5)?,
-            p90_px: quantile(&mut errors, 0.9)?,
-            median_square: quantile(&mut squares, 0.5)?,
-            nees: all.iter().map(|(_, d2)| d2).sum::<f64>() / count,
-            within_95: all.iter().filter(|(_, d2)| *d2 < CHI2_2_95).count() as f64 / count,
-        })
-    }
-
-    fn in_words(&self) -> String {
-        let Self { named, corners, median_px, p90_px, nees, median_square, within_95 } = self;
-        let within = 100.0 * within_95;
-        format!(
-            "  {named:<33} {corners:>6}   {median_px:>6.2}  {p90_px:>6.2}    {nees:>6.2}  {median_square:>6.2}   {within:>5.1} %"
-        )
-    }
-}
-
-fn corner_errors(journeys: &[Journey]) -> Vec<CornerErrors> {
-    let mut all: BTreeMap<&'static str, Vec<(f64, f64)>> = BTreeMap::new();
-    for (named, corners) in journeys.iter().flat_map(|j| &j.corners) {
-        all.entry(named).or_default().extend(corners);
-    }
-    all.into_iter().filter_map(|(named, corners)| CornerErrors::of(named, &corners)).collect()
-}
-
 /// Figures of all drives. Along is the map's x axis.
 #[derive(Debug, Serialize)]
 pub(super) struct Report {
@@ -129,6 +53,8 @@ pub(super) struct Report {
     landmarks: usize,
     /// Of the landmarks' places against the truth.
     place_error_m: Option<Errors>,
+    /// Mean squared error of the places along the corridor over the stated variance; 1 expected.
+    place_nees_along: f64,
     drives: usize,
     frames: usize,
     shown: usize,
@@ -142,8 +68,9 @@ pub(super) struct Report {
     corners: Vec<CornerErrors>,
     /// The robots had one.
     laser: bool,
-    /// Fixes by landmarks: applied, and gated out by the filter.
+    /// Fixes by landmarks: applied, of the drive with the fewest, and gated out by the filter.
     corrections: u64,
+    corrections_fewest: u64,
     gated: u64,
     /// By landmarks that guided recognition named.
     guided_corrections: u64,
@@ -170,15 +97,23 @@ pub(super) struct Report {
     nees_within_95: f64,
     /// Mean squared error over the stated variance: along, across, heading; 1 expected of each.
     nees_each: [f64; 3],
-    /// Intrinsics, extrinsics and survey poses are exact.
-    exact: bool,
+    /// Drives that came to the end of their path, and how far true poses were beside it.
+    arrived: usize,
+    off_path_m: Option<Errors>,
+    /// The pipeline, and which modalities were fused.
+    preset: Preset,
+    fusion: FusionMode,
+    /// Reference runs that the robots had learnt from.
+    runs: usize,
+    /// The robots went by their own estimate, in a map of their own.
+    closed: bool,
     /// Outcomes of the kidnapped robots.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     kidnapped: Vec<KidnapOutcome>,
 }
 
 impl Report {
-    pub(super) fn new(world: &World, journeys: &[Journey], (laser, exact): (bool, bool), seed: u64) -> Self {
+    pub(super) fn new(world: &World, journeys: &[Journey], (laser, runs): (bool, usize)) -> Self {
         let moments = || journeys.iter().flat_map(|j| &j.moments);
         let fused = || moments().filter_map(|m| Some((m, m.fused.as_ref()?)));
         let errors = |of: fn(&Moment, &Pose2Covariance) -> f64| Errors::of(fused().map(|(m, f)| of(m, f)));
@@ -194,12 +129,14 @@ impl Report {
         }
         Self {
             experiment: "navigation",
-            seed,
+            seed: world.course.seed,
             length_m: world.course.length_m,
             posters: world.course.posters,
             taught: world.map.landmarks.len(),
             landmarks: world.map.models.len(),
-            place_error_m: Errors::of(world.place_errors_m.iter().copied()),
+            place_error_m: Errors::of(world.place_errors.iter().map(|(m, _)| *m)),
+            place_nees_along: world.place_errors.iter().map(|(_, square)| square).sum::<f64>()
+                / world.place_errors.len().max(1) as f64,
             drives: journeys.len(),
             frames: moments().count(),
             shown: of_each(|j| j.shown),
@@ -210,6 +147,11 @@ impl Report {
             corners: corner_errors(journeys),
             laser,
             corrections: logged("landmarks", &APPLIED),
+            corrections_fewest: journeys
+                .iter()
+                .map(|j| of(&j.log, "landmarks", &APPLIED))
+                .min()
+                .unwrap_or_default(),
             gated: logged("landmarks", &["gated_out"]),
             guided_corrections: logged("guided", &APPLIED),
             laser_corrections: logged("laser", &APPLIED),
@@ -229,7 +171,12 @@ impl Report {
                 fused().map(|(m, f)| f.pose.minus(&m.truth)[k].powi(2) / f.covariance[(k, k)]).sum::<f64>()
                     / count
             }),
-            exact,
+            arrived: journeys.iter().filter(|j| j.arrived).count(),
+            off_path_m: Errors::of(moments().filter_map(|m| m.off_path_m)),
+            preset: world.course.preset,
+            fusion: world.map.modalities.mode(),
+            runs,
+            closed: world.course.closed,
             kidnapped: journeys.iter().filter_map(|j| j.kidnapped.clone()).collect(),
         }
     }
@@ -239,9 +186,16 @@ impl Report {
         let words = |e: &Option<Errors>| Errors::in_words(e.as_ref());
         let mut lines = vec![
             format!(
-                "navigation: corridor of {} m, {} posters; {} landmarks taught, {} active; {} drives, seed {}",
-                self.length_m, self.posters, self.taught, self.landmarks, self.drives, self.seed
+                "navigation: corridor of {} m, {} posters; {} landmarks taught, {} active; {} drives, seed {}; preset {}",
+                self.length_m,
+                self.posters,
+                self.taught,
+                self.landmarks,
+                self.drives,
+                self.seed,
+                self.preset.word()
             ),
+            format!("  fusion          {:?}, learnt from {} runs", self.fusion, self.runs),
             format!("  frames          {}", self.frames),
             format!("  recognitions    {} of {} full views of active landmarks", self.recognised, self.shown),
             format!(
@@ -249,8 +203,8 @@ impl Report {
                 self.false_matches, self.guided_false
             ),
             format!(
-                "  by landmarks    {} corrections, {} more gated out; {} by guided names",
-                self.corrections, self.gated, self.guided_corrections
+                "  by landmarks    {} corrections, {} in the drive with the fewest, {} more gated out; {} by guided names",
+                self.corrections, self.corrections_fewest, self.gated, self.guided_corrections
             ),
             if self.laser {
                 let others: Vec<String> = self.laser_others.iter().map(|(o, n)| format!("{o} {n}")).collect();
@@ -268,10 +222,15 @@ impl Report {
                 self.never_fixed
             ),
             "  errors                        median  95 %   worst".to_owned(),
-            format!("  places of landmarks, m        {}", words(&self.place_error_m)),
+            format!(
+                "  places of landmarks, m        {}; {:.2} along (1 expected)",
+                words(&self.place_error_m),
+                self.place_nees_along
+            ),
             format!("  along the corridor, m         {}", words(&self.along_m)),
             format!("  across it, m                  {}", words(&self.across_m)),
             format!("  heading, rad                  {}", words(&self.heading_rad)),
+            format!("  true pose beside the path, m  {}", words(&self.off_path_m)),
             format!("  odometry alone, along, m      {}", words(&self.odometry_along_m)),
             format!("  odometry alone, across, m     {}", words(&self.odometry_across_m)),
             format!(
@@ -283,14 +242,16 @@ impl Report {
                 "  of each number: {:.2} along, {:.2} across, {:.2} heading (1 expected)",
                 self.nees_each[0], self.nees_each[1], self.nees_each[2]
             ),
-            if self.exact {
-                "  Intrinsics, extrinsics and survey poses are exact, and stated with the usual covariances."
-                    .to_owned()
+            if self.closed {
+                format!(
+                    "  Closed loop: map by SLAM, camera and wheels by the estimate; {} drives arrived.",
+                    self.arrived
+                )
             } else {
-                "  Intrinsics, extrinsics and survey poses have errors by their stated covariances."
+                "  Open loop: true path, aim and survey poses; intrinsics and extrinsics are exact."
                     .to_owned()
             },
-            "  Errors from the first fix on; odometry alone starts at the true pose.".to_owned(),
+            "  Errors from the first fix on.".to_owned(),
             "  named rightly                      by the picture    with a known pose".to_owned(),
         ];
         lines.extend(self.named.iter().map(Row::in_words));
@@ -347,7 +308,14 @@ mod tests {
             covariance: Matrix3::from_diagonal(&nalgebra::Vector3::new(0.01, 0.04, 0.01)),
         };
         let truth = Pose2::new(1.2, 2.0, 0.1);
-        let moment = Moment { time_s: 0.0, truth, odometry: truth, fused: Some(fused), corrected: false };
+        let moment = Moment {
+            time_s: 0.0,
+            truth,
+            odometry: truth,
+            fused: Some(fused),
+            corrected: false,
+            off_path_m: None,
+        };
         // Two sigma along, one in heading.
         assert!((nees(&moment, &fused).unwrap() - 5.0).abs() < 1e-9);
         let sure = Pose2Covariance { covariance: Matrix3::zeros(), ..fused };

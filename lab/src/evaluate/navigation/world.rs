@@ -1,12 +1,13 @@
-//! The corridor and its map from a first drive: walls, places and models, as in a server, in
+//! The corridor and its map from the first drives: walls, places and models, as in a server, in
 //! memory.
 
+use super::exploration::{Explored, explore};
 use crate::evaluate::experiment::{lesson::points_of, mixed, of_each};
 use anyhow::Context as _;
 use cli::{
     screen,
     simulated_errors::SimulatedRobotErrors,
-    survey::{SurveyView, place_on_walls, survey},
+    survey::{SurveyView, known_poses, place_on_walls, survey},
 };
 use engine::snapshot::{LandmarkInfo, MapSnapshot, StoredModel, look_alike_classes};
 use map::{
@@ -25,10 +26,10 @@ use std::{collections::BTreeMap, sync::Arc};
 use vision::{
     learn::{LearnRules, TrainingView, add_negatives, learn, synthesis},
     model::{LandmarkId, LandmarkModel, ModelSet, ModelStatus},
-    params::Params,
+    params::{Params, preset::Preset},
     points::taught::TaughtPoint,
     pose::LandmarkSize,
-    recognise::{DistanceKind, IconFeatures, features},
+    recognise::{IconFeatures, features},
 };
 
 /// Views of each landmark; those that the first drive did not photograph are generated.
@@ -50,16 +51,17 @@ pub(super) struct Course {
     pub(super) pictures: usize,
     /// Number of last posters with a picture of their own.
     pub(super) unique: usize,
-    /// Points decide.
-    pub(super) points: bool,
+    /// The pipeline of the server.
+    pub(super) preset: Preset,
     /// Doors and windows are taught, too.
     pub(super) fittings: bool,
     /// Corners of photographs and places of landmarks are exact.
     pub(super) true_lessons: bool,
     /// Photographs of each landmark.
     pub(super) views: usize,
-    /// Pose, intrinsics and extrinsics of the surveying robot are exact.
-    pub(super) exact: bool,
+    /// Walls are made by SLAM, the lesson's poses by laser; robots go by their own estimate, and
+    /// their intrinsics and extrinsics have errors. Otherwise the truth stands for all of these.
+    pub(super) closed: bool,
     pub(super) seed: u64,
 }
 
@@ -68,8 +70,9 @@ pub(super) struct World {
     pub(super) building: Arc<Building>,
     pub(super) map: MapSnapshot,
     pub(super) course: Course,
-    /// Distance of each placed landmark from its true place.
-    pub(super) place_errors_m: Vec<f64>,
+    /// Distance of each placed landmark from its true place, and the squared error along the
+    /// corridor over its stated variance.
+    pub(super) place_errors: Vec<(f64, f64)>,
 }
 
 /// One landmark after the first drive.
@@ -84,10 +87,9 @@ struct Lesson {
 impl World {
     /// Builds the corridor, surveys it and learns its landmarks.
     pub(super) fn taught(course: Course) -> anyhow::Result<Self> {
-        let Course { length_m, posters, pictures, unique, points, fittings, .. } = course;
-        let Course { true_lessons, views: photographs, exact, seed, .. } = course;
-        let mut p = Params::default();
-        p.recognise.verdict.points = points;
+        let Course { length_m, posters, pictures, unique, preset, fittings, .. } = course;
+        let Course { true_lessons, views: photographs, closed, seed, .. } = course;
+        let p = preset.params();
         let corridor = CorridorParams {
             length_m,
             posters,
@@ -98,17 +100,24 @@ impl World {
         };
         let building = Arc::new(Building::corridor_with(&corridor, seed));
         let robot = Robot::new(building.clone(), &RobotParams::default());
-        let wrong = SimulatedRobotErrors::of(robot.camera().intrinsics(), exact, mixed(&[seed, 13]));
+        let wrong = SimulatedRobotErrors::of(robot.camera().intrinsics(), !closed, mixed(&[seed, 13]));
         let camera = wrong.camera;
         let lesson = LessonParams { seed, views: photographs, fittings, ..LessonParams::default() };
         let stops = stops(&building, &lesson);
-        let mut survey = survey(robot, &stops, wrong)?;
+        let (walls, stops) = if closed {
+            let Explored { walls, stops } = explore(&building, stops, mixed(&[seed, 16]))?;
+            (Some(walls), stops)
+        } else {
+            (None, known_poses(stops))
+        };
+        let mut survey = survey(robot, &stops, &wrong, &p.detect)?;
+        let walls = walls.unwrap_or_else(|| std::mem::take(&mut survey.walls));
         if true_lessons {
             survey.views.iter_mut().for_each(|(name, views_of_one)| take_true_corners(name, views_of_one));
         }
         let found: Vec<(&String, &Vec<SurveyView>)> = survey.views.iter().collect();
         let lessons: Vec<Lesson> = of_each(&found, "views", |i, (name, views_of_one)| {
-            let (mut place, agreed) = place_on_walls(views_of_one, &survey.walls, &camera)?;
+            let (mut place, agreed) = place_on_walls(views_of_one, &walls, &camera)?;
             if true_lessons {
                 place = true_place(&building, name)?;
             }
@@ -131,10 +140,10 @@ impl World {
             let others: Vec<IconFeatures> = others.flat_map(|(_, l)| l.icons.iter().cloned()).collect();
             Some(add_negatives(&alone, &others, &p))
         });
-        let map = snapshot(&lessons, &survey.walls, models, p)?;
+        let map = snapshot(&lessons, &walls, models, (preset, p))?;
         anyhow::ensure!(!map.models.is_empty(), "no landmark passed the quality gates; try another --seed");
-        let place_errors_m = lessons.iter().map(|l| place_error_m(&building, l)).collect::<Result<_, _>>()?;
-        Ok(Self { building, map, course, place_errors_m })
+        let place_errors = lessons.iter().map(|l| place_error(&building, l)).collect::<Result<_, _>>()?;
+        Ok(Self { building, map, course, place_errors })
     }
 
     /// The landmark's name.
@@ -175,7 +184,7 @@ fn snapshot(
     lessons: &[Lesson],
     walls: &[LaserSegment],
     models: Vec<Option<LandmarkModel>>,
-    params: Params,
+    (preset, params): (Preset, Params),
 ) -> anyhow::Result<MapSnapshot> {
     complain(lessons, &models);
     let learnt: BTreeMap<LandmarkId, StoredModel> = models
@@ -186,7 +195,7 @@ fn snapshot(
         })
         .collect();
     let models = ModelSet::in_use(learnt.values().map(|l| l.model.clone()), &params)?;
-    let look_alikes = Arc::new(look_alike_classes(&learnt, DistanceKind::Both, &params));
+    let look_alikes = Arc::new(look_alike_classes(&learnt, preset.distance(), &params));
     let numbered = || lessons.iter().enumerate().map(|(i, l)| (LandmarkId(i as u64), l));
     let sizes: BTreeMap<LandmarkId, LandmarkSize> = numbered().map(|(id, l)| (id, l.place.size)).collect();
     let landmarks: BTreeMap<LandmarkId, LandmarkInfo> = numbered()
@@ -203,7 +212,7 @@ fn snapshot(
     let visibility = numbered().filter_map(|(id, l)| Some((id, Arc::new(area(l).ok()?)))).collect();
     let (params, wall_index) = (Arc::new(params), Arc::new(WallIndex::new(walls)));
     let walls = walls.to_vec();
-    let mut map = MapSnapshot::empty(MAP, 1);
+    let mut map = MapSnapshot { distance: preset.distance(), ..MapSnapshot::empty(MAP, 1) };
     (map.landmarks, map.sizes, map.models, map.learnt) = (landmarks, sizes, models, learnt);
     (map.look_alikes, map.visibility, map.params) = (look_alikes, visibility, params);
     (map.walls, map.wall_index) = (Arc::new(walls), wall_index);
@@ -226,9 +235,10 @@ fn true_place(building: &Building, name: &str) -> Option<LandmarkPlace> {
     LandmarkPlace::by_hand(at, theta_rad, size, PlaceSigmas::default()).ok()
 }
 
-fn place_error_m(building: &Building, lesson: &Lesson) -> anyhow::Result<f64> {
+fn place_error(building: &Building, lesson: &Lesson) -> anyhow::Result<(f64, f64)> {
     let truth = building.landmark(&lesson.name).context("a taught poster that the building lacks")?;
-    let at = truth.map_from_landmark.translation.vector;
     let place = &lesson.place;
-    Ok((at - nalgebra::Vector3::new(place.x_m, place.y_m, place.z_m)).norm())
+    let error =
+        truth.map_from_landmark.translation.vector - nalgebra::Vector3::new(place.x_m, place.y_m, place.z_m);
+    Ok((error.norm(), error.x * error.x / place.covariance[(0, 0)]))
 }
