@@ -60,6 +60,11 @@ pub struct ParameterArgs {
 }
 
 impl ParameterArgs {
+    /// The preset that the others change.
+    pub fn preset(&self) -> Preset {
+        self.preset
+    }
+
     /// The parameters asked for; those not mentioned have their defaults.
     pub fn parameters(&self) -> anyhow::Result<DetectParams> {
         let mut all = serde_json::to_value(pictures::detect_params(self.preset, self.params.as_deref())?)?;

@@ -19,6 +19,7 @@ use server::Server;
 use std::{collections::BTreeMap, path::PathBuf, time::Duration};
 use vision::{
     geometry::{Corners, polygon},
+    params::preset::Preset,
     recognise::DistanceKind,
 };
 
@@ -42,7 +43,10 @@ pub(crate) struct Args {
     /// Generated views for each taught picture; default: the server's choice.
     #[arg(long)]
     generated_views: Option<u32>,
-    /// The distance that decides: both, correlation or hausdorff.
+    /// The pipeline: the `default`, or that of the `paper`, where H^r decides.
+    #[arg(long, value_name = "NAME", default_value = "default")]
+    preset: Preset,
+    /// The distance that decides instead of the preset's: both, correlation or hausdorff.
     #[arg(long, value_parser = cli::arg_parsers::distance)]
     distance: Option<DistanceKind>,
     /// Print one JSON object instead of a table.
@@ -99,7 +103,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
 
 async fn evaluate(truth: &Truth, args: &Args) -> anyhow::Result<Report> {
     let folder = scratch::Folder::new("evaluate")?;
-    let server = Server::start(scratch::private_server(folder.path())?).await?;
+    let server = Server::start(scratch::private_server(folder.path(), args.preset)?).await?;
     let maps = MapClient::new(&format!("http://{}", server.http_addr))?;
     let mut report = Report {
         set: truth.name.clone(),
@@ -151,7 +155,7 @@ async fn evaluate(truth: &Truth, args: &Args) -> anyhow::Result<Report> {
 }
 
 async fn teach(truth: &Truth, args: &Args, maps: &MapClient, report: &mut Report) -> anyhow::Result<()> {
-    let distance = args.distance.map(Distance::from).unwrap_or_default();
+    let distance = Distance::from(args.distance.unwrap_or_else(|| args.preset.distance()));
     maps.create_map(&NewMap { distance, ..NewMap::new(MAP) }).await?;
     let progress = screen::progress(truth.teach.len(), "teaching");
     for (path, landmark) in &truth.teach {

@@ -85,7 +85,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let worlds = worlds(&args.folders, sigmas)?;
     anyhow::ensure!(!args.strangers || worlds.len() > 1, "--strangers needs two worlds or more");
     let detect = args.parameters.parameters()?;
-    let teacher = Teacher::start()?;
+    let teacher = Teacher::start(args.parameters.preset())?;
     let maps =
         worlds.iter().enumerate().map(|(i, world)| adjusted(args, &detect, &*teacher.teach(world, i)?));
     let maps: Vec<MapSnapshot> = maps.collect::<anyhow::Result<_>>()?;
