@@ -220,7 +220,7 @@ pub(super) const BEYOND: [Row; 7] = [
         paper: "",
         commands: &[Command {
             full: "confidence",
-            quick: "confidence --quads 60",
+            quick: "confidence --quads 100",
             presets: Each,
             sets: &[],
             seconds: 400,
