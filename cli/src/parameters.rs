@@ -14,7 +14,7 @@ pub struct ParameterArgs {
     /// The parameters that the others change: `default`, or those of the `paper`: relaxation over
     /// all six cues, floor tiling removed.
     #[arg(long, value_name = "NAME", default_value = "default")]
-    pub preset: Preset,
+    preset: Preset,
     /// Parameters as JSON, only what differs from the defaults, such as {"quads": {"grouping":
     /// "relaxation"}}.
     #[arg(long, value_name = "FILE")]
@@ -60,6 +60,11 @@ pub struct ParameterArgs {
 }
 
 impl ParameterArgs {
+    /// The preset that the others change.
+    pub fn preset(&self) -> Preset {
+        self.preset
+    }
+
     /// The parameters asked for; those not mentioned have their defaults.
     pub fn parameters(&self) -> anyhow::Result<DetectParams> {
         let mut all = serde_json::to_value(pictures::detect_params(self.preset, self.params.as_deref())?)?;

@@ -2,15 +2,18 @@
 
 use server::config::{Config, ConfigError, RawConfig};
 use std::path::{Path, PathBuf};
+use vision::params::preset::Preset;
 
 /// Settings of a server that only this program knows of: free ports, and frames as large as the
 /// wire allows. What it stores is removed again, so only a full disk stops it, not one that is
 /// nearly full.
-pub fn private_server(data: &Path) -> Result<Config, ConfigError> {
+pub fn private_server(data: &Path, preset: Preset) -> Result<Config, ConfigError> {
     let mut raw = RawConfig {
         data: data.to_owned(),
         http: "127.0.0.1:0".to_owned(),
         zenoh: "tcp/127.0.0.1:0".to_owned(),
+        preset,
+        algorithm: preset.params(),
         ..RawConfig::default()
     };
     raw.limits.frame_bytes = protos::convert::frame::MAX_FRAME_IMAGE_BYTES;

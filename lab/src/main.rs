@@ -5,6 +5,7 @@
 mod bench;
 mod evaluate;
 mod plot;
+mod reproduce;
 mod train;
 
 use clap::{Parser, Subcommand};
@@ -49,6 +50,16 @@ enum Command {
     ///   waymark-lab plot icon --image painting.jpg --out icon.png
     #[command(verbatim_doc_comment)]
     Plot(plot::Args),
+    /// Every figure of accuracy, measured again by both presets, as one table.
+    ///
+    /// Runs the paper's experiments E1 to E14, the sets made by others (S) where they are, and what
+    /// goes beyond the paper (B), each by the command that is printed beside its figures. Takes at
+    /// most two hours on two idle cores; what an interrupted run has done is kept. For example:
+    ///   waymark-lab reproduce --quick --out smoke
+    ///   waymark-lab reproduce --only E1,E5 --preset paper
+    ///   waymark-lab reproduce && waymark-lab reproduce --render reproduced/figures.json
+    #[command(verbatim_doc_comment)]
+    Reproduce(reproduce::Args),
 }
 
 fn main() -> ExitCode {
@@ -59,6 +70,7 @@ fn main() -> ExitCode {
         Command::Bench(args) => bench::run(args),
         Command::Train(command) => train::run(command),
         Command::Plot(args) => plot::run(args),
+        Command::Reproduce(args) => reproduce::run(args),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

@@ -11,6 +11,7 @@ pub(crate) mod statistics;
 pub(crate) mod truth;
 pub(crate) mod calibration;
 pub(crate) mod detection;
+pub(crate) mod drawing;
 pub(crate) mod placement;
 pub(crate) mod pose;
 pub(crate) mod joint;
@@ -128,6 +129,13 @@ pub(crate) enum Command {
     ///   waymark-lab evaluate navigation --plot corridor.svg
     #[command(verbatim_doc_comment)]
     Navigation(navigation::Args),
+    /// The map of a drive, drawn: walls, landmarks, and doors as arcs (Fig. 6).
+    ///
+    /// A robot with errors drives through a rendered corridor, maps its walls by laser and places
+    /// posters, windows and doors by the detector's corners. For example:
+    ///   waymark-lab evaluate drawing --draw map.svg
+    #[command(verbatim_doc_comment)]
+    Drawing(drawing::Args),
     /// Modality statistics: learnt from reference runs, then used in every fusion mode.
     ///
     /// A path of 55 m through a corridor (the laser does not constrain x), a hall (the floor
@@ -162,6 +170,7 @@ pub(crate) fn run(command: &Command) -> anyhow::Result<()> {
         Command::Mapping(args) => mapping::run(args),
         Command::Joint(args) => joint::run(args),
         Command::Grids(args) => grids::run(args),
+        Command::Drawing(args) => drawing::run(args),
         Command::Modalities(args) => modalities::run(args),
         Command::Visibility(args) => visibility::run(args),
     }

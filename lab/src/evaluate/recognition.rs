@@ -103,7 +103,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
 
 async fn evaluate(truth: &Truth, args: &Args) -> anyhow::Result<Report> {
     let folder = scratch::Folder::new("evaluate")?;
-    let server = Server::start(scratch::private_server(folder.path())?).await?;
+    let server = Server::start(scratch::private_server(folder.path(), args.preset)?).await?;
     let maps = MapClient::new(&format!("http://{}", server.http_addr))?;
     let mut report = Report {
         set: truth.name.clone(),
@@ -155,8 +155,8 @@ async fn evaluate(truth: &Truth, args: &Args) -> anyhow::Result<Report> {
 }
 
 async fn teach(truth: &Truth, args: &Args, maps: &MapClient, report: &mut Report) -> anyhow::Result<()> {
-    let (preset, distance) = (Some(args.preset.into()), args.distance.map(Distance::from));
-    maps.create_map(&NewMap { preset, distance, ..NewMap::new(MAP) }).await?;
+    let distance = args.distance.map(Distance::from);
+    maps.create_map(&NewMap { distance, ..NewMap::new(MAP) }).await?;
     let progress = screen::progress(truth.teach.len(), "teaching");
     for (path, landmark) in &truth.teach {
         if maps.landmark(MAP, landmark).await.is_err() {

@@ -11,7 +11,7 @@ use tests::{
 };
 
 /// Options that each command must name in its help.
-const OPTIONS: [(&str, &[&str]); 27] = [
+const OPTIONS: [(&str, &[&str]); 29] = [
     (
         "evaluate navigation",
         &["--drives", "--posters", "--length-m", "--rate-hz", "--seed", "--json", "--plot"],
@@ -49,7 +49,9 @@ const OPTIONS: [(&str, &[&str]); 27] = [
         ],
     ),
     ("evaluate modalities", &["--runs", "--drives", "--seed", "--json", "--plot"]),
-    ("evaluate recognition", &["--generated-views", "--distance", "--misses", "--json", "<SET>"]),
+    ("evaluate recognition", &["--generated-views", "--preset", "--distance", "--misses", "--json", "<SET>"]),
+    ("evaluate drawing", &["--views", "--seed", "--json", "--draw"]),
+    ("reproduce", &["--preset", "--out", "--only", "--quick", "--data", "--render", "--check"]),
     (
         "evaluate viewpoint",
         &[

@@ -5,6 +5,7 @@ mod evaluate;
 mod outside;
 mod plot;
 mod real_pictures;
+mod reproduce;
 mod train;
 
 use std::{ffi::OsStr, path::Path, time::Duration};

@@ -17,7 +17,7 @@ use vision::{
     params::{Params, preset::Preset},
     points::taught::{MAX_POINT_VIEWS, TaughtPoint, view_points},
     random::Random,
-    recognise::{DistanceKind, IconFeatures, features},
+    recognise::{DistanceKind, IconFeatures, features, features::descriptor::Descriptor},
 };
 
 /// Views of each landmark, as in the server.
@@ -137,6 +137,20 @@ impl Class {
     pub(crate) fn bytes_per_model(&self) -> usize {
         let all: usize = self.models.iter().map(|m| m.to_bytes().len()).sum();
         all / self.models.len().max(1)
+    }
+
+    /// Mean size of what each distance of the paper needs of a model: icons at one byte a pixel for
+    /// C^r, points with positions and descriptors for H^r.
+    pub(crate) fn distance_bytes_per_model(&self, p: &Params) -> [usize; 2] {
+        let icons = |m: &LandmarkModel| m.exemplars.iter().map(|e| e.pixels().len()).sum::<usize>();
+        let point = size_of::<[f32; 2]>() + size_of::<Descriptor>();
+        let points = |m: &LandmarkModel| {
+            point * m.features(&p.recognise).iter().map(|f| f.points.len()).sum::<usize>()
+        };
+        let mean = |of: &dyn Fn(&LandmarkModel) -> usize| {
+            self.models.iter().map(|m| of(m)).sum::<usize>() / self.models.len().max(1)
+        };
+        [mean(&icons), mean(&points)]
     }
 }
 

@@ -87,6 +87,9 @@ pub(crate) struct Setting {
     candidates: Vec<String>,
     /// Mean bytes of a model as it is stored.
     bytes_per_model: usize,
+    /// Of them what C^r needs, and what H^r would: icons, and points with descriptors (E14).
+    icon_bytes_per_model: usize,
+    point_bytes_per_model: usize,
     /// Hash of the parameters of the distances.
     params_hash: String,
 }
@@ -98,6 +101,7 @@ impl Setting {
         } else {
             format!("true, noise {} px", common.corner_noise_px)
         };
+        let [icon_bytes_per_model, point_bytes_per_model] = class.distance_bytes_per_model(p);
         Self {
             experiment,
             set: common.part.name(),
@@ -109,6 +113,8 @@ impl Setting {
             photographs: class.active().filter(|(_, picture)| picture.photograph).count(),
             candidates: class.candidates.iter().map(|i| class.landmarks[*i].name.clone()).collect(),
             bytes_per_model: class.bytes_per_model(),
+            icon_bytes_per_model,
+            point_bytes_per_model,
             params_hash: format!("{:016x}", p.distance_hash()),
         }
     }
@@ -128,9 +134,11 @@ impl Setting {
                 self.corners
             ),
             format!(
-                "  {} more were taught but failed a quality gate; {} bytes a model; parameters {}",
+                "  {} more were taught but failed a quality gate; {} bytes a model, {} for C^r, {} for H^r; parameters {}",
                 self.candidates.len(),
                 self.bytes_per_model,
+                self.icon_bytes_per_model,
+                self.point_bytes_per_model,
                 self.params_hash
             ),
         ]

@@ -85,7 +85,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let worlds = worlds(&args.folders, sigmas)?;
     anyhow::ensure!(!args.strangers || worlds.len() > 1, "--strangers needs two worlds or more");
     let detect = args.parameters.parameters()?;
-    let teacher = Teacher::start()?;
+    let teacher = Teacher::start(args.parameters.preset())?;
     let maps =
         worlds.iter().enumerate().map(|(i, world)| adjusted(args, &detect, &*teacher.teach(world, i)?));
     let maps: Vec<MapSnapshot> = maps.collect::<anyhow::Result<_>>()?;
@@ -145,11 +145,10 @@ const EXACT: f64 = 1e-12;
 
 /// The map, recognised with the parameters that are asked for.
 fn adjusted(args: &Args, detect: &DetectParams, map: &MapSnapshot) -> anyhow::Result<MapSnapshot> {
-    let map = map.under(args.parameters.preset);
     let mut all = serde_json::to_value(Params { detect: detect.clone(), ..Params::clone(&map.params) })?;
     args.algorithm.iter().try_for_each(|assignment| assign(&mut all, assignment))?;
     let params: Params = serde_json::from_value(all).context("--algorithm")?;
-    let mut map = MapSnapshot { params: Arc::new(params), ..map };
+    let mut map = MapSnapshot { params: Arc::new(params), ..map.clone() };
     if args.exact_places {
         for place in map.landmarks.values_mut().filter_map(|landmark| landmark.place.as_mut()) {
             place.covariance = nalgebra::Matrix6::identity() * EXACT;

@@ -1,0 +1,357 @@
+//! Sets made by others, and what the paper does not measure.
+
+use super::{
+    figures::Unit::{Count, M, Percent, Plain, Px, Share},
+    row::{
+        Command, Figure,
+        Presets::{Each, One},
+        Row,
+    },
+};
+
+/// The worlds that nothing was chosen on.
+macro_rules! worlds {
+    () => {
+        "outside photoreal/15 photoreal/16 photoreal/17 photoreal/18 photoreal/19 photoreal/20 photoreal/21 \
+         photoreal/22 photoreal/23 photoreal/24 photoreal/25 photoreal/26 photoreal/27 photoreal/28"
+    };
+}
+const WORLDS: &str = worlds!();
+const STRANGERS: &str = concat!(worlds!(), " --strangers");
+
+const NAMES: [Figure; 12] = [
+    Figure::new("detected at IoU 0.7", Share, "0/all/shown").of("0/all/full_views"),
+    Figure::new("among the compared borders", Share, "0/all/asked"),
+    Figure::new("false quads an image", Plain, "0/false_per_picture"),
+    Figure::new("full views named", Share, "0/all/named").of("0/all/full_views"),
+    Figure::new("without doors and windows", Share, "0/pictures_and_boards/named"),
+    Figure::new("wrong names", Count, "0/wrong_names"),
+    Figure::new("cut or hidden, named", Count, "0/partial/named").of("0/partial/views"),
+    Figure::new("corners of posters and canvases, median", Px, "0/flat/answer_error_px/median"),
+    Figure::new("landmark in the camera frame, median", M, "0/measurements/position_m/median"),
+    Figure::new("camera position, median", M, "0/camera/position_m/median").of("0/camera/position_m/count"),
+    Figure::new("camera position, 90 %", M, "0/camera/position_m/most"),
+    Figure::new("camera position, worst", M, "0/camera/position_m/worst"),
+];
+
+const FOUND: [Figure; 4] = [
+    Figure::new("recall at IoU 0.7", Share, "0/recall_70").of("0/quads").within("0/recall_70_interval"),
+    Figure::new("recall at IoU 0.85", Share, "0/recall_85").within("0/recall_85_interval"),
+    Figure::new("false quads an image", Plain, "0/false_per_image").within("0/false_per_image_interval"),
+    Figure::new("corners, median", Px, "0/corner_error_px"),
+];
+
+const fn of_set(
+    full: &'static str,
+    quick: &'static str,
+    sets: &'static [&'static str],
+    seconds: u32,
+    figures: &'static [Figure],
+) -> Command {
+    Command { full, quick, presets: Each, sets, seconds, figures }
+}
+
+/// What no preset changes.
+const fn once(full: &'static str, quick: &'static str, seconds: u32, figures: &'static [Figure]) -> Command {
+    Command { full, quick, presets: One, sets: &[], seconds, figures }
+}
+
+const BOARD: [Figure; 1] = [Figure::new("5 views, median", Percent, "0/sets/0/by_views/views=5/median")];
+const CHESSBOARD: [Figure; 2] = [
+    Figure::new("5 views of the chessboard, median", Percent, "0/sets/0/by_views/views=5/median"),
+    Figure::new("10 views of the chessboard, median", Percent, "0/sets/0/by_views/views=10/median"),
+];
+
+const fn board(line: &'static str, sets: &'static [&'static str], figures: &'static [Figure]) -> Command {
+    Command { full: line, quick: line, presets: One, sets, seconds: 5, figures }
+}
+
+pub(super) const SETS: [Row; 10] = [
+    Row {
+        id: "S1",
+        title: "path-traced worlds of an independent generator",
+        paper: "",
+        commands: &[of_set(WORLDS, "outside photoreal/15", &["photoreal"], 100, &NAMES)],
+    },
+    Row {
+        id: "S2",
+        title: "a poster behind glass, filmed by hand",
+        paper: "",
+        commands: &[of_set(
+            "outside poster-behind-glass",
+            "outside poster-behind-glass",
+            &["poster-behind-glass"],
+            15,
+            &[
+                Figure::new("detected at IoU 0.7", Share, "0/all/shown").of("0/all/full_views"),
+                Figure::new("full views named", Share, "0/all/named").of("0/all/full_views"),
+                Figure::new("wrong names", Count, "0/wrong_names"),
+                Figure::new("corners, median", Px, "0/all/answer_error_px/median"),
+            ],
+        )],
+    },
+    Row {
+        id: "S3",
+        title: "paintings on gallery walls: detection",
+        paper: "",
+        commands: &[of_set(
+            "detection museum-paintings",
+            "detection museum-paintings",
+            &["museum-paintings"],
+            15,
+            &FOUND,
+        )],
+    },
+    Row {
+        id: "S4",
+        title: "paintings on gallery walls: recognition among 287",
+        paper: "",
+        commands: &[of_set(
+            "recognition museum-paintings",
+            "recognition museum-paintings --generated-views 2",
+            &["museum-paintings"],
+            90,
+            &[
+                Figure::new("right", Count, "0/right"),
+                Figure::new("wrong", Count, "0/wrong"),
+                Figure::new("missed", Count, "0/missed"),
+                Figure::new("distractors accepted", Count, "0/distractors_accepted"),
+                Figure::new("distractors refused", Count, "0/distractors_refused"),
+            ],
+        )],
+    },
+    Row {
+        id: "S5",
+        title: "exit signs in corridors: detection",
+        paper: "",
+        commands: &[of_set(
+            "detection exit-signs --min-side-px 20",
+            "detection exit-signs --min-side-px 100",
+            &["exit-signs"],
+            30,
+            &FOUND,
+        )],
+    },
+    Row {
+        id: "S6",
+        title: "landmarks of another world shown",
+        paper: "",
+        commands: &[of_set(
+            STRANGERS,
+            "outside photoreal/15 photoreal/16 --strangers",
+            &["photoreal"],
+            100,
+            &[Figure::new("wrong names", Count, "0/wrong_names")],
+        )],
+    },
+    Row {
+        id: "S7",
+        title: "boards of others: focal length by one quad with one radial coefficient, against all points",
+        paper: "below 1 % (Fig. 17)",
+        commands: &[
+            board("calibration calib-zhang --trials 1", &["calib-zhang"], &BOARD),
+            board(
+                "calibration calib-opencv-chessboard --trials 1",
+                &["calib-opencv-chessboard"],
+                &CHESSBOARD,
+            ),
+        ],
+    },
+    Row {
+        id: "S8",
+        title: "laser maps of public logs: error of relative poses",
+        paper: "",
+        commands: &[Command {
+            full: "mapping laser-carmen-corrected laser-intel-raw-odometry --seed 1",
+            quick: "mapping laser-carmen-corrected laser-intel-raw-odometry --seed 1",
+            presets: One,
+            sets: &["laser-carmen-corrected", "laser-intel-raw-odometry"],
+            seconds: 90,
+            figures: &[
+                Figure::new("intel, raw odometry", M, "log=intel, raw odometry/error/translation_m"),
+                Figure::new("aces", M, "log=aces/error/translation_m"),
+                Figure::new("infinite-corridor", M, "log=infinite-corridor/error/translation_m"),
+                Figure::new("freiburg-079", M, "log=freiburg-079/error/translation_m"),
+            ],
+        }],
+    },
+    Row {
+        id: "S9",
+        title: "unknown quads with photographs among them",
+        paper: "",
+        commands: &[of_set(
+            "discrimination --photographs museum-paintings --photographs poster-textures-estense",
+            "discrimination --photographs museum-paintings --photographs poster-textures-estense \
+             --landmarks 3 --distractors 4 --views 1 --own-views 1",
+            &["museum-paintings", "poster-textures-estense"],
+            250,
+            &[
+                Figure::new("accepted", Count, "0/unknown/0/accepted").of("0/unknown/0/quads"),
+                Figure::new("landmarks right", Count, "0/mated/right").of("0/mated/quads"),
+                Figure::new("landmarks wrong", Count, "0/mated/wrong").of("0/mated/quads"),
+            ],
+        )],
+    },
+    Row {
+        id: "S10",
+        title: "occupancy grids: wall cells explained",
+        paper: "",
+        commands: &[Command {
+            full: "grids maps-ros-grid",
+            quick: "grids maps-ros-grid",
+            presets: One,
+            sets: &["maps-ros-grid"],
+            seconds: 5,
+            figures: &[
+                Figure::new("mit-stata-basement, explained", Share, "map=mit-stata-basement/explained"),
+                Figure::new("nav2-depot, explained", Share, "map=nav2-depot/explained"),
+                Figure::new("nav2-warehouse, explained", Share, "map=nav2-warehouse/explained"),
+                Figure::new("turtlebot3-world, explained", Share, "map=turtlebot3-world/explained"),
+                Figure::new("upenn-levine-lobby, explained", Share, "map=upenn-levine-lobby/explained"),
+            ],
+        }],
+    },
+];
+
+pub(super) const BEYOND: [Row; 7] = [
+    Row {
+        id: "B1",
+        title: "confidences",
+        paper: "",
+        commands: &[Command {
+            full: "confidence",
+            quick: "confidence --quads 100",
+            presets: Each,
+            sets: &[],
+            seconds: 400,
+            figures: &[
+                Figure::new("expected calibration error", Plain, "0/results/distance=both/ece")
+                    .within("0/results/distance=both/ece_interval"),
+                Figure::new("the same, H^r", Plain, "0/results/distance=hausdorff/ece")
+                    .within("0/results/distance=hausdorff/ece_interval"),
+            ],
+        }],
+    },
+    Row {
+        id: "B2",
+        title: "look-alikes, one of each pair taught: accepted",
+        paper: "",
+        commands: &[Command {
+            full: "lookalikes --pairs 16",
+            quick: "lookalikes --pairs 2 --views 1",
+            presets: Each,
+            sets: &[],
+            seconds: 200,
+            figures: &[
+                Figure::new("a quarter replaced", Count, "0/kinds/change=a quarter/alone/look_alike")
+                    .of("0/kinds/change=a quarter/alone/views"),
+                Figure::new("one block of 25", Count, "0/kinds/change=one block/alone/look_alike")
+                    .of("0/kinds/change=one block/alone/views"),
+                Figure::new("a line of text", Count, "0/kinds/change=text/alone/look_alike")
+                    .of("0/kinds/change=text/alone/views"),
+                Figure::new("other tones", Count, "0/kinds/change=tones/alone/look_alike")
+                    .of("0/kinds/change=tones/alone/views"),
+                Figure::new("another door number", Count, "0/kinds/change=doors/alone/look_alike")
+                    .of("0/kinds/change=doors/alone/views"),
+            ],
+        }],
+    },
+    Row {
+        id: "B3",
+        title: "poses by landmarks with errors of corners, places and mounting",
+        paper: "",
+        commands: &[once(
+            "pose --no-peers",
+            "pose --no-peers --draws 100 --drives 2",
+            30,
+            &[
+                Figure::new("cells within 95 %", Count, "0/cells_inside_95"),
+                Figure::new("unflagged flips", Count, "0/unflagged_flips"),
+                Figure::new("robot by one landmark, RMS", M, "0/joint/0/rms_m"),
+                Figure::new("by two", M, "0/joint/1/rms_m"),
+                Figure::new("by three", M, "0/joint/2/rms_m"),
+                Figure::new("NEES of 3, by one", Plain, "0/joint/0/nees"),
+            ],
+        )],
+    },
+    Row {
+        id: "B4",
+        title: "places of landmarks",
+        paper: "",
+        commands: &[once(
+            "placement",
+            "placement --rooms 10 --corridors 1 --views 2",
+            60,
+            &[
+                Figure::new("wall, one view, median", M, "0/summaries/what=rooms, walls, one view/median_m"),
+                Figure::new("its NEES of 6", Plain, "0/summaries/what=rooms, walls, one view/nees"),
+                Figure::new(
+                    "wall, several views, median",
+                    M,
+                    "0/summaries/what=rooms, walls, several views/median_m",
+                ),
+                Figure::new(
+                    "its NEES of 6, several views",
+                    Plain,
+                    "0/summaries/what=rooms, walls, several views/nees",
+                ),
+                Figure::new(
+                    "rendered posters, median",
+                    M,
+                    "0/summaries/what=rendered corridor, posters, detector/median_m",
+                ),
+                Figure::new(
+                    "rendered lamps, median",
+                    M,
+                    "0/summaries/what=rendered corridor, lamps, detector/median_m",
+                ),
+            ],
+        )],
+    },
+    Row {
+        id: "B5",
+        title: "cameras at any roll",
+        paper: "",
+        commands: &[once(
+            "roll",
+            "roll --posters 2 --views 1",
+            40,
+            &[
+                Figure::new("named at 0 deg", Count, "0/rolls/roll_deg=0.0/named")
+                    .of("0/rolls/roll_deg=0.0/shown"),
+                Figure::new("named at 90 deg", Count, "0/rolls/roll_deg=90.0/named")
+                    .of("0/rolls/roll_deg=90.0/shown"),
+                Figure::new("named at 150 deg", Count, "0/rolls/roll_deg=150.0/named")
+                    .of("0/rolls/roll_deg=150.0/shown"),
+                Figure::new("position at 90 deg, median", M, "0/rolls/roll_deg=90.0/robot/median_m"),
+                Figure::new("position at 90 deg, worst", M, "0/rolls/roll_deg=90.0/robot/worst_m"),
+            ],
+        )],
+    },
+    Row {
+        id: "B6",
+        title: "modalities by area: position, 95 %",
+        paper: "",
+        commands: &[once(
+            "modalities",
+            "modalities --runs 1 --drives 1",
+            20,
+            &[
+                Figure::new("stated errors", M, "0/rows/way=untaught&zone=all/p95_m"),
+                Figure::new("measured errors", M, "0/rows/way=all, with error models&zone=all/p95_m"),
+                Figure::new("the best alone", M, "0/rows/way=best&zone=all/p95_m"),
+            ],
+        )],
+    },
+    Row {
+        id: "B7",
+        title: "visibility areas against brute force",
+        paper: "",
+        commands: &[once(
+            "visibility --seed 1",
+            "visibility --seed 1 --maps 2 --points 200",
+            30,
+            &[Figure::new("points that differ", Count, "0/differ").of("0/points")],
+        )],
+    },
+];
