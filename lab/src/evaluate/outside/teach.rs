@@ -7,7 +7,7 @@ use anyhow::Context as _;
 use cli::{scratch, screen};
 use client::{
     LandmarkRegion, MapClient,
-    api::{Distance, Job, JobState, NewMap},
+    api::{Job, JobState, NewMap},
 };
 use engine::snapshot::MapSnapshot;
 use server::{RunningServer, Server};
@@ -22,7 +22,6 @@ pub(super) struct Teacher {
     runtime: tokio::runtime::Runtime,
     server: RunningServer,
     maps: MapClient,
-    distance: Distance,
     _folder: scratch::Folder,
 }
 
@@ -32,7 +31,7 @@ impl Teacher {
         let folder = scratch::Folder::new("outside")?;
         let server = runtime.block_on(Server::start(scratch::private_server(folder.path(), preset)?))?;
         let maps = MapClient::new(&format!("http://{}", server.http_addr))?;
-        Ok(Self { runtime, server, maps, distance: preset.distance().into(), _folder: folder })
+        Ok(Self { runtime, server, maps, _folder: folder })
     }
 
     /// The landmarks of `world` as the map number `index`.
@@ -44,7 +43,7 @@ impl Teacher {
 
     async fn lesson(&self, world: &World, map: &str) -> anyhow::Result<()> {
         let maps = &self.maps;
-        maps.create_map(&NewMap { distance: Some(self.distance), ..NewMap::new(map) }).await?;
+        maps.create_map(&NewMap::new(map)).await?;
         let bar = screen::progress(world.truth.teach.len(), "teaching");
         for (path, landmark) in &world.truth.teach {
             let known = world.landmarks.get(landmark).map(super::world::LandmarkTruth::size_and_place);
