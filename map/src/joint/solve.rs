@@ -50,9 +50,9 @@ impl JointProblem {
         let mut steps = 0;
         while steps < descent.steps {
             steps += 1;
-            let (mut matrix, mut downhill) = layout.equations(&at);
+            let (mut matrix, gradient) = layout.equations(&at);
             matrix.change_diagonal(|d| d * (1.0 + damping) + FLOOR);
-            downhill.iter_mut().for_each(|g| *g = -*g);
+            let downhill: Vec<f64> = gradient.iter().map(|g| -g).collect();
             let step = matrix.factor()?.solve(&downhill);
             if step.iter().any(|v| !v.is_finite()) {
                 return Err(JointError::Loose);
