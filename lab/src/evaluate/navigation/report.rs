@@ -183,7 +183,6 @@ impl Report {
 
     /// For people.
     pub(super) fn lines(&self) -> Vec<String> {
-        let words = |e: &Option<Errors>| Errors::in_words(e.as_ref());
         let mut lines = vec![
             format!(
                 "navigation: corridor of {} m, {} posters; {} landmarks taught, {} active; {} drives, seed {}; preset {}",
@@ -221,6 +220,36 @@ impl Report {
                 self.frames_to_fix_worst.map_or("-".to_owned(), |n| n.to_string()),
                 self.never_fixed
             ),
+        ];
+        lines.extend(self.errors_in_words());
+        lines.extend([
+            if self.closed {
+                format!(
+                    "  Closed loop: map by SLAM, camera and wheels by the estimate; {} drives arrived.",
+                    self.arrived
+                )
+            } else {
+                "  Open loop: true path, aim and survey poses; intrinsics and extrinsics are exact."
+                    .to_owned()
+            },
+            "  Errors from the first fix on.".to_owned(),
+            "  named rightly                      by the picture    with a known pose".to_owned(),
+        ]);
+        lines.extend(self.named.iter().map(Row::in_words));
+        lines.extend(self.kidnapped_in_words());
+        lines.push(
+            "  corners of these                 number   median   90 %  NEES (2)  median (1.39)  within 95 %"
+                .to_owned(),
+        );
+        lines.extend(self.corners.iter().map(CornerErrors::in_words));
+        lines
+    }
+}
+
+impl Report {
+    fn errors_in_words(&self) -> Vec<String> {
+        let words = |e: &Option<Errors>| Errors::in_words(e.as_ref());
+        vec![
             "  errors                        median  95 %   worst".to_owned(),
             format!(
                 "  places of landmarks, m        {}; {:.2} along (1 expected)",
@@ -242,30 +271,9 @@ impl Report {
                 "  of each number: {:.2} along, {:.2} across, {:.2} heading (1 expected)",
                 self.nees_each[0], self.nees_each[1], self.nees_each[2]
             ),
-            if self.closed {
-                format!(
-                    "  Closed loop: map by SLAM, camera and wheels by the estimate; {} drives arrived.",
-                    self.arrived
-                )
-            } else {
-                "  Open loop: true path, aim and survey poses; intrinsics and extrinsics are exact."
-                    .to_owned()
-            },
-            "  Errors from the first fix on.".to_owned(),
-            "  named rightly                      by the picture    with a known pose".to_owned(),
-        ];
-        lines.extend(self.named.iter().map(Row::in_words));
-        lines.extend(self.kidnapped_in_words());
-        lines.push(
-            "  corners of these                 number   median   90 %  NEES (2)  median (1.39)  within 95 %"
-                .to_owned(),
-        );
-        lines.extend(self.corners.iter().map(CornerErrors::in_words));
-        lines
+        ]
     }
-}
 
-impl Report {
     fn kidnapped_in_words(&self) -> Option<String> {
         if self.kidnapped.is_empty() {
             return None;
