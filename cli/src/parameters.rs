@@ -47,9 +47,9 @@ pub struct ParameterArgs {
     /// What a quad inside another becomes: one of its `alternates`, or one of the `quads`.
     #[arg(long, value_name = "WHAT")]
     nested: Option<String>,
-    /// Also find sets of three sides (doors, half-hidden posters).
+    /// Leave out sets of three sides (doors, half-hidden posters).
     #[arg(long)]
-    three_sided: bool,
+    no_three_sided: bool,
     /// Remove floor tiling before sides are grouped.
     #[arg(long)]
     remove_tiling: bool,
@@ -112,7 +112,7 @@ impl ParameterArgs {
             ("quads.min_side_support", self.min_support.map(Value::from)),
             ("quads.min_probability", self.min_score.map(Value::from)),
             ("quads.nested", self.nested.clone().map(Value::from)),
-            ("quads.three_sided", self.three_sided.then_some(Value::from(true))),
+            ("quads.three_sided", self.no_three_sided.then_some(Value::from(false))),
             ("tiling.remove", self.remove_tiling.then_some(Value::from(true))),
         ]
         .into_iter()
@@ -202,7 +202,7 @@ mod tests {
             "--min-support=0.7",
             "--min-score=0.4",
             "--nested=quads",
-            "--three-sided",
+            "--no-three-sided",
             "--remove-tiling",
         ])
         .unwrap();
@@ -214,7 +214,7 @@ mod tests {
         assert!(
             (p.quads.min_side_support - 0.7).abs() < 1e-12 && (p.quads.min_probability - 0.4).abs() < 1e-12
         );
-        assert!(p.quads.three_sided && p.tiling.remove);
+        assert!(!p.quads.three_sided && p.tiling.remove);
     }
 
     #[test]

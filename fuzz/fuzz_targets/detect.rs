@@ -49,7 +49,7 @@ fn params(switches: u8, more: u8, width_px: usize) -> DetectParams {
     let mut p = DetectParams::default();
     p.quads.grouping = if on(0) { Grouping::Relaxation } else { Grouping::Proposals };
     p.quads.nested = if on(1) { Nested::Quads } else { Nested::Alternates };
-    p.quads.three_sided = on(2);
+    p.quads.three_sided = !on(2);
     p.quads.proposals.complete = !on(3);
     p.tiling.remove = on(4);
     p.quads.working_side_px = if on(5) { 100 } else { 640 };

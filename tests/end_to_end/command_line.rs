@@ -35,7 +35,7 @@ const OPTIONS: [(&str, &[&str], &[&str]); 64] = [
             "--min-support",
             "--min-score",
             "--nested",
-            "--three-sided",
+            "--no-three-sided",
             "--remove-tiling",
             "--set",
             "[IMAGES]",

@@ -161,7 +161,7 @@ impl Default for QuadParams {
             min_probability: 0.65,
             min_asked_probability: 0.02,
             sure_probability: 0.95,
-            three_sided: false,
+            three_sided: true,
             min_three_sided_closing: 0.5,
             min_three_sided_score: 0.5,
         }

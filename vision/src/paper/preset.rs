@@ -13,7 +13,6 @@ const MIN_SCORE: f64 = 0.75;
 pub(crate) fn params() -> Params {
     let mut p = Params::default();
     p.detect.quads.grouping = Grouping::Relaxation;
-    p.detect.quads.three_sided = true;
     p.detect.similarity.weights = [1.0 / 6.0; 6];
     p.detect.similarity.min_score = MIN_SCORE;
     p.detect.relaxation.linear_weight = 0.0;
@@ -30,7 +29,6 @@ pub(crate) fn params() -> Params {
 pub(crate) fn choose(p: &mut Params, preset: Params) {
     let Params { detect, recognise, learn, .. } = preset;
     p.detect.quads.grouping = detect.quads.grouping;
-    p.detect.quads.three_sided = detect.quads.three_sided;
     p.detect.similarity.weights = detect.similarity.weights;
     p.detect.similarity.min_score = detect.similarity.min_score;
     p.detect.relaxation.linear_weight = detect.relaxation.linear_weight;

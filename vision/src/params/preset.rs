@@ -83,7 +83,6 @@ mod tests {
         let paper = Preset::Paper.params();
         assert_eq!(paper.detect.quads.grouping, Grouping::Relaxation);
         assert!(paper.detect.similarity.weights.iter().all(|w| *w > 0.1));
-        assert!(paper.detect.quads.three_sided && !Params::default().detect.quads.three_sided);
         assert!(paper.detect.tiling.remove && paper.detect.relaxation.linear_weight.abs() < 1e-15);
         assert!(!paper.recognise.verdict.points && paper.recognise.verdict.verify_reach.abs() < 1e-15);
         assert!(paper.learn.gates.refuse_one_side && paper.learn.gates.refuse_few_points);

@@ -6,7 +6,7 @@
 
 use crate::{
     camera_calibration::pictures::search_windows::search_windows,
-    detect::{detector::detect, params::DetectParams},
+    detect::{detector::detect, params::DetectParams, quad::QuadKind},
     frame::GrayImage,
     geometry::{corners::Corners, homography::Homography, polygon::iou},
     points::{
@@ -46,9 +46,9 @@ impl<'a> Picture<'a> {
     /// hardly believes are among them: the texture decides.
     pub(crate) fn detected(image: &'a GrayImage) -> Self {
         let mut p = DetectParams::default();
-        p.quads.min_probability = MIN_PROBABILITY;
+        (p.quads.min_probability, p.quads.three_sided) = (MIN_PROBABILITY, false);
         let quads = detect(image, &p, &mut NoTrace);
-        let whole = quads.iter().filter(|q| !q.side_clipped.contains(&true));
+        let whole = quads.iter().filter(|q| q.kind == QuadKind::Full && !q.side_clipped.contains(&true));
         let mut borders_px: Vec<Corners> =
             whole.flat_map(|q| std::iter::once(q.corners_px).chain(q.alternates.iter().copied())).collect();
         borders_px.sort_by(|a, b| b.area_px2().total_cmp(&a.area_px2()));

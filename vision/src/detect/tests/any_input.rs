@@ -77,7 +77,6 @@ fn both() -> [DetectParams; 2] {
     // The default detector with every option on.
     let mut search = DetectParams::default();
     search.tiling.remove = true;
-    (search.quads.three_sided, paper.quads.three_sided) = (true, true);
     search.quads.scales = MAX_SCALES;
     [search, paper]
 }

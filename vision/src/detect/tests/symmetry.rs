@@ -60,11 +60,9 @@ fn scene(seed: u64, scale: usize) -> GrayImage {
 }
 
 fn both() -> [DetectParams; 2] {
-    let mut search = DetectParams::default();
-    search.quads.three_sided = true;
-    let mut paper = search.clone();
+    let mut paper = DetectParams::default();
     paper.quads.grouping = Grouping::Relaxation;
-    [search, paper]
+    [DetectParams::default(), paper]
 }
 
 /// Largest distance of a corner from that of the nearest quad of the same kind, under the best

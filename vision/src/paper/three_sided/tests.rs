@@ -23,14 +23,8 @@ fn door() -> GrayImage {
     render(500, 420, 200, &[(DOOR, 90), (floor, 90)])
 }
 
-fn asked() -> DetectParams {
-    let mut p = DetectParams::default();
-    p.quads.three_sided = true;
-    p
-}
-
 fn found(image: &GrayImage) -> (Vec<Quad>, Vec<Quad>) {
-    let quads = detect(image, &asked(), &mut NoTrace);
+    let quads = detect(image, &DetectParams::default(), &mut NoTrace);
     quads.into_iter().partition(|q| q.kind == QuadKind::Full)
 }
 
@@ -101,8 +95,10 @@ fn complete_quads_leave_no_three_sided_set() {
 }
 
 #[test]
-fn three_sided_sets_are_found_only_where_asked_for() {
-    assert!(detect(&door(), &DetectParams::default(), &mut NoTrace).is_empty());
+fn the_parameter_disables_three_sided_sets() {
+    let mut p = DetectParams::default();
+    p.quads.three_sided = false;
+    assert!(detect(&door(), &p, &mut NoTrace).is_empty());
 }
 
 #[test]
