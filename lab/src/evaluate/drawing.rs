@@ -8,7 +8,7 @@ use super::{
 };
 use cli::{
     simulated_errors::SimulatedRobotErrors,
-    survey::{place_on_walls, survey},
+    survey::{known_poses, place_on_walls, survey},
 };
 use formats::svg::{put, text};
 use map::{place::LandmarkPlace, segments::LaserSegment};
@@ -20,6 +20,7 @@ use sim::{
     robot::{Robot, RobotParams},
 };
 use std::{fmt::Write as _, path::PathBuf, sync::Arc};
+use vision::detect::DetectParams;
 
 /// Border of the picture, metres, and its scale.
 const BORDER_M: f64 = 0.7;
@@ -77,7 +78,8 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
         fittings: true,
         ..LessonParams::default()
     };
-    let survey = survey(robot, &stops(&building, &lesson), errors)?;
+    let stops = known_poses(stops(&building, &lesson));
+    let survey = survey(robot, &stops, &errors, &DetectParams::default())?;
     let placed: Vec<Placed> = survey
         .views
         .iter()

@@ -37,6 +37,7 @@ use utoipa_swagger_ui::SwaggerUi;
         protos::api::EventKind,
         protos::api::LandmarkDifference,
         protos::api::ListOrder,
+        protos::api::ModelPicture,
         protos::api::NumberOrder,
         protos::api::ScanBody
     )),

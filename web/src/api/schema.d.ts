@@ -91,6 +91,7 @@ export interface components {
             action: string;
             /** Path of the request. */ target: string;
             /** Id of the request, as in the log of the server. */ request?: string | null;
+            /** The reason that was given. */ why?: string | null;
             /** Digest of this entry and of all before it: SHA-256, hexadecimal. */ sha256: string;
         };
         /** A place in the chain. */
@@ -215,8 +216,8 @@ export interface components {
             /** The distance that decides and its threshold; absent where points decide, and where the distance is infinite. */
             distance: number | null;
             threshold: number | null;
-            /** Accepted below 1: the distance over its threshold, or, where points decide, -5 over their log10_chance. */
-            ratio: number;
+            /** Accepted below 1: the distance over its threshold, or, where points decide, -5 over their log10_chance. Absent where it is infinite: too few points. */
+            ratio: number | null;
             /** Equal for each landmark that the verdict leaves, and for `probability_none` where that is left. */
             probability: number;
             /** Empty, or the gate that refused it: correlation, hausdorff, similarity, mismatch, low_content, margin, points (so many points would agree by chance too often), disagreement (a connected part shows something else), corners (points agree, but do not tell where its corners are), plain (its icon alone speaks for it). */
@@ -251,7 +252,7 @@ export interface components {
             /** The picture under the map, or where it lies, differs. */ underlay_changed: boolean;
             /** Reference runs that are new. */ reference_runs_added: number;
             /** Reference runs that are gone. */ reference_runs_removed: number;
-            /** Which settings differ: `name`, `site`, `building`, `floor`, `parent`, `fusion_mode`, `areas`, `visibility_settings`. */
+            /** Which settings differ: `name`, `site`, `building`, `floor`, `parent`, `pipeline` (detector or decision), `fusion_mode`, `areas`, `visibility_settings`. */
             settings: string[];
             /** Names of the first landmarks that differ, at most 8. */ landmarks: string[];
         };
@@ -533,6 +534,18 @@ export interface components {
             /** Distance of the camera from its centre. */ range_m: number;
             /** Angle between its normal and the line of sight. */ incidence_rad: number;
         };
+        /** A Harris point of an exemplar with its descriptor. */
+        HarrisPoint: {
+            /** To the right, in icon pixels. */ x_px: number;
+            /** Downwards, in icon pixels. */ y_px: number;
+            /** Harris response, grey levels to the fourth. */ response: number;
+            /** The seven components of the 7-jet, whitened: differences are in standard deviations. */ jet: number[];
+        };
+        /** Harris points of an exemplar. */
+        HarrisSet: {
+            /** Which exemplar, from 1. */ exemplar: number;
+            /** At most 60, by falling response. */ points: components["schemas"]["HarrisPoint"][];
+        };
         /** The process lives. */
         Health: {
             /** `ok`. */ status: string;
@@ -608,6 +621,9 @@ export interface components {
             /** How far it has come. */ status: components["schemas"]["LandmarkStatus"];
             /** Why it is not matched; empty unless it is inactive. */
             failed_gates: components["schemas"]["FailedGate"][];
+            /** Gates that it does not pass and that do not keep it from being matched. */
+            waived_gates: components["schemas"]["FailedGate"][];
+            learning?: components["schemas"]["LearningSettings"] | null;
             /** Real views stored. */ views: number;
             size?: components["schemas"]["Size"] | null;
             place?: components["schemas"]["Place"] | null;
@@ -631,7 +647,7 @@ export interface components {
             /** Its name after the change, or before it if it is gone. */ name: string;
             /** Its name before, where that was another one. */ old_name?: string | null;
             /** Whether it is new, gone, or differs. */ change: components["schemas"]["ChangeKind"];
-            /** Of one that stays: name, size, place. */ fields: string[];
+            /** Of one that stays: name, size, place, learning. */ fields: string[];
             before?: components["schemas"]["SizeAndPlace"] | null;
             after?: components["schemas"]["SizeAndPlace"] | null;
             /** Training views that are new. */ views_added: number;
@@ -695,15 +711,18 @@ export interface components {
             /** Bits of the descriptor of one point. */ bits_per_point: number;
             /** Share of the variance of the views that the leading modes explain, 0 to 1 each, falling. */
             mode_shares: number[];
+            /** Harris points of each exemplar with their descriptors, where they are asked for. */
+            harris?: components["schemas"]["HarrisSet"][];
             /** Threshold of the correlation distance, 0 to 2. */ correlation: components["schemas"]["ThresholdBody"];
             /** Threshold of the Hausdorff distance. */ hausdorff: components["schemas"]["ThresholdBody"];
-            /** Threshold of 1 minus the gradient similarity. */
+            /** What these two weigh. */ weights: components["schemas"]["ThresholdWeights"];
+            /** Threshold of 1 minus the gradient similarity: its cap, or a share of the nearest negative. */
             gradient_dissimilarity: components["schemas"]["ThresholdBody"];
             /** Saliency, 0 to 1. */ saliency: number;
             /** Keypoints of the mean icon that are found in the other views, too. */ stable_points: number;
-            /** Spread of the viewpoints of all views (visibility confidence), 0 to 10. */
+            /** Spread of the viewpoints of all views, generated ones included, 0 to 10. No gate takes it. */
             visibility_confidence: number;
-            /** The same of photographed views only; 0 with fewer than two. */
+            /** The same of photographed views only; 0 with fewer than two. The gate and the choice of gaze take this one. */
             photographed_visibility_confidence: number;
             /** Memory in use. */ memory: components["schemas"]["MemoryPart"][];
         };
@@ -713,6 +732,7 @@ export interface components {
             name?: string | null;
             size?: components["schemas"]["Size"] | null;
             place?: components["schemas"]["Place"] | null;
+            learning?: components["schemas"]["LearningSettings"] | null;
             health?: components["schemas"]["LandmarkHealthBody"] | null;
         };
         /** A point of the landmark's photographs. */
@@ -728,6 +748,19 @@ export interface components {
             reprojection_rms_px: number;
         };
         /** How far a landmark has come. */ LandmarkStatus: "not_learnt" | "learning" | "active" | "inactive";
+        /** Weights and gates of one landmark, where a person wants others than the server has. What is absent is as there. */
+        LearningSettings: {
+            /** Why: one line of 1 to 200 characters. The history of the map has it, too. */ reason: string;
+            /** Cost of a wrong acceptance, 0.1 to 1000, where a refused own view costs 1 (lambda : mu). */
+            false_positive_weight?: number | null;
+            /** Fewest views, 1 to 200. */ min_views?: number | null;
+            /** Least saliency F, 0 to 1000. */ min_saliency_f?: number | null;
+            /** Fewest stable points, 0 to 60. */ min_stable_points?: number | null;
+            /** Least visibility confidence of its photographs, 0 to 10. */ min_visibility_confidence?: number | null;
+            /** Whether a smaller visibility confidence keeps it out of use. */ refuse_one_side?: boolean | null;
+            /** It is used whatever its measured gates say. Without a threshold it is still not. */
+            use_despite_gates?: boolean | null;
+        };
         /** The order of a list: by name, or by the time of the last edit or lesson; `-` reverses it. */
         ListOrder: "name" | "-name" | "changed" | "-changed";
         /** The answer to a frame. */
@@ -794,6 +827,7 @@ export interface components {
             revision?: string;
             /** Landmarks in it, learnt or not. */ landmarks: number;
             /** A picture is shown under it: `GET /maps/{map}/underlay`. */ has_underlay?: boolean;
+            preset?: components["schemas"]["PipelinePreset"] | null;
             /** Which distance decides. */ distance: components["schemas"]["Distance"];
             /** The map that it is a draft of. */ draft_of?: string | null;
             /** The site it belongs to, in words. */ site?: string | null;
@@ -816,6 +850,8 @@ export interface components {
         MapPatch: {
             /** Another name. Refused while a robot, an open job or an open gathering has the present one. */
             name?: string | null;
+            preset?: components["schemas"]["PipelinePreset"] | null;
+            distance?: components["schemas"]["Distance"] | null;
             /** The site it belongs to, in words: 1 to 64 characters. */ site?: string | null;
             /** The building it belongs to, in words: 1 to 64 characters. */ building?: string | null;
             /** The floor it belongs to, in words: 1 to 64 characters. */ floor?: string | null;
@@ -878,6 +914,8 @@ export interface components {
             /** Steps of 5 cm that were compared. */ steps: number;
             /** Measurements that were compared. */ measurements: number;
         };
+        /** A stored picture of a model. */
+        ModelPicture: "exemplar1" | "exemplar2" | "exemplar3" | "mean" | "mode1" | "mode2";
         /** A GeoJSON `MultiPolygon`: polygons of rings of points, m in the map; the outer ring counter-clockwise, that of a hole clockwise, the first point repeated. */
         MultiPolygon: {
             /** `MultiPolygon`. */ type: string;
@@ -917,7 +955,8 @@ export interface components {
         /** A map to be. */
         NewMap: {
             /** `[a-z0-9_-]{1,64}`, unique. */ name: string;
-            /** Which distance decides. */ distance?: components["schemas"]["Distance"];
+            preset?: components["schemas"]["PipelinePreset"] | null;
+            distance?: components["schemas"]["Distance"] | null;
             /** The site it belongs to, in words: 1 to 64 characters. */ site?: string | null;
             /** The building it belongs to, in words: 1 to 64 characters. */ building?: string | null;
             /** The floor it belongs to, in words: 1 to 64 characters. */ floor?: string | null;
@@ -936,6 +975,17 @@ export interface components {
             /** Maps that it is for; absent for all maps and what is above maps. */ maps?: string[] | null;
             /** Seconds until it expires, by the server's clock, at most ten years; absent for never. */
             valid_s?: number | null;
+        };
+        /** A landmark to look for, and the pose from which the camera turns to it. */
+        NextLandmarkBody: {
+            /** Name of the landmark. */ landmark: string;
+            /** How far along the leg the robot is. */ along_m: number;
+            /** The robot there, metres, in the map. */ x_m: number;
+            /** The robot there. */ y_m: number;
+            /** Its heading along the leg. */ theta_rad: number;
+            /** Turn of the camera from the heading, left positive. */ pan_rad: number;
+            /** Tilt of the camera, up positive. */ tilt_rad: number;
+            /** Distance on the floor. */ range_m: number;
         };
         /** The order of a list by number; `-` reverses it. */ NumberOrder: "number" | "-number";
         /** Where a landmark is observed, in the map. */
@@ -1060,6 +1110,13 @@ export interface components {
             covariance?: components["schemas"]["Covariance"] | null;
         };
         /** What a part of a landmark says. */ PartAgreement: "unspecified" | "silent" | "agrees" | "disagrees";
+        /** An end of a passage. */
+        PassageEnd: {
+            /** The place there, `hall/3`. */ place: string;
+            /** The middle of the passage, metres, in the map of the place. */ x_m: number;
+            /** Of the middle. */ y_m: number;
+        };
+        /** A whole pipeline by its name. */ PipelinePreset: "default" | "paper";
         /** Where a landmark is, in the map. */
         Place: {
             /** Centre, x. */ x_m: number;
@@ -1070,6 +1127,11 @@ export interface components {
             /** Turn about the outward normal, within 0.5; 0 when the sides are vertical. */ roll_rad?: number;
             /** Turn of the outward normal from level downwards: 0 on a wall, pi/2 under a ceiling. */
             tilt_rad?: number;
+        };
+        /** A landmark seen from a place. */
+        PlaceLandmark: {
+            /** Name of the landmark. */ landmark: string;
+            /** Share of the place from which it is seen, above 0 to 1. */ share: number;
         };
         /** Standard deviations of a place that the server found from views. */
         PlaceSigma: {
@@ -1467,6 +1529,15 @@ export interface components {
                 };
             };
         };
+        /** A part of a route within one place. */
+        RouteLeg: {
+            /** The place, `hall/3`. */ place: string;
+            /** Index of the passage at its end; `null` for the last leg, which ends at the place's centre. */
+            passage?: number | null;
+            /** With the passage after it. */ length_m: number;
+            /** Its corners: x, y in metres, in the map of the place. */ path: components["schemas"]["Pair"][];
+            next_landmark?: components["schemas"]["NextLandmarkBody"] | null;
+        };
         /** A map of a server. */
         ServedMap: {
             /** Its name. */ name: string;
@@ -1540,6 +1611,13 @@ export interface components {
             /** Announcements that were not taken because they were too many. */ ignored: number;
         };
         /** How a landmark was named. */ Sighting: "unspecified" | "global" | "guided";
+        /** Places and passages of the maps of a site. */
+        SiteTopologyBody: {
+            /** The versions of the maps it rests on, by map. */ maps: components["schemas"]["TopologyMap"][];
+            /** By map, then by number. */ places: components["schemas"]["TopologyPlace"][];
+            /** Doorways by map, then links between maps. */ passages: components["schemas"]["TopologyPassage"][];
+            route?: components["schemas"]["TopologyRoute"] | null;
+        };
         /** Width and height of a landmark. */
         Size: {
             /** 0.01 to 100. */ width_m: number;
@@ -1612,6 +1690,11 @@ export interface components {
             /** What limits it. */ limited_by: components["schemas"]["ThresholdLimit"];
         };
         /** What limits a threshold. */ ThresholdLimit: "cost" | "nearest_negative" | "absolute_cap";
+        /** Costs that thresholds of the correlation and the Hausdorff distance weigh. */
+        ThresholdWeights: {
+            /** Of a wrong acceptance. */ lambda: number;
+            /** Of a refused own view. */ mu: number;
+        };
         /** A token without its secret. */
         Token: {
             /** Its number; never given again. */ id: number;
@@ -1622,6 +1705,34 @@ export interface components {
             /** Milliseconds since the Unix epoch. */ created_ms: number;
             /** Not valid from then on; null for never. */ expires_ms?: number | null;
             /** Not valid since then; null if it was not revoked. */ revoked_ms?: number | null;
+        };
+        /** A map of a site. */
+        TopologyMap: {
+            /** Its name. */ map: string;
+            /** Its version. */ version: number;
+        };
+        /** A doorway between two places, or a link between two maps. */
+        TopologyPassage: {
+            /** Its two ends. */ ends: components["schemas"]["PassageEnd"][];
+            /** Free width, at most 2 m; `null` for a link. */ width_m?: number | null;
+            /** From centre to centre of its places. */ length_m: number;
+            /** What is seen from its first end, deepest inside its visibility area first; at most 32. */
+            landmarks: string[];
+        };
+        /** Free floor that no doorway divides. */
+        TopologyPlace: {
+            /** Map and number, `hall/3`. Numbers are those of this version of the map. */ place: string;
+            /** The map. */ map: string;
+            /** The point of it nearest to its centre of gravity, metres, in the map. */ x_m: number;
+            /** Of that point. */ y_m: number;
+            /** Free floor. */ area_m2: number;
+            /** What is seen from it, from most of it first; at most 32. */
+            landmarks: components["schemas"]["PlaceLandmark"][];
+        };
+        /** A route from passage to passage. */
+        TopologyRoute: {
+            /** Sum of its legs. */ length_m: number;
+            /** In order, at least one. */ legs: components["schemas"]["RouteLeg"][];
         };
         /** All tracks of a gathering that wait for a decision. */
         TrackList: {
@@ -1878,10 +1989,10 @@ export interface Operations {
   "PATCH /maps/{map}/landmarks/{landmark}": { body: Schemas["LandmarkPatch"]; answer: Schemas["Landmark"] };
   "GET /maps/{map}/landmarks/{landmark}/distances": { answer: Schemas["LandmarkDistances"] };
   "GET /maps/{map}/landmarks/{landmark}/evidence": { answer: Schemas["LandmarkEvidence"] };
-  "GET /maps/{map}/landmarks/{landmark}/icon": { answer: undefined };
+  "GET /maps/{map}/landmarks/{landmark}/icon": { query: { which?: Schemas["ModelPicture"] }; answer: undefined };
   "POST /maps/{map}/landmarks/{landmark}/learn": { body: Schemas["LandmarkLesson"] | null; answer: Schemas["Job"] };
   "POST /maps/{map}/landmarks/{landmark}/merge": { body: Schemas["LandmarkMerge"]; answer: Schemas["Landmark"] };
-  "GET /maps/{map}/landmarks/{landmark}/model": { answer: Schemas["LandmarkModelDetail"] };
+  "GET /maps/{map}/landmarks/{landmark}/model": { query: { harris?: boolean }; answer: Schemas["LandmarkModelDetail"] };
   "GET /maps/{map}/landmarks/{landmark}/refused-views": { answer: Schemas["Page_RefusedView"] };
   "GET /maps/{map}/landmarks/{landmark}/refused-views/{refused}/icon": { answer: undefined };
   "GET /maps/{map}/landmarks/{landmark}/views": { query: { limit?: number; cursor?: string; sort?: Schemas["NumberOrder"]; has_capture?: boolean; since_ms?: number; until_ms?: number }; answer: Schemas["Page_TrainingView"] };
@@ -1939,6 +2050,7 @@ export interface Operations {
   "GET /robots/{robot}/trajectories": { answer: Schemas["TrajectoriesBody"] };
   "GET /servers": { answer: Schemas["Servers"] };
   "POST /session/links": { answer: Schemas["PageLink"] };
+  "GET /sites/{site}/topology": { query: { from?: string; to?: string }; answer: Schemas["SiteTopologyBody"] };
   "GET /tokens": { query: { limit?: number; cursor?: string }; answer: Schemas["Page_Token"] };
   "POST /tokens": { body: Schemas["NewToken"]; answer: Schemas["CreatedToken"] };
   "DELETE /tokens/{token}": { answer: undefined };

@@ -9,7 +9,7 @@ export interface LiveQuad {
   guided_landmark?: string;
   doubtful_landmark?: string;
   confidence: number;
-  candidates?: { landmark: string; ratio?: number; refusal?: string }[];
+  candidates?: { landmark: string; ratio?: number | null; refusal?: string }[];
 }
 
 export interface LiveAnswer {

@@ -164,7 +164,7 @@ async fn every_body_has_an_example_and_the_server_takes_it() {
 /// Where the document is kept, for programs that make clients of it.
 const KEPT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/openapi.json");
 /// Largest size of the document, in bytes: as it is kept and as it is served.
-const MAX_BYTES: usize = 275_000;
+const MAX_BYTES: usize = 285_000;
 
 /// JSON with one line for every operation and every part of `components`, so that a change shows
 /// what it changes.

@@ -6,7 +6,7 @@ export interface Candidate {
   /** Absent where points decide. */
   distance?: number;
   threshold?: number;
-  ratio?: number;
+  ratio?: number | null;
   refusal?: string;
   gradient_similarity?: number;
 }

@@ -12,6 +12,7 @@ from waymark.api import (
     LandmarkEvidence,
     LandmarkModelDetail,
     LocaliseResult,
+    ModelPicture,
     StoredAnswer,
     StoredAnswerSummary,
 )
@@ -61,9 +62,11 @@ class Answers(Base):
         parts = localise_parts(image, intrinsics, mounting, scan)
         return self._send(LocaliseResult, "localise", map, **parts)
 
-    def landmark_model(self, map: str, landmark: str) -> LandmarkModelDetail:
-        """Thresholds, keypoints, points and sizes of a landmark's model. Refused with `not_learnt` if there is none."""
-        return self._send(LandmarkModelDetail, "landmark_model", map, landmark)
+    def landmark_model(self, map: str, landmark: str, *, harris: bool = False) -> LandmarkModelDetail:
+        """Thresholds, keypoints, points and sizes of a landmark's model, and on request the Harris points of its icons
+        with descriptors. Refused with `not_learnt` if there is none."""
+        query = {"harris": "true"} if harris else None
+        return self._send(LandmarkModelDetail, "landmark_model", map, landmark, params=query)
 
     def landmark_distances(self, map: str, landmark: str) -> LandmarkDistances:
         """Histograms of the distances that its thresholds were fitted to."""
@@ -73,9 +76,9 @@ class Answers(Base):
         """How strongly points spoke for it in the newest stored answers."""
         return self._send(LandmarkEvidence, "landmark_evidence", map, landmark)
 
-    def landmark_icon(self, map: str, landmark: str) -> bytes:
-        """The learnt icon that is nearest to the mean of its views: PNG."""
-        return self._bytes("landmark_icon", map, landmark)
+    def landmark_icon(self, map: str, landmark: str, which: ModelPicture = "exemplar1") -> bytes:
+        """A learnt icon, the mean of the views, or a mode: PNG."""
+        return self._bytes("landmark_icon", map, landmark, params={"which": which})
 
     def duplicates(
         self, map: str, *, landmark: str | None = None, in_use: bool | None = None

@@ -164,8 +164,8 @@ class Base:
     def _done(self, call: str, *at: str | int) -> None:
         self._checked(call, at)
 
-    def _bytes(self, call: str, *at: str | int) -> bytes:
-        return (self._checked(call, at)).content
+    def _bytes(self, call: str, *at: str | int, **parts: Any) -> bytes:
+        return (self._checked(call, at, **parts)).content
 
     def _save(self, path: str | PathLike[str], call: str, *at: str | int) -> int:
         """Writes the answer to a new file; returns its size."""

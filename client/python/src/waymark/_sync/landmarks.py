@@ -19,9 +19,11 @@ from waymark.api import (
     LandmarkDeletion,
     LandmarkHealth,
     LandmarkStatus,
+    LearningSettings,
     NewLandmark,
     NumberOrder,
     Order,
+    PipelinePreset,
     Place,
     RefusedView,
     Size,
@@ -94,10 +96,11 @@ class Landmarks(Base):
         name: str | Unset = UNSET,
         size: Size | Unset | None = UNSET,
         place: Place | Unset | None = UNSET,
+        learning: LearningSettings | Unset | None = UNSET,
         health: LandmarkHealth | Unset = UNSET,
     ) -> Landmark:
-        """Renames a landmark; sets size, place and health. What is not given stays; `None` forgets."""
-        body = given(name=name, size=size, place=place, health=health)
+        """Renames a landmark; sets size, place, gates and health. What is not given stays; `None` forgets."""
+        body = given(name=name, size=size, place=place, learning=learning, health=health)
         return self._send(Landmark, "update_landmark", map, landmark, json=body)
 
     def merge_landmarks(self, map: str, into: str, origin: str) -> Landmark:
@@ -218,8 +221,12 @@ class Landmarks(Base):
             waited_s += JOB_POLL_S
             job = self.job(job.id)
 
-    def recognise(self, map: str, image: Picture, intrinsics: Intrinsics | None = None) -> Answer:
+    def recognise(
+        self, map: str, image: Picture, intrinsics: Intrinsics | None = None, *, preset: PipelinePreset | None = None
+    ) -> Answer:
         """Recognises the landmarks of one picture. Without intrinsics there is no pose; with them, `camera_pose` says
-        where it was taken, by landmarks of known size and place."""
+        where it was taken, by landmarks of known size and place. `preset`: another detector and decision than the
+        map's."""
         form = {"intrinsics": json.dumps(to_json(intrinsics))} if intrinsics is not None else {}
+        form |= {"preset": preset} if preset is not None else {}
         return self._send(Answer, "recognise", map, files=picture_part(image), data=form)

@@ -25,11 +25,13 @@ from waymark.api import (
     Map,
     Order,
     Parent,
+    PipelinePreset,
     PoseBody,
     Readiness,
     Replay,
     RollbackOutcome,
     Servers,
+    SiteTopologyBody,
     TransformResponse,
     Underlay,
     UnderlayPlace,
@@ -100,14 +102,16 @@ class Maps(Base):
         self,
         name: str,
         *,
-        distance: Distance = "both",
+        preset: PipelinePreset | None = None,
+        distance: Distance | None = None,
         site: str | None = None,
         building: str | None = None,
         floor: str | None = None,
         parent: Parent | None = None,
     ) -> Map:
         """Creates an empty map; `Refused` with code `exists` if there is one of that name."""
-        body = present(name=name, distance=distance, site=site, building=building, floor=floor, parent=parent)
+        where = present(site=site, building=building, floor=floor, parent=parent)
+        body = present(name=name, preset=preset, distance=distance) | where
         return self._send(Map, "create_map", json=body)
 
     def maps(self) -> tuple[Map, ...]:
@@ -134,6 +138,13 @@ class Maps(Base):
         """Sets where a map is. What is not given stays; `None` forgets."""
         body = given(site=site, building=building, floor=floor, parent=parent)
         return self._send(Map, "locate_map", map, json=body)
+
+    def set_pipeline(
+        self, map: str, *, preset: PipelinePreset | Unset | None = UNSET, distance: Distance | Unset = UNSET
+    ) -> Map:
+        """Sets detector and decision of a map, and the distance that decides: without one, that of the preset. `None`:
+        those of the server's settings."""
+        return self._send(Map, "locate_map", map, json=given(preset=preset, distance=distance))
 
     def copy_map(self, map: str, name: str) -> Map:
         """Makes a new map of all that a map has."""
@@ -208,6 +219,14 @@ class Maps(Base):
         """How a map lies in another one, and a pose converted by it."""
         query = {"to": to, **(to_json(pose) if pose is not None else {})}
         return self._send(TransformResponse, "transform", map, params=query)
+
+    def site_topology(
+        self, site: str, *, route_from: str | None = None, route_to: str | None = None
+    ) -> SiteTopologyBody:
+        """Places and passages of a site's maps; with both ends, each a place `hall/3` or a point `hall/2.5,-1`, a route
+        with the landmarks to look for."""
+        query = query_of({"from": route_from, "to": route_to})
+        return self._send(SiteTopologyBody, "site_topology", site, params=query)
 
     def live_events(self, map: str) -> LiveEvents:
         """Follows a map. Close the stream, or use it as a context manager."""

@@ -75,6 +75,8 @@ __all__ = [
     "GazeQueryBody",
     "GazeRankingBody",
     "GazeTargetBody",
+    "HarrisPoint",
+    "HarrisSet",
     "Health",
     "IconKeypoint",
     "IntrinsicsMonitorBody",
@@ -98,6 +100,7 @@ __all__ = [
     "LandmarkPatch",
     "LandmarkPoint",
     "LandmarkStatus",
+    "LearningSettings",
     "LiveAnswer",
     "LiveMapChange",
     "LivePose",
@@ -118,6 +121,7 @@ __all__ = [
     "ModalityMapBody",
     "ModalityMapPatch",
     "ModalityStatsBody",
+    "ModelPicture",
     "MultiPolygon",
     "NamedAreaBody",
     "NewCopy",
@@ -128,13 +132,17 @@ __all__ = [
     "NewMap",
     "NewMapping",
     "NewToken",
+    "NextLandmarkBody",
     "NumberOrder",
     "ObservedPlaceBody",
     "Order",
     "PageLink",
     "Pair",
     "Parent",
+    "PassageEnd",
+    "PipelinePreset",
     "Place",
+    "PlaceLandmark",
     "PlaceSigma",
     "PlacementReportBody",
     "PointMatch",
@@ -168,12 +176,14 @@ __all__ = [
     "Rollback",
     "RollbackOutcome",
     "Ros2Status",
+    "RouteLeg",
     "ScanBody",
     "ServedMap",
     "ServerBody",
     "ServerEvent",
     "ServerEventBody",
     "Servers",
+    "SiteTopologyBody",
     "Size",
     "SizeAndPlace",
     "Span",
@@ -184,7 +194,12 @@ __all__ = [
     "StoredQuad",
     "ThresholdBody",
     "ThresholdLimit",
+    "ThresholdWeights",
     "Token",
+    "TopologyMap",
+    "TopologyPassage",
+    "TopologyPlace",
+    "TopologyRoute",
     "TrackList",
     "TrackSummary",
     "TrainingView",
@@ -268,10 +283,14 @@ MappingStage = Literal["resuming", "mapping", "finishing", "found", "done", "fai
 MissingCondition = Literal["higher_probability", "second_landmark", "consistent_observations", "no_rival_pose"]
 # What estimates poses by itself.
 Modality = Literal["odometry", "laser", "landmarks"]
+# A stored picture of a model.
+ModelPicture = Literal["exemplar1", "exemplar2", "exemplar3", "mean", "mode1", "mode2"]
 # The order of a list by number; `-` reverses it.
 NumberOrder = Literal["number", "-number"]
 # Two numbers: x and y in metres, or columns and rows in pixels.
 Pair = tuple[float, float]
+# A whole pipeline by its name.
+PipelinePreset = Literal["default", "paper"]
 # Whose pose a picture was compared with.
 PriorSource = Literal["robot", "server"]
 # Who did not take a photograph.
@@ -397,6 +416,8 @@ class AuditEntry:
     """Number of the token; none for the local one and the server."""
     request: str | None = None
     """Id of the request, as in the log of the server."""
+    why: str | None = None
+    """The reason that was given."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -654,8 +675,8 @@ class ChangeSummary:
     reference_runs_removed: int = 0
     """Reference runs that are gone."""
     settings: tuple[str, ...] = ()
-    """Which settings differ: `name`, `site`, `building`, `floor`, `parent`, `fusion_mode`, `areas`,
-    `visibility_settings`."""
+    """Which settings differ: `name`, `site`, `building`, `floor`, `parent`, `pipeline` (detector or decision),
+    `fusion_mode`, `areas`, `visibility_settings`."""
     landmarks: tuple[str, ...] = ()
     """Names of the first landmarks that differ, at most 8."""
 
@@ -1123,6 +1144,30 @@ class GazeTargetBody:
 
 
 @dataclass(frozen=True, slots=True)
+class HarrisPoint:
+    """A Harris point of an exemplar with its descriptor."""
+
+    x_px: float
+    """To the right, in icon pixels."""
+    y_px: float
+    """Downwards, in icon pixels."""
+    response: float
+    """Harris response, grey levels to the fourth."""
+    jet: tuple[float, ...]
+    """The seven components of the 7-jet, whitened: differences are in standard deviations."""
+
+
+@dataclass(frozen=True, slots=True)
+class HarrisSet:
+    """Harris points of an exemplar."""
+
+    exemplar: int
+    """Which exemplar, from 1."""
+    points: tuple[HarrisPoint, ...]
+    """At most 60, by falling response."""
+
+
+@dataclass(frozen=True, slots=True)
 class Health:
     """The process lives."""
 
@@ -1214,6 +1259,8 @@ class Landmark:
     """How far it has come."""
     failed_gates: tuple[FailedGate, ...]
     """Why it is not matched; empty unless it is inactive."""
+    waived_gates: tuple[FailedGate, ...]
+    """Gates that it does not pass and that do not keep it from being matched."""
     views: int
     """Real views stored."""
     health: LandmarkHealth
@@ -1221,6 +1268,8 @@ class Landmark:
     revision: str = ""
     """Another one after every edit of name, size, place, views or, by a person, health, and after every lesson of
     its model; the same after what robots do by themselves. `If-Match` takes it, in quotes."""
+    learning: LearningSettings | None = None
+    """Its own weights and gates, if a person has set some."""
     size: Size | None = None
     """Width and height, if measured."""
     place: Place | None = None
@@ -1260,7 +1309,7 @@ class LandmarkDifference:
     change: ChangeKind
     """Whether it is new, gone, or differs."""
     fields: tuple[str, ...]
-    """Of one that stays: name, size, place."""
+    """Of one that stays: name, size, place, learning."""
     views_added: int
     """Training views that are new."""
     views_removed: int
@@ -1382,18 +1431,22 @@ class LandmarkModelDetail:
     """Threshold of the correlation distance, 0 to 2."""
     hausdorff: ThresholdBody
     """Threshold of the Hausdorff distance."""
+    weights: ThresholdWeights
+    """What these two weigh."""
     gradient_dissimilarity: ThresholdBody
-    """Threshold of 1 minus the gradient similarity."""
+    """Threshold of 1 minus the gradient similarity: its cap, or a share of the nearest negative."""
     saliency: float
     """Saliency, 0 to 1."""
     stable_points: int
     """Keypoints of the mean icon that are found in the other views, too."""
     visibility_confidence: float
-    """Spread of the viewpoints of all views (visibility confidence), 0 to 10."""
+    """Spread of the viewpoints of all views, generated ones included, 0 to 10. No gate takes it."""
     photographed_visibility_confidence: float
-    """The same of photographed views only; 0 with fewer than two."""
+    """The same of photographed views only; 0 with fewer than two. The gate and the choice of gaze take this one."""
     memory: tuple[MemoryPart, ...]
     """Memory in use."""
+    harris: tuple[HarrisSet, ...] = ()
+    """Harris points of each exemplar with their descriptors, where they are asked for."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -1406,6 +1459,8 @@ class LandmarkPatch:
     """Width and height."""
     place: Place | None = None
     """Where it is."""
+    learning: LearningSettings | None = None
+    """Weights and gates."""
     health: LandmarkHealth | None = None
     """A person's decision; a new size or place is sound by itself."""
 
@@ -1420,6 +1475,29 @@ class LandmarkPoint:
     """Downwards, 0 to 1 over the landmark's height."""
     sigma: float
     """Scale, in shares of the landmark's side."""
+
+
+@dataclass(frozen=True, slots=True)
+class LearningSettings:
+    """Weights and gates of one landmark, where a person wants others than the server has. What is absent is as
+    there."""
+
+    reason: str
+    """Why: one line of 1 to 200 characters. The history of the map has it, too."""
+    false_positive_weight: float | None = None
+    """Cost of a wrong acceptance, 0.1 to 1000, where a refused own view costs 1 (lambda : mu)."""
+    min_views: int | None = None
+    """Fewest views, 1 to 200."""
+    min_saliency_f: float | None = None
+    """Least saliency F, 0 to 1000."""
+    min_stable_points: int | None = None
+    """Fewest stable points, 0 to 60."""
+    min_visibility_confidence: float | None = None
+    """Least visibility confidence of its photographs, 0 to 10."""
+    refuse_one_side: bool | None = None
+    """Whether a smaller visibility confidence keeps it out of use."""
+    use_despite_gates: bool | None = None
+    """It is used whatever its measured gates say. Without a threshold it is still not."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -1540,6 +1618,8 @@ class Map:
     themselves: `If-Match` takes it, in quotes."""
     has_underlay: bool = False
     """A picture is shown under it: `GET /maps/{map}/underlay`."""
+    preset: PipelinePreset | None = None
+    """Detector and decision; absent: those of the server's settings."""
     draft_of: str | None = None
     """The map that it is a draft of."""
     site: str | None = None
@@ -1578,6 +1658,10 @@ class MapPatch:
 
     name: str | None = None
     """Another name. Refused while a robot, an open job or an open gathering has the present one."""
+    preset: PipelinePreset | None = None
+    """Detector and decision, from the next version on; null: those of the server's settings."""
+    distance: Distance | None = None
+    """Which distance decides; absent where `preset` changes: that of the preset."""
     site: str | None = None
     """The site it belongs to, in words: 1 to 64 characters."""
     building: str | None = None
@@ -1760,8 +1844,10 @@ class NewMap:
 
     name: str
     """`[a-z0-9_-]{1,64}`, unique."""
+    preset: PipelinePreset | None = None
+    """Detector and decision; absent: those of the server's settings."""
     distance: Distance | None = None
-    """Which distance decides."""
+    """Which distance decides; absent: that of the preset."""
     site: str | None = None
     """The site it belongs to, in words: 1 to 64 characters."""
     building: str | None = None
@@ -1794,6 +1880,28 @@ class NewToken:
     """Maps that it is for; absent for all maps and what is above maps."""
     valid_s: int | None = None
     """Seconds until it expires, by the server's clock, at most ten years; absent for never."""
+
+
+@dataclass(frozen=True, slots=True)
+class NextLandmarkBody:
+    """A landmark to look for, and the pose from which the camera turns to it."""
+
+    landmark: str
+    """Name of the landmark."""
+    along_m: float
+    """How far along the leg the robot is."""
+    x_m: float
+    """The robot there, metres, in the map."""
+    y_m: float
+    """The robot there."""
+    theta_rad: float
+    """Its heading along the leg."""
+    pan_rad: float
+    """Turn of the camera from the heading, left positive."""
+    tilt_rad: float
+    """Tilt of the camera, up positive."""
+    range_m: float
+    """Distance on the floor."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -1849,6 +1957,18 @@ class Parent:
 
 
 @dataclass(frozen=True, slots=True)
+class PassageEnd:
+    """An end of a passage."""
+
+    place: str
+    """The place there, `hall/3`."""
+    x_m: float
+    """The middle of the passage, metres, in the map of the place."""
+    y_m: float
+    """Of the middle."""
+
+
+@dataclass(frozen=True, slots=True)
 class Place:
     """Where a landmark is, in the map."""
 
@@ -1865,6 +1985,16 @@ class Place:
     """Turn about the outward normal, within 0.5; 0 when the sides are vertical."""
     tilt_rad: float = 0.0
     """Turn of the outward normal from level downwards: 0 on a wall, pi/2 under a ceiling."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlaceLandmark:
+    """A landmark seen from a place."""
+
+    landmark: str
+    """Name of the landmark."""
+    share: float
+    """Share of the place from which it is seen, above 0 to 1."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -2352,6 +2482,22 @@ class Ros2Status:
 
 
 @dataclass(frozen=True, slots=True)
+class RouteLeg:
+    """A part of a route within one place."""
+
+    place: str
+    """The place, `hall/3`."""
+    length_m: float
+    """With the passage after it."""
+    path: tuple[Pair, ...]
+    """Its corners: x, y in metres, in the map of the place."""
+    passage: int | None = None
+    """Index of the passage at its end; `null` for the last leg, which ends at the place's centre."""
+    next_landmark: NextLandmarkBody | None = None
+    """The landmark to look for; `null` where none is seen from this leg."""
+
+
+@dataclass(frozen=True, slots=True)
 class ScanBody:
     """A planar laser scan: the part `scan`."""
 
@@ -2496,6 +2642,20 @@ class Servers:
 
 
 @dataclass(frozen=True, slots=True)
+class SiteTopologyBody:
+    """Places and passages of the maps of a site."""
+
+    maps: tuple[TopologyMap, ...]
+    """The versions of the maps it rests on, by map."""
+    places: tuple[TopologyPlace, ...]
+    """By map, then by number."""
+    passages: tuple[TopologyPassage, ...]
+    """Doorways by map, then links between maps."""
+    route: TopologyRoute | None = None
+    """Where one was asked for."""
+
+
+@dataclass(frozen=True, slots=True)
 class Size:
     """Width and height of a landmark."""
 
@@ -2606,6 +2766,16 @@ class ThresholdBody:
 
 
 @dataclass(frozen=True, slots=True)
+class ThresholdWeights:
+    """Costs that thresholds of the correlation and the Hausdorff distance weigh."""
+
+    lambda_: float = field(metadata={NAME: "lambda"})
+    """Of a wrong acceptance."""
+    mu: float
+    """Of a refused own view."""
+
+
+@dataclass(frozen=True, slots=True)
 class Token:
     """A token without its secret."""
 
@@ -2623,6 +2793,58 @@ class Token:
     """Not valid from then on; null for never."""
     revoked_ms: int | None = None
     """Not valid since then; null if it was not revoked."""
+
+
+@dataclass(frozen=True, slots=True)
+class TopologyMap:
+    """A map of a site."""
+
+    map: str
+    """Its name."""
+    version: int
+    """Its version."""
+
+
+@dataclass(frozen=True, slots=True)
+class TopologyPassage:
+    """A doorway between two places, or a link between two maps."""
+
+    ends: tuple[PassageEnd, ...]
+    """Its two ends."""
+    length_m: float
+    """From centre to centre of its places."""
+    landmarks: tuple[str, ...]
+    """What is seen from its first end, deepest inside its visibility area first; at most 32."""
+    width_m: float | None = None
+    """Free width, at most 2 m; `null` for a link."""
+
+
+@dataclass(frozen=True, slots=True)
+class TopologyPlace:
+    """Free floor that no doorway divides."""
+
+    place: str
+    """Map and number, `hall/3`. Numbers are those of this version of the map."""
+    map: str
+    """The map."""
+    x_m: float
+    """The point of it nearest to its centre of gravity, metres, in the map."""
+    y_m: float
+    """Of that point."""
+    area_m2: float
+    """Free floor."""
+    landmarks: tuple[PlaceLandmark, ...]
+    """What is seen from it, from most of it first; at most 32."""
+
+
+@dataclass(frozen=True, slots=True)
+class TopologyRoute:
+    """A route from passage to passage."""
+
+    length_m: float
+    """Sum of its legs."""
+    legs: tuple[RouteLeg, ...]
+    """In order, at least one."""
 
 
 @dataclass(frozen=True, slots=True)
