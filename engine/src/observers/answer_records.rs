@@ -278,7 +278,7 @@ mod tests {
 
     #[test]
     fn the_reason_is_that_of_the_nearest_candidate_unless_something_says_more() {
-        let candidate = |ratio: Some(ratio), refusal: &str| v1::Candidate {
+        let candidate = |ratio, refusal: &str| v1::Candidate {
             ratio: Some(ratio),
             refusal: refusal.into(),
             ..v1::Candidate::default()
