@@ -103,8 +103,8 @@ pub(super) struct Serve {
     /// no such permission.
     #[arg(long)]
     insecure: bool,
-    /// The pipeline: `default`, or that of the `paper`, for experiments: relaxation, icons alone. A map
-    /// may have its own: `waymark map create --preset` [default: default].
+    /// The pipeline: `default`, or that of the `paper`, for experiments: relaxation, icons alone. A
+    /// map may have its own: `waymark map create --preset` [default: default].
     #[arg(long, value_name = "NAME")]
     preset: Option<Preset>,
 }

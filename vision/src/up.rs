@@ -48,8 +48,8 @@ impl Up {
         Self { max_elevation_deg: MAX_ELEVATION_WITH_LEVEL_DEG, ..self }
     }
 
-    /// Angle of the optical axis above the horizontal, rad, of a camera whose image rows are level to
-    /// within [`MAX_ROLL_DEG`]; `None` of any other, and of one that looks straight up or down.
+    /// Angle of the optical axis above the horizontal, rad, of a camera whose image rows are level
+    /// to within [`MAX_ROLL_DEG`]; `None` of any other, and of one that looks straight up or down.
     pub(crate) fn tilt_without_roll_rad(self) -> Option<f64> {
         let up = self.camera_up;
         let roll_rad = up.x.atan2(-up.y);

@@ -36,7 +36,8 @@ enum Verb {
         /// Lower-case letters, digits, `_` and `-`, up to 64.
         #[arg(value_name = "MAP", value_parser = name)]
         map: String,
-        /// Its detector and decision, `default` or `paper`; otherwise those of the server's settings.
+        /// Its detector and decision, `default` or `paper`; otherwise those of the server's
+        /// settings.
         #[arg(long, value_name = "NAME")]
         preset: Option<Preset>,
         /// The distance that decides in this map; otherwise that of the preset.

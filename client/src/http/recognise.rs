@@ -31,7 +31,7 @@ impl MapClient {
         image: Vec<u8>,
         camera: Option<&Intrinsics>,
     ) -> Result<Answer, ClientError> {
-        let options = RecogniseOptions { camera: camera.cloned(), ..RecogniseOptions::default() };
+        let options = RecogniseOptions { camera: camera.copied(), ..RecogniseOptions::default() };
         self.recognise_with(map, image, &options).await
     }
 

@@ -18,8 +18,8 @@ pub struct ExclusiveRecording {
 }
 
 impl MotionTracker {
-    /// Copies the recording of a robot, up to about 70 MB: not for an async thread. Errors: there is
-    /// none, or it is in use.
+    /// Copies the recording of a robot, up to about 70 MB: not for an async thread. Errors: there
+    /// is none, or it is in use.
     pub fn lend_recording(self: &Arc<Self>, robot: &Name) -> Result<ExclusiveRecording, RecordingError> {
         let state = self.lock().robots.get(robot).cloned().ok_or(RecordingError::None)?;
         let mut state = lock_robot(&state);

@@ -90,8 +90,9 @@ pub(crate) enum Command {
     /// The joint map of walls, landmarks and camera in simulated buildings, and what is required of
     /// it.
     ///
-    /// One drive and two, loops with and without scans, a bare corridor, no laser, wrong identities;
-    /// beside them the laser map with each landmark placed alone. Needs no data. For example:
+    /// One drive and two, loops with and without scans, a bare corridor, no laser, wrong
+    /// identities; beside them the laser map with each landmark placed alone. Needs no data. For
+    /// example:
     ///   waymark-lab evaluate joint --buildings 4 --cases a,d,e
     #[command(verbatim_doc_comment)]
     Joint(joint::Args),

@@ -1,28 +1,11 @@
 //! The figures of a whole run, as they are stored: typed values from the reports of the
 //! experiments, with the commands and the commit that gave them. A report in, figures out.
 
-use super::row::{Command, Figure};
+use super::row::{Command, Figure, Unit};
 use anyhow::Context as _;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use vision::params::preset::Preset;
-
-/// What a number counts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub(super) enum Unit {
-    /// Of one.
-    Share,
-    Count,
-    /// A share, shown in percent.
-    Percent,
-    /// Without a unit.
-    Plain,
-    Px,
-    M,
-    Deg,
-    Bytes,
-}
 
 /// A number with what belongs to it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -1,12 +1,10 @@
 //! Sets made by others, and what the paper does not measure.
 
-use super::{
-    figures::Unit::{Count, M, Percent, Plain, Px, Share},
-    row::{
-        Command, Figure,
-        Presets::{Each, One},
-        Row,
-    },
+use super::row::{
+    Command, Figure,
+    Presets::{Each, One},
+    Row,
+    Unit::{Count, M, Percent, Plain, Px, Share},
 };
 
 /// The worlds that nothing was chosen on.

@@ -1,12 +1,10 @@
 //! The paper's experiments, E1 to E14 (method 18).
 
-use super::{
-    figures::Unit::{Bytes, Count, Deg, M, Percent, Plain, Px, Share},
-    row::{
-        Command, Figure,
-        Presets::{Each, One},
-        Row,
-    },
+use super::row::{
+    Command, Figure,
+    Presets::{Each, One},
+    Row,
+    Unit::{Bytes, Count, Deg, M, Percent, Plain, Px, Share},
 };
 
 const CORRIDOR: Command = Command {

@@ -1,8 +1,25 @@
 //! What a row of the table is: data alone. A command, the figures to take from its report, and what
 //! the paper says.
 
-use super::figures::Unit;
+use serde::{Deserialize, Serialize};
 use vision::params::preset::Preset;
+
+/// What a number counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum Unit {
+    /// Of one.
+    Share,
+    Count,
+    /// A share, shown in percent.
+    Percent,
+    /// Without a unit.
+    Plain,
+    Px,
+    M,
+    Deg,
+    Bytes,
+}
 
 /// One experiment of the table.
 #[derive(Debug)]

@@ -1,8 +1,8 @@
 //! Figures as Markdown: the tables of docs/EVALUATION.md and README.md. Figures in, text out.
 
 use super::{
-    figures::{Figures, Measured, Outcome, RowFigures, Run, Unit},
-    row::HIGHLIGHTS,
+    figures::{Figures, Measured, Outcome, RowFigures, Run},
+    row::{HIGHLIGHTS, Unit},
 };
 use std::fmt::Write as _;
 use vision::params::preset::Preset;

@@ -1,5 +1,5 @@
-//! Claim: `waymark-lab reproduce` gives the figures of the very commands that it names, says what it
-//! could not measure, goes on where it was interrupted, and the documents state its figures.
+//! Claim: `waymark-lab reproduce` gives the figures of the very commands that it names, says what
+//! it could not measure, goes on where it was interrupted, and the documents state its figures.
 
 use crate::lab;
 use serde_json::Value;

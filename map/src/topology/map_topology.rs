@@ -167,8 +167,8 @@ impl MapTopology {
         Some((self.place_of[cell] as usize - 1, self.floor.clearance_m[cell]))
     }
 
-    /// The way between two points of a place: its corners and its length. It keeps [`RADIUS_M`] from
-    /// walls, except at its ends. `None` if either is not in the place or next to it.
+    /// The way between two points of a place: its corners and its length. It keeps [`RADIUS_M`]
+    /// from walls, except at its ends. `None` if either is not in the place or next to it.
     pub fn path(
         &self,
         place: usize,

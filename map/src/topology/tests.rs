@@ -202,7 +202,8 @@ fn room() -> Plan {
 #[test]
 fn a_link_joins_the_places_with_most_common_floor() {
     let (hall, room) = (corridor(), room());
-    // The room is turned a quarter and lies over the right room of the hall: x 7 to 11, y 1.9 to 5.9.
+    // The room is turned a quarter and lies over the right room of the hall: x 7 to 11, y 1.9 to
+    // 5.9.
     let pose = Pose2::new(11.0, 1.9, FRAC_PI_2);
     let plans = [("hall", &hall), ("room", &room)];
     let both = site(&plans, &[("room", link("hall", pose, 3.0))].into());

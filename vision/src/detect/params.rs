@@ -39,8 +39,8 @@ pub struct DetectParams {
 }
 
 impl DetectParams {
-    /// The same above the floor as one camera sees it, for images of `width_px`. `None` where tiling
-    /// is not removed, or the parameters have a floor of their own.
+    /// The same above the floor as one camera sees it, for images of `width_px`. `None` where
+    /// tiling is not removed, or the parameters have a floor of their own.
     pub(crate) fn above_floor(
         &self,
         intrinsics: Intrinsics,

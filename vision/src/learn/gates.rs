@@ -222,7 +222,8 @@ mod tests {
         assert!((v(&[(0.0, 6.0), (0.0, 2.0)]) - 8.0f64.sqrt()).abs() < 1e-9);
     }
 
-    /// The side at +y is the right one of who faces the landmark. 40 degrees pass the gate, 30 fail.
+    /// The side at +y is the right one of who faces the landmark. 40 degrees pass the gate, 30
+    /// fail.
     #[test]
     fn the_side_of_the_views_is_that_of_the_longer_side() {
         let from = |bearings: &[f64]| {

@@ -79,9 +79,9 @@ pub fn minimise(positives: &[f64], negatives: &[f64], weight: f64) -> Result<f64
 }
 
 /// The tau in use: [`minimise`], then limited to `nearest_share` of the nearest negative where the
-/// optimum has no false positive, and below `cap` always, unless `p` lifts both. With fewer than [`FEW_NEGATIVES`] the cap
-/// counts as one more of them: the sample of negatives is small, and a distractor as near as the
-/// cap may exist.
+/// optimum has no false positive, and below `cap` always, unless `p` lifts both. With fewer than
+/// [`FEW_NEGATIVES`] the cap counts as one more of them: the sample of negatives is small, and a
+/// distractor as near as the cap may exist.
 // Departs from method 8 twice. There n- = 0 gives no threshold; here the cap, measured on real
 // distractors, replaces it. There small sets use the crossing of two normal curves; H^r has
 // infinite values and both classes have long tails towards each other, where the fitted curves

@@ -110,13 +110,16 @@ impl Row {
         );
         if self.wrong + self.right > 0 {
             let (kept, wrong, lost, right) = (self.wrong_kept, self.wrong, self.right_lost, self.right);
-            line += &format!("; wrong kept {kept} of {wrong}, right lost {lost} of {right}");
+            let more = format!("; wrong kept {kept} of {wrong}, right lost {lost} of {right}");
+            line.push_str(&more);
         }
         if self.apart_mm.is_some() {
-            line += &format!("; from both at once {} mm", whole(self.apart_mm));
+            let more = format!("; from both at once {} mm", whole(self.apart_mm));
+            line.push_str(&more);
         }
         if self.failed > 0 {
-            line += &format!("; {} not solved", self.failed);
+            let more = format!("; {} not solved", self.failed);
+            line.push_str(&more);
         }
         line
     }

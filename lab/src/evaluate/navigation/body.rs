@@ -1,7 +1,6 @@
 //! What moves the robot: its own estimate, or its true path. Out: what it senses at every step.
 
 use super::{
-    journey::DriveSettings,
     pilot::{Path, Pilot},
     server::Server,
     world::World,
@@ -15,6 +14,19 @@ use sim::{
     steered::Steered,
 };
 use vision::{frame::Intrinsics, model::LandmarkId, random::Random};
+
+/// Settings of a drive.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct DriveSettings {
+    pub(super) seed: u64,
+    /// From the far end.
+    pub(super) back: bool,
+    pub(super) rate_hz: f64,
+    /// They have a laser.
+    pub(super) laser: bool,
+    /// Distance that the robot is carried forwards, m; 0: none.
+    pub(super) kidnap_m: f64,
+}
 
 /// Start beyond any corridor: the simulator clamps it to the end.
 const FAR_END_M: f64 = 1e3;

@@ -2,7 +2,7 @@
 //! a map made by SLAM there and back, and the pose at every stop by laser and odometry in these
 //! walls. A person steers; where the first drive began is the only pose that is told.
 
-use super::{server::Server, world::MAP};
+use super::server::{MAP, Server};
 use engine::snapshot::MapSnapshot;
 use map::{
     laser_fix::WallIndex,

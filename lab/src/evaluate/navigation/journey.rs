@@ -4,7 +4,7 @@
 
 use super::{
     super::experiment::mixed,
-    body::Body,
+    body::{Body, DriveSettings},
     kidnap::{Kidnap, KidnapOutcome},
     server::Server,
     world::World,
@@ -97,19 +97,6 @@ pub(super) struct Named {
     pub(super) shown_to_pose: usize,
     /// Of these, rightly named by the picture alone or with the pose.
     pub(super) guided: usize,
-}
-
-/// Settings of a drive.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct DriveSettings {
-    pub(super) seed: u64,
-    /// From the far end.
-    pub(super) back: bool,
-    pub(super) rate_hz: f64,
-    /// They have a laser.
-    pub(super) laser: bool,
-    /// Distance that the robot is carried forwards, m; 0: none.
-    pub(super) kidnap_m: f64,
 }
 
 /// Drives the length of the corridor once.

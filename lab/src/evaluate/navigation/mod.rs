@@ -18,7 +18,8 @@ mod plot;
 mod report;
 
 use super::experiment::{mixed, of_each, say, write_plot};
-use journey::{DriveSettings, Journey, drive};
+use body::DriveSettings;
+use journey::{Journey, drive};
 use map::modality_stats::FusionMode;
 use reference_runs::learnt;
 use report::Report;
@@ -111,7 +112,7 @@ fn kidnap(text: &str) -> Result<f64, String> {
 }
 
 fn fusion(word: &str) -> Result<FusionMode, String> {
-    serde_json::from_value(word.into()).map_err(|_| "one of: all, near_best, best".to_owned())
+    serde_json::from_value(word.into()).map_err(|_other| "one of: all, near_best, best".to_owned())
 }
 
 /// Teaches, drives, reports.

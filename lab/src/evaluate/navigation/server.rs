@@ -2,7 +2,6 @@
 //! In: scans, analysed frames, gaze queries. Out: poses, names by the pose, advice. No transport,
 //! no threads.
 
-use super::world::MAP;
 use cli::simulated_errors::SimulatedRobotErrors;
 use engine::{
     context::FrameContext,
@@ -24,6 +23,9 @@ use protos::Name;
 use sim::robot::SensorReadings;
 use std::{sync::Arc, time::Instant};
 use vision::{model::LandmarkId, pipeline::FrameAnalysis};
+
+/// Name of its map.
+pub(super) const MAP: &str = "corridor";
 
 /// One run of the robot's software.
 const EPOCH: u64 = 1;

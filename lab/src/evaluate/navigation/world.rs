@@ -1,7 +1,10 @@
 //! The corridor and its map from the first drives: walls, places and models, as in a server, in
 //! memory.
 
-use super::exploration::{Explored, explore};
+use super::{
+    exploration::{Explored, explore},
+    server::MAP,
+};
 use crate::evaluate::experiment::{lesson::points_of, mixed, of_each};
 use anyhow::Context as _;
 use cli::{
@@ -37,12 +40,8 @@ const VIEWS: usize = 30;
 /// Icons of each landmark that are negatives of the others.
 const NEGATIVES: usize = 10;
 
-/// Name of its map.
-pub(super) const MAP: &str = "corridor";
-
 /// A corridor and how it is taught.
 #[derive(Debug, Clone, Copy)]
-#[expect(clippy::struct_excessive_bools, reason = "each is a switch of the experiment")]
 pub(super) struct Course {
     pub(super) length_m: f64,
     /// Posters that hang there.

@@ -7,6 +7,7 @@ use crate::{
     store::{
         StoreError,
         kind::Kind,
+        landmark_learning,
         landmark_placement::tests::seen_from,
         landmarks::{self, ModelSummary, StoredPlace},
         map_locations, maps,
@@ -133,6 +134,8 @@ pub(crate) async fn filled(store: &Catalogue) {
             landmarks::create(tx, "a", "p1", place(), 9).await?;
             landmarks::create(tx, "a", "p2", LandmarkGeometry::default(), 9).await?;
             landmarks::set_health(tx, "a", "p1", LandmarkHealth::Flagged, Some("{\"x\":1}")).await?;
+            let learning = "{\"reason\":\"hung by us\",\"use_despite_gates\":true}";
+            landmark_learning::set(tx, ("a", "p1"), Some(learning), None).await?;
             for (landmark, seed) in [(1, 0), (2, 5)] {
                 models::put(tx, 1, &model_of(landmark, seed)).await?;
             }
