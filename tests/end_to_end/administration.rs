@@ -177,11 +177,12 @@ fn a_map_or_a_photograph_is_compared_by_the_papers_pipeline() {
     wall_with(&photograph, &[1]);
     desk.done(&format!("landmark teach poster {photograph} --map office"));
     let points_decide = |options: &str| {
-        let seen = desk.done(&format!("recognise {photograph} --map office {options} --json"));
+        let line = format!("recognise {photograph} --map office --json {options}");
+        let seen = desk.done(line.trim_end());
         let seen: Value = serde_json::from_str(&seen).expect("JSON");
         let candidate = &seen["quads"][0]["candidates"][0];
         assert_eq!(candidate["landmark"], "poster", "{seen}");
-        candidate["hausdorff"].is_null()
+        candidate["correlation"].is_null()
     };
     assert!(points_decide("") && !points_decide("--preset paper"));
     assert!(desk.done("map pipeline office --preset paper").contains("paper, distance hausdorff"));
