@@ -9,7 +9,7 @@ use crate::{
     place::{LandmarkPlace, MAX_HEIGHT_M},
     placement::{
         params::{PlacementError, PlacementParams},
-        rays::{self, Hit, MOUNTING, WALL, by_camera, new_in_each_view},
+        rays::{self, Hit, MOUNTING, WALL, by_camera, by_corners_and_robot, by_robot},
         view::{CheckedView, MAX_VIEWS, PosedView, checked},
     },
     pose2::wrap_rad,
@@ -46,8 +46,10 @@ impl Ceiling {
 pub struct CeilingRectangle {
     /// Centre x and y, direction of the top, width, height; metres and radians.
     pub rectangle: SVector<f64, 5>,
-    /// Covariance by the errors that are independent in every view: corners and robot pose.
+    /// Covariance by the corners and the robot's pose.
     pub covariance: SMatrix<f64, 5, 5>,
+    /// Derivative by the robot's pose, in its standard deviations.
+    pub by_robot: SMatrix<f64, 5, 3>,
     /// Derivative by the extrinsics' (rotation, translation).
     pub by_mounting: SMatrix<f64, 5, 6>,
     /// Covariance of the extrinsics.
@@ -85,9 +87,9 @@ fn fit(
         intersections.fixed_rows_mut::<2>(2 * i).copy_from(&hit.point.xy());
         by.fixed_rows_mut::<2>(2 * i).copy_from(&hit.by.fixed_rows::<2>(0));
     }
-    let independent = new_in_each_view(view, &by);
+    let own = by_corners_and_robot(view, &by);
     let m = by.fixed_columns::<6>(MOUNTING);
-    let weight = (independent + m * view.mounting.covariance * m.transpose())
+    let weight = (own + m * view.mounting.covariance * m.transpose())
         .cholesky()
         .ok_or(PoseError::Degenerate)?
         .inverse();
@@ -99,7 +101,8 @@ fn fit(
     }
     Ok(CeilingRectangle {
         rectangle: q,
-        covariance: gain * independent * gain.transpose(),
+        covariance: gain * own * gain.transpose(),
+        by_robot: gain * by_robot(view, &by),
         by_mounting: gain * m,
         mounting_covariance: view.mounting.covariance,
         by_camera: gain * by_camera(view, &by),
@@ -190,8 +193,8 @@ fn apart(a: &Vector5, b: &Vector5) -> Vector5 {
     d
 }
 
-/// Fusion in information form; the errors of extrinsics, intrinsics and ceiling are common to all
-/// views and added once.
+/// Fusion in information form; the errors of extrinsics, intrinsics, ceiling and robot pose are
+/// common to all views and added once.
 fn fused(
     origin: &Vector5,
     views: &[&CeilingRectangle],
@@ -205,19 +208,23 @@ fn fused(
     let mean = information.cholesky()?.inverse();
     let (mut d, mut by_mounting, mut by_height) =
         (Vector5::zeros(), SMatrix::<f64, 5, 6>::zeros(), Vector5::zeros());
-    let mut by_camera = SMatrix::<f64, 5, 3>::zeros();
+    let (mut by_camera, mut by_robot) = (SMatrix::<f64, 5, 3>::zeros(), SMatrix::<f64, 5, 3>::zeros());
+    let mut own = Matrix5::zeros();
     for v in views {
         let share = mean * v.covariance.try_inverse()?;
         d += share * apart(&v.rectangle, origin);
         by_mounting += share * v.by_mounting;
         by_camera += share * v.by_camera;
+        by_robot += share * v.by_robot;
+        own += share * (v.covariance - v.by_robot * v.by_robot.transpose()) * share.transpose();
         by_height += share * v.by_height;
     }
     let q = origin + d;
     let inflation = if views.len() > 1 { p.inflation } else { 1.0 };
-    let own = mean * inflation
+    let total = own * inflation
         + by_mounting * views[0].mounting_covariance * by_mounting.transpose()
-        + by_camera * by_camera.transpose();
+        + by_camera * by_camera.transpose()
+        + by_robot * by_robot.transpose();
     // (x, y, theta, z, w, h) by (rectangle, height of the ceiling).
     let mut j = DMatrix::zeros(6, 6);
     for (row, k) in [(0, 0), (1, 1), (2, 2), (4, 3), (5, 4)] {
@@ -226,7 +233,7 @@ fn fused(
     }
     j[(3, 5)] = 1.0;
     let mut s = DMatrix::zeros(6, 6);
-    s.view_mut((0, 0), (5, 5)).copy_from(&own);
+    s.view_mut((0, 0), (5, 5)).copy_from(&total);
     s[(5, 5)] = ceiling.sigma_m.powi(2);
     let covariance = &j * s * j.transpose();
     let covariance = Matrix6::from_iterator(covariance.iter().copied());

@@ -98,8 +98,11 @@ pub(super) fn is_on(wall: &LaserSegment, point: &Vector3<f64>, margin_m: f64) ->
     (-margin_m..=wall.length_m() + margin_m).contains(&u)
 }
 
-/// Covariance of the intersections by corners and robot pose, which are independent in every view.
-pub(super) fn new_in_each_view(view: &CheckedView<'_>, by: &SMatrix<f64, 8, INPUTS>) -> SMatrix<f64, 8, 8> {
+/// Covariance of the intersections by corners and robot pose.
+pub(super) fn by_corners_and_robot(
+    view: &CheckedView<'_>,
+    by: &SMatrix<f64, 8, INPUTS>,
+) -> SMatrix<f64, 8, 8> {
     let mut sum = SMatrix::<f64, 8, 8>::zeros();
     for (i, covariance) in view.covariance_px2.iter().enumerate() {
         let j = by.fixed_columns::<2>(CORNERS + 2 * i);
@@ -107,6 +110,12 @@ pub(super) fn new_in_each_view(view: &CheckedView<'_>, by: &SMatrix<f64, 8, INPU
     }
     let j = by.fixed_columns::<3>(ROBOT);
     sum + j * view.map_from_robot.covariance * j.transpose()
+}
+
+/// Derivative of the intersections by the robot pose's errors, each of one standard deviation.
+pub(super) fn by_robot(view: &CheckedView<'_>, by: &SMatrix<f64, 8, INPUTS>) -> SMatrix<f64, 8, 3> {
+    let root = view.map_from_robot.covariance.cholesky().map_or_else(Matrix3::zeros, |c| c.l());
+    by.fixed_columns::<3>(ROBOT) * root
 }
 
 /// Derivative of the intersections by the intrinsics' errors, each of one standard deviation. They

@@ -181,15 +181,16 @@ fn draw_with(
     views: &[(f64, f64)],
     random: &mut Random,
 ) -> (Vector6<f64>, LandmarkPlace) {
-    draw_on(&wall(), stated, views, random)
+    draw_on(&wall(), stated, views, (random, false))
 }
 
-/// The same on a wall that has an error by its stated covariance.
+/// The same on a wall that has an error by its stated covariance; the robot's error is drawn once
+/// for all views, or for each.
 fn draw_on(
     w: &LaserSegment,
     stated: &Intrinsics,
     views: &[(f64, f64)],
-    random: &mut Random,
+    (random, once): (&mut Random, bool),
 ) -> (Vector6<f64>, LandmarkPlace) {
     let e = stated.error_sigmas().map(|s| if s > 0.0 { s * random.normal() } else { 0.0 });
     let (fx_px, fy_px) = (stated.fx_px * (1.0 + e.x), stated.fy_px * (1.0 + e.x));
@@ -202,11 +203,15 @@ fn draw_on(
     let (turn, shift) = (e.fixed_rows::<3>(0).into(), e.fixed_rows::<3>(3).into());
     let mounted =
         CameraExtrinsics { robot_from_camera: perturbed(&m.robot_from_camera, &turn, &shift), ..m.clone() };
+    let mut robot_error = None;
     let views_on_wall: Vec<_> = views
         .iter()
         .filter_map(|(d, psi)| {
             let believed = robot(&truth, *d, *psi);
-            let e = believed.covariance.map_diagonal(f64::sqrt).map(|s| s * random.normal());
+            let e = robot_error
+                .filter(|_| once)
+                .unwrap_or_else(|| believed.covariance.map_diagonal(f64::sqrt).map(|s| s * random.normal()));
+            robot_error = Some(e);
             let points = projected(&real, &truth, &believed.pose.plus(&e), &mounted)
                 .map(|p| p + Vector2::new(random.normal(), random.normal()) * SIGMA_PX);
             // Large errors of the camera give no rectangles.
@@ -216,7 +221,7 @@ fn draw_on(
         .collect();
     let walls = std::slice::from_ref(w);
     let Ok(Placement { place, .. }) = placement(&views_on_wall, walls, &PlacementParams::default()) else {
-        return draw_on(w, stated, views, random);
+        return draw_on(w, stated, views, (random, once));
     };
     let error = Vector6::new(
         place.x_m - truth.x_m,
@@ -262,6 +267,20 @@ fn several_views_reduce_the_covariance_without_overconfidence() {
 }
 
 #[test]
+fn a_pose_error_that_all_views_share_is_in_the_claim() {
+    // Oracle: the robot's error drawn once for all views, as laser and odometry have it.
+    let mut random = Random::new(8);
+    let views = [(2.5, 30.0), (2.4, 20.0), (2.3, 10.0), (2.3, 0.0), (2.4, -10.0), (2.5, -20.0)];
+    let (mut sum, mut n) = (0.0, 0.0);
+    for _ in 0..300 {
+        let (e, place) = draw_on(&wall(), &camera(), &views, (&mut random, true));
+        sum += e.dot(&place.covariance.cholesky().unwrap().solve(&e));
+        n += 1.0;
+    }
+    assert!((3.0..6.3).contains(&(sum / n)), "{}", sum / n);
+}
+
+#[test]
 fn a_wall_with_a_wide_covariance_widens_what_is_placed_on_it() {
     // Oracle: a wall drawn anew in each draw, 6 cm and 10 mrad about its middle, as a map made of
     // scans has them.
@@ -271,9 +290,9 @@ fn a_wall_with_a_wide_covariance_widens_what_is_placed_on_it() {
     let mut random = Random::new(6);
     let (mut sum, mut as_by_hand, n) = (0.0, 0.0, 1000);
     for _ in 0..n {
-        let (e, place) = draw_on(&wide, &camera(), &[(2.5, 35.0)], &mut random);
+        let (e, place) = draw_on(&wide, &camera(), &[(2.5, 35.0)], (&mut random, false));
         sum += e.dot(&place.covariance.cholesky().unwrap().solve(&e));
-        let claim = draw_on(&by_hand, &camera(), &[(2.5, 35.0)], &mut Random::new(7)).1.covariance;
+        let claim = draw_on(&by_hand, &camera(), &[(2.5, 35.0)], (&mut Random::new(7), false)).1.covariance;
         as_by_hand += e.dot(&claim.cholesky().unwrap().solve(&e));
     }
     let (mean, as_by_hand) = (sum / f64::from(n), as_by_hand / f64::from(n));

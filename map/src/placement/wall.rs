@@ -3,7 +3,7 @@
 use crate::{
     placement::{
         params::{PlacementError, PlacementParams},
-        rays::{self, Hit, INPUTS, MOUNTING, WALL, by_camera, new_in_each_view},
+        rays::{self, Hit, INPUTS, MOUNTING, WALL, by_camera, by_corners_and_robot, by_robot},
         view::{CheckedView, PosedView, checked},
     },
     segments::LaserSegment,
@@ -19,8 +19,10 @@ pub struct WallRectangle {
     /// Centre along the wall (metres from the foot of the map's origin, towards the viewer's
     /// right), height of the centre, width, height; metres.
     pub rectangle: Vector4<f64>,
-    /// Covariance by the errors that are independent in every view: corners and robot pose.
+    /// Covariance by the corners and the robot's pose.
     pub covariance: Matrix4<f64>,
+    /// Derivative by the robot's pose, in its standard deviations.
+    pub by_robot: Matrix4x3<f64>,
     /// Derivative by the extrinsics' (rotation, translation).
     pub by_mounting: SMatrix<f64, 4, 6>,
     /// Covariance of the extrinsics.
@@ -109,9 +111,9 @@ fn fit(
         by.set_row(2 * i, &row);
         by.set_row(2 * i + 1, &hit.by.row(2));
     }
-    let independent = new_in_each_view(view, &by);
+    let own = by_corners_and_robot(view, &by);
     let m = by.fixed_columns::<6>(MOUNTING);
-    let weight = (independent + m * view.mounting.covariance * m.transpose())
+    let weight = (own + m * view.mounting.covariance * m.transpose())
         .cholesky()
         .ok_or(PoseError::Degenerate)?
         .inverse();
@@ -125,7 +127,8 @@ fn fit(
     Ok(WallRectangle {
         wall,
         rectangle: q.fixed_rows::<4>(0).into_owned(),
-        covariance: gain * independent * gain.transpose(),
+        covariance: gain * own * gain.transpose(),
+        by_robot: gain * by_robot(view, &by),
         by_mounting: gain * m,
         mounting_covariance: view.mounting.covariance,
         by_camera: gain * by_camera(view, &by),

@@ -44,8 +44,9 @@ fn total(v: &WallRectangle) -> Matrix4<f64> {
     v.covariance + mounting + v.by_camera * v.by_camera.transpose()
 }
 
-/// Fusion in information form with the wall fixed; the errors of extrinsics, intrinsics and wall
-/// are common to all views and added once.
+/// Fusion in information form with the wall fixed. The errors of extrinsics, intrinsics and wall are
+/// common to all views and added once; so are those of the robot's pose: a robot that goes by laser
+/// and odometry errs alike for metres.
 fn fused(views: &[&WallRectangle], wall: &LaserSegment, p: &PlacementParams) -> Option<LandmarkPlace> {
     let mut information = Matrix4::zeros();
     for v in views {
@@ -54,18 +55,22 @@ fn fused(views: &[&WallRectangle], wall: &LaserSegment, p: &PlacementParams) -> 
     let mean = information.cholesky()?.inverse();
     let (mut rectangle, mut by_mounting, mut by_wall) =
         (Vector4::zeros(), SMatrix::<f64, 4, 6>::zeros(), Matrix4x2::zeros());
-    let (mut by_camera, mut roll_rad, n) = (Matrix4x3::zeros(), 0.0, views.len() as f64);
+    let (mut by_camera, mut by_robot) = (Matrix4x3::zeros(), Matrix4x3::zeros());
+    let (mut own, mut roll_rad, n) = (Matrix4::zeros(), 0.0, views.len() as f64);
     for v in views {
         let share = mean * v.covariance.try_inverse()?;
         rectangle += share * v.rectangle;
         by_mounting += share * v.by_mounting;
         by_camera += share * v.by_camera;
+        by_robot += share * v.by_robot;
+        own += share * (v.covariance - v.by_robot * v.by_robot.transpose()) * share.transpose();
         by_wall += share * v.by_wall;
         roll_rad += v.roll_rad / n;
     }
     let inflation = if views.len() > 1 { p.inflation } else { 1.0 };
     let shared = by_mounting * views[0].mounting_covariance * by_mounting.transpose()
-        + by_camera * by_camera.transpose();
+        + by_camera * by_camera.transpose()
+        + by_robot * by_robot.transpose();
     let (theta, r) = rays::plane(wall);
     let (facing, side) = (Vector2::new(theta.cos(), theta.sin()), Vector2::new(-theta.sin(), theta.cos()));
     // (x, y) = r facing + along side, by (rectangle, wall).
@@ -81,7 +86,7 @@ fn fused(views: &[&WallRectangle], wall: &LaserSegment, p: &PlacementParams) -> 
     let mut wall_part = j.columns_mut(4, 2);
     wall_part += moved;
     let mut s = DMatrix::zeros(6, 6);
-    s.view_mut((0, 0), (4, 4)).copy_from(&(mean * inflation + shared));
+    s.view_mut((0, 0), (4, 4)).copy_from(&(own * inflation + shared));
     s.view_mut((4, 4), (2, 2)).copy_from(&facing_covariance(wall));
     let covariance = &j * s * j.transpose();
     let covariance = Matrix6::from_iterator(covariance.iter().copied());
