@@ -19,6 +19,8 @@ mod closures;
 mod survey_map;
 mod known_map;
 mod window;
+mod laser_drive;
+mod laser_map;
 
 pub use build::SurveyProblem;
 pub use factor::{Factor, Kernels, Linearised};
@@ -33,6 +35,8 @@ pub use factors::{
     wall_prior::{SizePrior, WallPrior},
 };
 pub use known_map::{KnownMap, refined};
+pub use laser_drive::{FrameSeen, LaserDrive, ObjectSeen};
+pub use laser_map::{JointLaserMap, MappedObject, MappedWall};
 pub use marginals::Marginals;
 pub use params::JointParams;
 pub use problem::{JointError, JointProblem, MAX_FACTORS};

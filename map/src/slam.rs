@@ -25,7 +25,7 @@ mod refine;
 mod map_builder;
 
 pub use loop_closure::{LoopClosure, LoopParams};
-pub use map_builder::{MAX_KEYS, MAX_SCANS, Slam, SlamError, SlamMap};
+pub use map_builder::{MAX_KEYS, MAX_SCANS, MapKey, Slam, SlamError, SlamMap};
 pub use params::{RefineParams, SlamParams};
 
 #[cfg(test)]

@@ -112,9 +112,9 @@ impl MapFile {
         Self {
             segments: map.walls.iter().map(Wall::of).collect(),
             path: map.path.iter().map(|p| [p.x_m, p.y_m, p.theta_rad]).collect(),
-            key_scans: map.keys.iter().map(|(scan, _)| *scan).collect(),
-            key_sigmas: map.keys.iter().map(|(_, p)| sigmas(&p.covariance)).collect(),
-            loops: map.loops.iter().map(|l| [map.keys[l.old].0, map.keys[l.new].0]).collect(),
+            key_scans: map.keys.iter().map(|key| key.scan).collect(),
+            key_sigmas: map.keys.iter().map(|key| sigmas(&key.pose.covariance)).collect(),
+            loops: map.loops.iter().map(|l| [map.keys[l.old].scan, map.keys[l.new].scan]).collect(),
             refused: map.refused,
         }
     }

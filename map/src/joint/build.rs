@@ -19,7 +19,7 @@ use super::{
     variables::{OdometryErrors, State, Variable, WallLine},
 };
 use crate::pose2::Pose2;
-use nalgebra::{Matrix2, Point2, Vector2};
+use nalgebra::{Matrix2, Vector2};
 use std::collections::BTreeMap;
 
 /// The problem of a survey.
@@ -166,9 +166,7 @@ impl SurveyProblem {
         for view in &track.views {
             let keyframe = self.first_keyframe[drive] + view.keyframe;
             let wrong = JointError::Survey { field: "covariance_px2", what: "track", number };
-            let sqrt_information = corner_roots(view, params.border_sigma_px).ok_or(wrong)?;
-            let corners_px = view.corners_px;
-            let factor = LandmarkView { keyframe, landmark, camera: 0, corners_px, sqrt_information };
+            let factor = landmark_view(view, keyframe, landmark, params.border_sigma_px).ok_or(wrong)?;
             self.problem.factors.push(Factor::View(factor));
         }
         let (distance_sigma_m, sigma_rad) = (params.hanging_sigma_m, params.hanging_sigma_rad);
@@ -186,11 +184,11 @@ impl SurveyProblem {
         Ok(())
     }
 
-    /// Poses and corners of a track's views, by the state as it is.
-    fn posed(&self, drive: usize, track: &Track) -> Vec<(Pose2, [Point2<f64>; 4])> {
+    /// A track's views with their poses, by the state as it is.
+    fn posed(&self, drive: usize, track: &Track) -> Vec<(Pose2, QuadView)> {
         let first = self.first_keyframe[drive];
         let pose = |view: &QuadView| self.problem.state.keyframes[first + view.keyframe];
-        track.views.iter().map(|view| (pose(view), view.corners_px)).collect()
+        track.views.iter().map(|view| (pose(view), *view)).collect()
     }
 
     /// Starts the landmark of a track again from its rays.
@@ -216,7 +214,19 @@ impl SurveyProblem {
     }
 }
 
-pub(super) fn corner_roots(view: &QuadView, border_sigma_px: f64) -> Option<[Matrix2<f64>; 4]> {
+/// A quad of the only camera as a factor.
+pub(super) fn landmark_view(
+    view: &QuadView,
+    keyframe: usize,
+    landmark: usize,
+    border_sigma_px: f64,
+) -> Option<LandmarkView> {
+    let QuadView { mounting_from_camera, corners_px, .. } = *view;
+    let sqrt_information = corner_roots(view, border_sigma_px)?;
+    Some(LandmarkView { keyframe, landmark, camera: 0, mounting_from_camera, corners_px, sqrt_information })
+}
+
+fn corner_roots(view: &QuadView, border_sigma_px: f64) -> Option<[Matrix2<f64>; 4]> {
     let border = Matrix2::identity() * border_sigma_px.powi(2);
     let [a, b, c, d] = view.covariance_px2.map(|covariance| sqrt_information(&(covariance + border)));
     Some([a?, b?, c?, d?])

@@ -1,7 +1,10 @@
 //! The start value of a landmark: the rectangle nearest to the rays of its corners, the poses as
 //! they are.
 
-use super::variables::{CameraState, LandmarkState};
+use super::{
+    survey::QuadView,
+    variables::{CameraState, LandmarkState},
+};
 use crate::pose2::Pose2;
 use nalgebra::{Matrix3, Point2, Vector2, Vector3};
 
@@ -14,19 +17,19 @@ const UNBENDINGS: usize = 8;
 /// Least and largest side, metres.
 const SIDE_M: [f64; 2] = [0.1, 3.0];
 
-/// An upright landmark from the poses and corners (TL, TR, BR, BL; px) of its views: each corner is
-/// the point nearest to its rays, and the size is that of the quadrilateral. `None` without a view,
-/// or where the numbers are not finite.
-pub fn landmark_by_rays(views: &[(Pose2, [Point2<f64>; 4])], camera: &CameraState) -> Option<LandmarkState> {
+/// An upright landmark from its views and the pose of each: each corner is the point nearest to its
+/// rays, and the size is that of the quadrilateral. `None` without a view, or where the numbers are
+/// not finite.
+pub fn landmark_by_rays(views: &[(Pose2, QuadView)], camera: &CameraState) -> Option<LandmarkState> {
     if views.is_empty() {
         return None;
     }
     let rays: Vec<(Vector3<f64>, [Vector3<f64>; 4])> = views
         .iter()
-        .map(|(pose, corners)| {
-            let camera_pose = pose.to_isometry3() * camera.robot_from_camera;
+        .map(|(pose, view)| {
+            let camera_pose = pose.to_isometry3() * camera.robot_from_camera * view.mounting_from_camera;
             let ray = |px: &Point2<f64>| camera_pose.rotation * direction(px, camera);
-            (camera_pose.translation.vector, corners.each_ref().map(ray))
+            (camera_pose.translation.vector, view.corners_px.each_ref().map(ray))
         })
         .collect();
     let mut weights = vec![1.0; views.len()];

@@ -6,7 +6,7 @@ use super::{
     variables::{CameraState, WallLine},
 };
 use crate::pose2::Pose2;
-use nalgebra::{Matrix2, Matrix3, Point2, SVector};
+use nalgebra::{Isometry3, Matrix2, Matrix3, Point2, SVector};
 use vision::pose::LandmarkSize;
 
 /// A motion between consecutive keyframes by odometry.
@@ -38,6 +38,8 @@ pub struct LineSeen {
 pub struct QuadView {
     /// Keyframe of the frame, within the drive.
     pub keyframe: usize,
+    /// The camera in its mounting, by a head that turns it; identity where it is fixed.
+    pub mounting_from_camera: Isometry3<f64>,
     /// Corners TL, TR, BR, BL as measured, px.
     pub corners_px: [Point2<f64>; 4],
     /// Covariance of each corner, px^2.

@@ -85,6 +85,17 @@ pub(super) fn opened(
     Ok(open)
 }
 
+/// A survey of one drive without candidates, solved from these keyframes on.
+pub(super) fn opened_from(
+    survey: &Survey,
+    params: &JointParams,
+    keyframes: Vec<Pose2>,
+) -> Result<SurveyProblem, JointError> {
+    let mut open = SurveyProblem::new(survey, params, Some(keyframes))?;
+    narrowed(&mut open.problem, &OPEN)?;
+    Ok(open)
+}
+
 fn narrowed(problem: &mut JointProblem, widths: &[[f64; 2]]) -> Result<(), JointError> {
     for &[views, identities] in widths {
         let kernels = Kernels { views, identities };

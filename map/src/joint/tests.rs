@@ -6,6 +6,7 @@
 mod bounds;
 mod closures;
 mod golden;
+mod laser_drive;
 mod window;
 
 use super::*;

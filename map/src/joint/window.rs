@@ -2,14 +2,13 @@
 //! What is older is a Gaussian prior over what the window shares with it.
 
 use super::{
-    build::corner_roots,
+    build::landmark_view,
     factor::{Factor, Kernels},
     factors::{
         camera_prior::CameraPrior,
         hanging::{Level, OnWall},
         line::LineFit,
         odometry::{OdometryMotion, OdometryPrior},
-        reprojection::LandmarkView,
         sqrt_information,
         summary::{Estimate, Summary},
     },
@@ -21,7 +20,7 @@ use super::{
     variables::{OdometryErrors, State, Variable, WallLine},
 };
 use crate::{pose2::Pose2, slam::graph::scaled_weight};
-use nalgebra::{DMatrix, DVector, Point2};
+use nalgebra::{DMatrix, DVector};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Steps of a solution: from the last keyframe's, little changes.
@@ -157,8 +156,8 @@ impl JointWindow {
         let mut new = vec![(keyframe, *view)];
         if track.landmark.is_none() && track.views.len() >= self.params.min_views.max(1) {
             let keyframes = &self.problem.state.keyframes;
-            let posed: Vec<(Pose2, [Point2<f64>; 4])> =
-                track.views.iter().map(|(k, view)| (keyframes[*k], view.corners_px)).collect();
+            let posed: Vec<(Pose2, QuadView)> =
+                track.views.iter().map(|(k, view)| (keyframes[*k], *view)).collect();
             let Some(start) = landmark_by_rays(&posed, &self.problem.state.cameras[0]) else { return Ok(()) };
             let landmark = self.problem.state.landmarks.len();
             self.problem.state.landmarks.push(start);
@@ -173,9 +172,8 @@ impl JointWindow {
         let Some(landmark) = track.landmark else { return Ok(()) };
         for (keyframe, view) in new {
             let wrong = JointError::Survey { field: "covariance_px2", what: "track", number };
-            let sqrt_information = corner_roots(&view, self.params.border_sigma_px).ok_or(wrong)?;
-            let corners_px = view.corners_px;
-            let factor = LandmarkView { keyframe, landmark, camera: 0, corners_px, sqrt_information };
+            let border_sigma_px = self.params.border_sigma_px;
+            let factor = landmark_view(&view, keyframe, landmark, border_sigma_px).ok_or(wrong)?;
             self.problem.factors.push(Factor::View(factor));
         }
         Ok(())

@@ -60,13 +60,26 @@ pub struct Slam {
     matcher: ScanMatcher,
 }
 
+/// A keyframe of a finished map.
+#[derive(Debug, Clone)]
+pub struct MapKey {
+    /// Index of its scan.
+    pub scan: usize,
+    /// `map_from_robot`, with its covariance relative to the first.
+    pub pose: Pose2Covariance,
+    /// Odometry of its time.
+    pub odom: Pose2,
+    /// Lines of its scan, robot frame.
+    pub lines: Vec<LaserSegment>,
+}
+
 /// A finished map.
 #[derive(Debug, Clone)]
 pub struct SlamMap {
     /// `map_from_robot` of every scan, in order.
     pub path: Vec<Pose2>,
-    /// Keyframes: index of the scan, pose, and covariance relative to the first.
-    pub keys: Vec<(usize, Pose2Covariance)>,
+    /// Keyframes.
+    pub keys: Vec<MapKey>,
     /// Loop closures, by keyframe.
     pub loops: Vec<LoopClosure>,
     /// Loop closures refused after their match.
@@ -141,15 +154,22 @@ impl Slam {
         let covariances = graph::covariances(&poses, &refined, &at)?;
         let known = |i: usize| Pose2Covariance { pose: poses[i], covariance: covariances[i / stride] };
         let walls = self.walls(&known)?;
-        let mut keys = Vec::with_capacity(poses.len());
+        let mut scans = Vec::with_capacity(poses.len());
         for (scan, placed) in self.placed.iter().enumerate() {
-            if placed.key == keys.len() {
-                keys.push((scan, known(placed.key)));
+            if placed.key == scans.len() {
+                scans.push(scan);
             }
         }
+        let keys = self.keys.into_iter().zip(scans).enumerate();
+        let keys = keys.map(|(i, (Keyframe { odom, lines, .. }, scan))| MapKey {
+            scan,
+            pose: known(i),
+            odom,
+            lines,
+        });
         Ok(SlamMap {
             path: self.placed.iter().map(|p| poses[p.key].compose(&p.key_from_robot)).collect(),
-            keys,
+            keys: keys.collect(),
             refused: self.closures.refused(),
             loops: self.closures.taken(),
             walls,

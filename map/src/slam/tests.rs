@@ -3,7 +3,7 @@ use crate::{
     laser::Scan,
     pose2::{Pose2, Pose2Covariance},
     slam::{
-        map_builder::{Slam, SlamError, SlamMap},
+        map_builder::{MapKey, Slam, SlamError, SlamMap},
         params::SlamParams,
     },
 };
@@ -35,7 +35,7 @@ fn a_ring_is_closed_where_odometry_alone_is_metres_off() {
     assert!(map.loops.len() >= 3 && map.path.len() == path.len());
     // Every loop is true.
     for l in &map.loops {
-        let truth = path[map.keys[l.old].0].between(&path[map.keys[l.new].0]);
+        let truth = path[map.keys[l.old].scan].between(&path[map.keys[l.new].scan]);
         let d = l.old_from_new.pose.minus(&truth);
         let d2 = d.dot(&l.old_from_new.covariance.cholesky().unwrap().solve(&d));
         assert!(d2 < 30.0 && d.xy().norm() < 0.5, "{l:?} {truth:?}");
@@ -95,7 +95,7 @@ fn identical_rooms_are_not_closed_as_a_loop() {
     let map = build(&walls, &path, &odom, 12);
     assert!(worst_m(&map.path, &path) < 0.5, "{}", worst_m(&map.path, &path));
     for l in &map.loops {
-        let (old, new) = (path[map.keys[l.old].0], path[map.keys[l.new].0]);
+        let (old, new) = (path[map.keys[l.old].scan], path[map.keys[l.new].scan]);
         assert!((old.position() - new.position()).norm() < 3.0, "a loop between the two rooms: {l:?}");
     }
 }
@@ -108,7 +108,7 @@ fn the_length_of_a_bare_corridor_has_the_uncertainty_of_odometry() {
     let odom: Vec<Pose2> =
         (0..80).map(|i| Pose2::new(0.985 * 0.25 * f64::from(i), 0.0, 0.1 * f64::from(i) / 80.0)).collect();
     let map = build(&walls, &path, &odom, 4);
-    let (scan, end) = map.keys.last().unwrap();
+    let MapKey { scan, pose: end, .. } = map.keys.last().unwrap();
     let x_m = 0.25 * *scan as f64;
     assert!((end.pose.x_m - 0.985 * x_m).abs() < 0.15, "{end:?}");
     assert!(end.pose.y_m.abs() < 0.05 && end.pose.theta_rad.abs() < 0.01, "{end:?}");

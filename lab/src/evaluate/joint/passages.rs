@@ -162,7 +162,8 @@ impl LabelledSurvey {
             let shift = Vector2::new(random.normal(), random.normal()) * WRONG_VIEW_PX;
             let corners_px = if is_wrong { quad.corners_px.map(|p| p + shift) } else { quad.corners_px };
             let covariance_px2 = [Matrix2::identity() * CORNER_PX.powi(2); 4];
-            let view = QuadView { keyframe: quad.keyframe, corners_px, covariance_px2 };
+            let mounting_from_camera = nalgebra::Isometry3::identity();
+            let view = QuadView { keyframe: quad.keyframe, mounting_from_camera, corners_px, covariance_px2 };
             tracks.entry((quad.object, passage)).or_default().views.push(view);
         }
         let mut met = Vec::new();

@@ -3,8 +3,8 @@
 
 use super::{building::NAMED, figures::Placed, passages::LabelledSurvey};
 use map::joint::{
-    Factor, JointError, JointParams, LandmarkState, LandmarkView, Level, Marginals, OnWall, State, Survey,
-    SurveyMap, Variable, landmark_by_rays, surveyed,
+    Factor, JointError, JointParams, LandmarkState, LandmarkView, Level, Marginals, OnWall, QuadView, State,
+    Survey, SurveyMap, Variable, landmark_by_rays, surveyed,
 };
 use nalgebra::{DMatrix, DVector, Matrix2, SMatrix, Vector2};
 
@@ -29,7 +29,7 @@ pub(super) fn two_step(
             for track in &record.tracks {
                 if labelled.object_of[number] == object {
                     let first = map.first_keyframe[drive];
-                    views.extend(track.views.iter().map(|v| (first + v.keyframe, v.corners_px)));
+                    views.extend(track.views.iter().map(|v| (first + v.keyframe, *v)));
                     let same = track.wall.map(|w| labelled.survey.same_wall[w]);
                     wall = wall.or(same.and_then(|w| map.wall_of.get(&w).copied()));
                 }
@@ -58,13 +58,13 @@ fn without_tracks(survey: &Survey) -> Survey {
 fn alone(
     map: &SurveyMap,
     camera: map::joint::CameraState,
-    views: &[(usize, [nalgebra::Point2<f64>; 4])],
+    views: &[(usize, QuadView)],
     wall: Option<usize>,
     params: &JointParams,
     corner_sigma_px: f64,
 ) -> Result<Option<LandmarkState>, JointError> {
     let keyframes = &map.problem.state.keyframes;
-    let posed: Vec<_> = views.iter().map(|(k, corners)| (keyframes[*k], *corners)).collect();
+    let posed: Vec<_> = views.iter().map(|(k, view)| (keyframes[*k], *view)).collect();
     let Some(mut landmark) = landmark_by_rays(&posed, &camera) else { return Ok(None) };
     let mut chosen: Vec<Variable> = views.iter().map(|(k, _)| Variable::Keyframe(*k)).collect();
     chosen.retain(|v| *v != Variable::Keyframe(0));
@@ -82,14 +82,14 @@ fn alone(
             ..State::default()
         };
         let (mut h, mut g) = (DMatrix::zeros(8, 8), DVector::zeros(8));
-        for (keyframe, corners_px) in views {
-            let sqrt_information = [Matrix2::identity(); 4];
+        for (keyframe, view) in views {
             let view = LandmarkView {
                 keyframe: *keyframe,
                 landmark: 0,
                 camera: 0,
-                corners_px: *corners_px,
-                sqrt_information,
+                mounting_from_camera: view.mounting_from_camera,
+                corners_px: view.corners_px,
+                sqrt_information: [Matrix2::identity(); 4],
             };
             let term = Factor::View(view).linearised(&state);
             let (by_pose, by) = (&term.by[0].1, &term.by[1].1);

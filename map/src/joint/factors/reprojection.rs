@@ -6,7 +6,9 @@ use crate::{
     localise::derivatives::{point_by_mounting, point_by_pose},
     pose2::Pose2,
 };
-use nalgebra::{DMatrix, DVector, Matrix2, Matrix2x3, Matrix3, Point2, SMatrix, Vector2, Vector3};
+use nalgebra::{
+    DMatrix, DVector, Isometry3, Matrix2, Matrix2x3, Matrix3, Point2, Point3, SMatrix, Vector2, Vector3,
+};
 
 /// Nearer points are put at this depth: a step of the solver may lead behind the camera. Metres.
 const MIN_DEPTH_M: f64 = 0.1;
@@ -20,6 +22,8 @@ pub struct LandmarkView {
     pub landmark: usize,
     /// Camera.
     pub camera: usize,
+    /// The camera in its mounting, by a head that turns it; identity where it is fixed.
+    pub mounting_from_camera: Isometry3<f64>,
     /// Corners TL, TR, BR, BL as measured, with distortion; px.
     pub corners_px: [Point2<f64>; 4],
     /// Root of the information of each corner, 1/px.
@@ -38,7 +42,8 @@ struct Corner {
 struct Setting {
     turns: [Matrix3<f64>; 3],
     robot_from_map: Matrix3<f64>,
-    camera_from_robot: Matrix3<f64>,
+    mounting_from_robot: Matrix3<f64>,
+    camera_from_mounting: Isometry3<f64>,
 }
 
 impl LandmarkView {
@@ -52,7 +57,7 @@ impl LandmarkView {
         let camera = &state.cameras[self.camera];
         let mut residual = DVector::zeros(8);
         let [mut by_x, mut by_m, mut by_c] = [3, 8, 10].map(|columns| DMatrix::zeros(8, columns));
-        let corners = projected(x, landmark, camera);
+        let corners = projected(x, landmark, camera, &self.mounting_from_camera);
         for (i, (corner, w)) in corners.iter().zip(&self.sqrt_information).enumerate() {
             residual.fixed_rows_mut::<2>(2 * i).copy_from(&(w * (corner.px - self.corners_px[i])));
             by_x.fixed_rows_mut::<2>(2 * i).copy_from(&(w * corner.by_keyframe));
@@ -63,12 +68,18 @@ impl LandmarkView {
     }
 }
 
-fn projected(x: &Pose2, landmark: &LandmarkState, camera: &CameraState) -> [Corner; 4] {
+fn projected(
+    x: &Pose2,
+    landmark: &LandmarkState,
+    camera: &CameraState,
+    mounting_from_camera: &Isometry3<f64>,
+) -> [Corner; 4] {
     let rotation = |m: nalgebra::UnitQuaternion<f64>| m.to_rotation_matrix().into_inner();
     let setting = Setting {
         turns: landmark.turns(),
         robot_from_map: rotation(x.to_isometry3().rotation.inverse()),
-        camera_from_robot: rotation(camera.robot_from_camera.rotation.inverse()),
+        mounting_from_robot: rotation(camera.robot_from_camera.rotation.inverse()),
+        camera_from_mounting: mounting_from_camera.inverse(),
     };
     vision::pose::reprojection::corner_points(&landmark.size())
         .map(|local| corner(&setting, x, landmark, camera, &local))
@@ -81,16 +92,19 @@ fn corner(
     camera: &CameraState,
     local: &Vector3<f64>,
 ) -> Corner {
-    let Setting { turns: [turn, tilt, roll], robot_from_map, camera_from_robot } = setting;
+    let Setting { turns: [turn, tilt, roll], robot_from_map, mounting_from_robot, camera_from_mounting } =
+        setting;
     let map_from_landmark = turn * tilt * roll;
     let arm = map_from_landmark * local;
     let from_robot = landmark.centre + arm - Vector3::new(x.x_m, x.y_m, 0.0);
-    let from_camera = robot_from_map * from_robot - camera.robot_from_camera.translation.vector;
-    let (px, by_point, by_lens) = pixel(&(camera_from_robot * from_camera), camera);
-    let by_map_point = by_point * camera_from_robot * robot_from_map;
-    let camera_from_map = camera_from_robot * robot_from_map;
+    let from_mounting = robot_from_map * from_robot - camera.robot_from_camera.translation.vector;
+    let in_mounting = Point3::from(mounting_from_robot * from_mounting);
+    let (px, by_point, by_lens) = pixel(&(camera_from_mounting * in_mounting).coords, camera);
+    let by_point = by_point * camera_from_mounting.rotation.to_rotation_matrix();
+    let mounting_from_map = mounting_from_robot * robot_from_map;
+    let by_map_point = by_point * mounting_from_map;
     let mut by_camera = SMatrix::<f64, 2, 10>::zeros();
-    let by_mounting = by_point * point_by_mounting(camera_from_robot, &from_camera);
+    let by_mounting = by_point * point_by_mounting(mounting_from_robot, &from_mounting);
     by_camera.fixed_columns_mut::<6>(0).copy_from(&by_mounting);
     by_camera.fixed_columns_mut::<4>(6).copy_from(&by_lens);
     let axis = |m: &Matrix3<f64>, k: usize| m.column(k).into_owned();
@@ -106,7 +120,7 @@ fn corner(
     ]);
     Corner {
         px,
-        by_keyframe: by_point * point_by_pose(&camera_from_map, &from_robot),
+        by_keyframe: by_point * point_by_pose(&mounting_from_map, &from_robot),
         by_landmark: by_map_point * by_arm,
         by_camera,
     }

@@ -79,6 +79,11 @@ fn state(random: &mut Random) -> State {
     State { keyframes, walls: walls.to_vec(), landmarks, cameras, odometry, ceilings_m: vec![2.7 + n(0.1)] }
 }
 
+/// A head that has turned its camera.
+fn head() -> Isometry3<f64> {
+    Isometry3::new(Vector3::new(0.02, -0.01, 0.03), Vector3::new(0.1, -0.05, 0.02))
+}
+
 fn factors() -> Vec<Factor> {
     let full = Matrix3::new(4e-4, 1e-5, 2e-5, 1e-5, 2e-4, 0.0, 2e-5, 0.0, 1e-4);
     let corner = sqrt_information(&Matrix2::new(0.3, 0.1, 0.1, 0.4)).unwrap();
@@ -86,6 +91,7 @@ fn factors() -> Vec<Factor> {
         keyframe: 0,
         landmark,
         camera: 0,
+        mounting_from_camera: head(),
         corners_px: [(600.0, 400.0), (700.0, 410.0), (690.0, 500.0), (610.0, 505.0)]
             .map(|(x, y)| Point2::new(x, y)),
         sqrt_information: [corner; 4],
@@ -202,13 +208,15 @@ fn a_view_is_that_of_the_projection() {
         vision::frame::Distortion::None,
     )
     .unwrap();
-    let camera_from_landmark = (x.to_isometry3() * c.robot_from_camera).inverse() * place.map_from_landmark();
+    let camera_from_landmark =
+        (x.to_isometry3() * c.robot_from_camera * head()).inverse() * place.map_from_landmark();
     let corners_px = vision::pose::reprojection::corner_points(&m.size())
         .map(|p| vision::pose::reprojection::pixel(&camera_from_landmark, &p, &intrinsics).unwrap());
     let view = LandmarkView {
         keyframe: 0,
         landmark: 0,
         camera: 0,
+        mounting_from_camera: head(),
         corners_px,
         sqrt_information: [Matrix2::identity(); 4],
     };

@@ -94,6 +94,7 @@ impl Golden {
             };
         let view = |(keyframe, px): (&usize, &[f64; 8])| QuadView {
             keyframe: *keyframe,
+            mounting_from_camera: nalgebra::Isometry3::identity(),
             corners_px: [0, 1, 2, 3].map(|i| Point2::new(px[2 * i], px[2 * i + 1])),
             covariance_px2: [Matrix2::identity() * 0.25; 4],
         };

@@ -1,0 +1,202 @@
+//! The joint map of one drive with a laser: walls, and the place of each object, in the frame of
+//! the laser map.
+
+use super::{
+    build::SurveyProblem,
+    closures::weights,
+    laser_drive::{DriveSurvey, LaserDrive, Piece},
+    marginals::Marginals,
+    params::JointParams,
+    problem::JointError,
+    survey::CameraStated,
+    survey_map::opened_from,
+    variables::{CameraState, LandmarkState, OdometryErrors, Variable, WallLine},
+};
+use crate::{
+    check::OutOfRange,
+    fuse::FuseParams,
+    place::LandmarkPlace,
+    pose2::{Pose2, Pose2Covariance},
+    segments::LaserSegment,
+};
+use nalgebra::{Matrix2, Matrix3, Matrix6, Point2, SVector};
+
+/// Variables whose covariance is computed at once.
+const AT_ONCE: usize = 32;
+/// Parameters of a landmark's variable that its place has a covariance of.
+const OF_PLACE: [usize; 6] = [0, 1, 2, 3, 6, 7];
+
+/// An object of a joint map.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MappedObject {
+    /// Where it hangs.
+    pub place: LandmarkPlace,
+    /// How well its views agree: their mean weight, 0 to 1.
+    pub agreement: f64,
+}
+
+/// A wall of a joint map: a piece of one of the laser map's.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MappedWall {
+    /// The wall, map frame.
+    pub segment: LaserSegment,
+    /// Number of the wall of the laser map that it is a piece of.
+    pub of: usize,
+    /// Where it begins there, metres from the first end.
+    pub from_m: f64,
+}
+
+/// The joint map of one drive.
+#[derive(Debug, Clone)]
+pub struct JointLaserMap {
+    /// Walls.
+    pub walls: Vec<MappedWall>,
+    /// `map_from_robot` of every frame, with its covariance relative to the first keyframe.
+    pub frames: Vec<Pose2Covariance>,
+    /// Objects in their order; `None` with too few views, or at no possible place.
+    pub objects: Vec<Option<MappedObject>>,
+    /// The camera as estimated.
+    pub camera: CameraState,
+    /// Standard deviations of its rotation (radians), translation (metres), focal length, centre
+    /// (px) and k1.
+    pub camera_sigmas: SVector<f64, 10>,
+    /// Odometry's systematic errors as estimated.
+    pub odometry: OdometryErrors,
+}
+
+impl LaserDrive<'_> {
+    /// Solves for walls, objects, camera and odometry together.
+    pub fn joint_map(
+        &self,
+        camera: CameraStated,
+        params: &JointParams,
+        odometry: &FuseParams,
+    ) -> Result<JointLaserMap, JointError> {
+        let made = self.survey(camera, odometry)?;
+        let solved = opened_from(&made.survey, params, made.keyframes.clone())?;
+        let camera = Marginals::of(&solved.problem, &[Variable::Camera(0)])?.into_covariance();
+        Ok(JointLaserMap {
+            walls: walls(&solved, &made, &self.map.walls)?,
+            frames: frames(&solved, &made.of_frame)?,
+            objects: objects(&solved)?,
+            camera: solved.problem.state.cameras[0],
+            camera_sigmas: SVector::from_fn(|i, _| camera[(i, i)].max(0.0).sqrt()),
+            odometry: solved.problem.state.odometry[0],
+        })
+    }
+}
+
+fn frames(solved: &SurveyProblem, of_frame: &[usize]) -> Result<Vec<Pose2Covariance>, JointError> {
+    let mut poses = Vec::with_capacity(of_frame.len());
+    for some in of_frame.chunks(AT_ONCE) {
+        // The first keyframe is fixed.
+        let free: Vec<usize> = some.iter().copied().filter(|k| *k != 0).collect();
+        let chosen: Vec<Variable> = free.iter().map(|k| Variable::Keyframe(*k)).collect();
+        let marginals = Marginals::of(&solved.problem, &chosen)?;
+        poses.extend(some.iter().map(|&k| {
+            let of = Variable::Keyframe(k);
+            let block = marginals.block(of, of);
+            let covariance = block.map_or_else(Matrix3::zeros, |b| Matrix3::from_fn(|r, c| b[(r, c)]));
+            Pose2Covariance { pose: solved.problem.state.keyframes[k], covariance }
+        }));
+    }
+    Ok(poses)
+}
+
+fn objects(solved: &SurveyProblem) -> Result<Vec<Option<MappedObject>>, JointError> {
+    let (agreements, _) = weights(solved);
+    let known: Vec<usize> = solved.landmark_of.iter().flatten().copied().collect();
+    let mut covariances = vec![Matrix6::zeros(); solved.problem.state.landmarks.len()];
+    for some in known.chunks(AT_ONCE) {
+        let chosen: Vec<Variable> = some.iter().map(|l| Variable::Landmark(*l)).collect();
+        let marginals = Marginals::of(&solved.problem, &chosen)?;
+        for (landmark, variable) in some.iter().zip(chosen) {
+            let Some(block) = marginals.block(variable, variable) else { continue };
+            covariances[*landmark] = Matrix6::from_fn(|r, c| block[(OF_PLACE[r], OF_PLACE[c])]);
+        }
+    }
+    let made = |landmark: usize| {
+        let place = place(&solved.problem.state.landmarks[landmark], &covariances[landmark]);
+        place.check().ok()?;
+        Some(MappedObject { place, agreement: agreements[landmark] })
+    };
+    Ok(solved.landmark_of.iter().map(|landmark| landmark.and_then(made)).collect())
+}
+
+/// A landmark's place; `covariance` is over x, y, theta, z, log width and log height.
+fn place(landmark: &LandmarkState, covariance: &Matrix6<f64>) -> LandmarkPlace {
+    let size = landmark.size();
+    let mut by = Matrix6::identity();
+    (by[(4, 4)], by[(5, 5)]) = (size.width_m, size.height_m);
+    let centre = landmark.centre;
+    LandmarkPlace {
+        x_m: centre.x,
+        y_m: centre.y,
+        z_m: centre.z,
+        theta_rad: landmark.theta_rad,
+        roll_rad: landmark.roll_rad,
+        tilt_rad: 0.0,
+        size,
+        covariance: by * covariance * by,
+    }
+}
+
+/// The pieces of walls, each on its line; one that no line of a scan lies on moves with the nearest
+/// keyframe.
+fn walls(
+    solved: &SurveyProblem,
+    made: &DriveSurvey,
+    before: &[LaserSegment],
+) -> Result<Vec<MappedWall>, JointError> {
+    let mut covariances = vec![Matrix2::zeros(); made.pieces.len()];
+    let known: Vec<(usize, usize)> = solved.wall_of.iter().map(|(piece, wall)| (*piece, *wall)).collect();
+    for some in known.chunks(AT_ONCE) {
+        let chosen: Vec<Variable> = some.iter().map(|(_, wall)| Variable::Wall(*wall)).collect();
+        let marginals = Marginals::of(&solved.problem, &chosen)?;
+        for ((piece, _), variable) in some.iter().zip(chosen) {
+            let Some(block) = marginals.block(variable, variable) else { continue };
+            covariances[*piece] = Matrix2::from_fn(|r, c| block[(r, c)]);
+        }
+    }
+    let moved = Moved { before: &made.keyframes, after: &solved.problem.state.keyframes };
+    let segment = |(number, piece): (usize, &Piece)| {
+        let wall = &before[piece.wall];
+        let ends = piece.along_m.map(|along| moved.point(&(wall.a + wall.direction() * along)));
+        let segment = match solved.wall_of.get(&number) {
+            Some(line) => on_line(&solved.problem.state.walls[*line], &covariances[number], ends),
+            None => LaserSegment::about_middle(ends[0], ends[1], &wall.covariance_about_middle()),
+        };
+        let segment = LaserSegment { hits: wall.hits, ..segment.ok()? };
+        Some(MappedWall { segment, of: piece.wall, from_m: piece.along_m[0] })
+    };
+    Ok(made.pieces.iter().enumerate().filter_map(segment).collect())
+}
+
+/// The piece of a line between the feet of two points; `covariance` is that of the line.
+fn on_line(
+    line: &WallLine,
+    covariance: &Matrix2<f64>,
+    ends: [Point2<f64>; 2],
+) -> Result<LaserSegment, OutOfRange> {
+    let n = line.normal();
+    let [a, b] = ends.map(|end| end - n * (n.dot(&(end - line.anchor)) - line.offset_m));
+    // Offset about the middle of the piece, from that about the anchor.
+    let by = Matrix2::new(1.0, 0.0, -line.along().dot(&(nalgebra::center(&a, &b) - line.anchor)), 1.0);
+    let covariance = by * covariance * by.transpose();
+    LaserSegment::about_middle(a, b, &(0.5 * (covariance + covariance.transpose())))
+}
+
+/// How the solution moved the keyframes.
+struct Moved<'a> {
+    before: &'a [Pose2],
+    after: &'a [Pose2],
+}
+
+impl Moved<'_> {
+    /// A point, moved with the keyframe that was nearest.
+    fn point(&self, at: &Point2<f64>) -> Point2<f64> {
+        let away = |i: &usize| (self.before[*i].position() - at.coords).norm_squared();
+        let nearest = (0..self.before.len()).min_by(|a, b| away(a).total_cmp(&away(b)));
+        nearest.map_or(*at, |i| self.after[i].apply(&self.before[i].inverse().apply(at)))
+    }
+}
