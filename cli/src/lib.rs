@@ -14,6 +14,7 @@ mod detect;
 pub mod drawing;
 mod explain;
 mod failure;
+pub mod first_drive;
 mod gathering;
 mod history;
 mod identity;
@@ -22,6 +23,7 @@ mod landmark;
 pub mod map;
 mod names;
 mod notify;
+pub mod parallel;
 pub mod parameters;
 pub mod pictures;
 mod recognise;
@@ -184,6 +186,15 @@ enum Command {
     ///   waymark replay bag/drive.mcap --robot r1 --map office --image front=/camera/image
     #[command(verbatim_doc_comment)]
     Replay(recording::replay::Args),
+    /// The map of a building from one drive: walls, landmarks with places, and the camera
+    ///
+    /// Reads a recording with scans, odometry and frames. Nobody measures and nobody clicks: quads
+    /// that lie on walls and are seen again become landmarks. For example:
+    ///   waymark record drive.mcap --robot r1
+    ///   waymark survey drive.mcap
+    ///   waymark survey drive.mcap --into office
+    #[command(verbatim_doc_comment)]
+    Survey(survey::Args),
     /// Jobs of a server: show, wait, cancel.
     Job(job::Args),
     /// What a server recognises in photographs
@@ -266,6 +277,7 @@ pub fn main() -> ExitCode {
         Command::Run(args) => run(run::run(args)).map(done),
         Command::Record(args) => run(recording::record::run(args)).map(done),
         Command::Replay(args) => run(recording::replay::run(args)),
+        Command::Survey(args) => run(survey::run(args)).map(done),
         Command::Job(args) => run(job::run(args)).map(done),
         Command::Recognise(args) => run(recognise::run(args)).map(done),
         Command::Detect(args) => detect::run(args),

@@ -14,9 +14,13 @@ const SERVER: &[&str] = &["--server", "--token", "--json"];
 const MAP: &[&str] = &["--map", "--server", "--token", "--json"];
 
 /// Options that each command must name in its help, beside those of its group.
-const OPTIONS: [(&str, &[&str], &[&str]); 65] = [
+const OPTIONS: [(&str, &[&str], &[&str]); 66] = [
     ("", &[], &["--log", "--version", "Exit status"]),
-    ("demo", &[], &["--robots", "--rate-hz", "--legs", "--seed", "--http", "--data", "--stay", "--json"]),
+    (
+        "demo",
+        &[],
+        &["--robots", "--rate-hz", "--legs", "--seed", "--survey", "--http", "--data", "--stay", "--json"],
+    ),
     ("sample", &[], &["<FOLDER>"]),
     ("serve", &[], &["--config", "--data", "--http", "--zenoh", "--fleet", "--workers", "--insecure"]),
     (
@@ -41,6 +45,7 @@ const OPTIONS: [(&str, &[&str], &[&str]); 65] = [
             "[IMAGES]",
         ],
     ),
+    ("survey", SERVER, &["<RECORDING>", "--into", "--origin", "--camera", "--recorded", "--image", "--scan"]),
     ("record", SERVER, &["<FILE>", "--robot", "--seconds", "--zenoh", "--fleet"]),
     (
         "replay",

@@ -1,9 +1,10 @@
 //! Claim: the demo runs without preparation: no landmark is named wrongly, and its robot is
-//! localised better than by odometry alone. Its drive is recorded on demand.
+//! localised better than by odometry alone. Its drive is recorded on demand, and a survey makes a
+//! map of the recording. One drive of a robot that knows nothing is a lesson, too.
 
 use recordings::{Body, DriveReader};
 use serde_json::Value;
-use std::{fs::File, time::Duration};
+use std::{fs::File, path::Path, time::Duration};
 use tests::command::waymark;
 
 const LONGEST: Duration = Duration::from_mins(4);
@@ -37,4 +38,35 @@ fn a_robot_of_the_demo_is_localised() {
         answers += usize::from(matches!(message.body, Body::Answer(_)));
     }
     assert_eq!((frames as f64, answers as f64), (of("/frames"), of("/answers")), "{summary}");
+    a_recording_is_surveyed(&file);
+}
+
+fn a_recording_is_surveyed(file: &Path) {
+    let run = waymark(["survey", file.to_str().expect("a path"), "--json"], LONGEST);
+    assert_eq!(run.status, 0, "{run:?}");
+    assert!(run.stderr.contains("--into MAP"), "{run:?}");
+    let report = run.last_json();
+    let landmarks = report["landmarks"].as_array().expect("landmarks");
+    let found = landmarks.iter().filter(|landmark| landmark["refused"].is_null());
+    assert!(found.clone().count() >= 3, "{report}");
+    for landmark in found {
+        // Posters hang on walls, in reach of the eye, and are no larger than a door.
+        let of = |field: &str| number(landmark, field);
+        assert!((0.8..2.2).contains(&of("/z_m")) && of("/sigma_m") < 0.3, "{landmark}");
+        assert!((0.2..2.5).contains(&of("/width_m")) && (0.2..2.5).contains(&of("/height_m")), "{landmark}");
+    }
+    assert!(number(&report, "/walls") >= 4.0 && number(&report, "/distance_m") > 15.0, "{report}");
+}
+
+#[test]
+fn one_drive_of_a_robot_that_knows_nothing_surveys_the_corridor() {
+    let args = "demo --survey --robots 1 --legs 1 --rate-hz 2 --seed 2 --json --http 127.0.0.1:0";
+    let run = waymark(args.split(' '), LONGEST);
+    assert_eq!(run.status, 0, "{run:?}");
+    let summary = run.last_json();
+    let of = |pointer| number(&summary, pointer);
+    assert_eq!((&summary["false_matches"], &summary["false_guided"]), (&0.into(), &0.into()), "{summary}");
+    assert!(of("/landmarks_active") >= 4.0 && of("/corrections") > 10.0, "{summary}");
+    assert!(of("/recognitions") > 0.8 * of("/landmark_views"), "{summary}");
+    assert!(of("/position_error_m/median") < 0.08 && of("/position_error_m/p95") < 0.13, "{summary}");
 }

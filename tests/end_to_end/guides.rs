@@ -270,6 +270,11 @@ fn the_commands_of_record_and_replay_work() {
 }
 
 #[test]
+fn the_commands_of_survey_a_building_work() {
+    run("survey-a-building");
+}
+
+#[test]
 fn the_commands_of_evaluate_on_your_photographs_work() {
     run("evaluate-on-your-photographs");
 }

@@ -6,20 +6,22 @@ use crate::{pictures, screen};
 use anyhow::Context as _;
 use client::{
     Capture, MapClient, RobotClient, RobotOptions,
-    api::LandmarkStatus,
+    api::{Landmark, LandmarkStatus},
     named_landmarks, quad_corners,
     v1::{Answer, Scan},
 };
 use map::pose2::Pose2;
+use nalgebra::Vector3;
 use protos::{Name, convert::geometry::pose2_wire};
 use server::RunningServer;
 use sim::{
-    building::Building,
+    building::{Building, LandmarkTruth},
     drive::DriveParams,
     robot::{Robot, RobotParams, SensorReadings},
     truth::{FrameTruth, ViewState},
 };
 use std::{
+    collections::BTreeMap,
     sync::Arc,
     time::{Duration, SystemTime, UNIX_EPOCH},
 };
@@ -63,13 +65,10 @@ pub(super) async fn drive(
     args: &Args,
 ) -> anyhow::Result<Record> {
     let maps = MapClient::new(&format!("http://{}", server.http_addr))?;
-    let taught: Vec<String> = maps
-        .landmarks(MAP)
-        .await?
-        .into_iter()
-        .filter(|l| l.status == LandmarkStatus::Active)
-        .map(|l| l.name)
-        .collect();
+    let landmarks = maps.landmarks(MAP).await?;
+    let in_use = landmarks.iter().filter(|landmark| landmark.status == LandmarkStatus::Active);
+    let taught: BTreeMap<String, String> =
+        in_use.map(|landmark| (landmark.name.clone(), true_name(building, landmark))).collect();
     let taught = Arc::new(taught);
     let mut tasks = Vec::new();
     for number in 0..args.robots {
@@ -110,12 +109,26 @@ pub(super) async fn drive(
     Ok(all)
 }
 
+/// What a landmark is in the building: by its name, or what hangs at its place. Its own name where
+/// nothing does.
+fn true_name(building: &Building, landmark: &Landmark) -> String {
+    let own = || landmark.name.clone();
+    let Some(place) = landmark.place.filter(|_| building.landmark(&landmark.name).is_none()) else {
+        return own();
+    };
+    let at = Vector3::new(place.x_m, place.y_m, place.z_m);
+    let off = |truth: &&LandmarkTruth| (truth.map_from_landmark.translation.vector - at).norm();
+    let there = building.landmarks().iter().filter(|t| off(t) < 0.5 * t.width_m.max(t.height_m));
+    there.min_by(|a, b| off(a).total_cmp(&off(b))).map_or_else(own, |truth| truth.name.clone())
+}
+
 struct Journey {
     robot: Name,
     name: String,
     client: RobotClient,
     live: Arc<engine::live::LiveHub>,
-    taught: Arc<Vec<String>>,
+    /// Landmarks in use, and what each is in the building.
+    taught: Arc<BTreeMap<String, String>>,
     period: Duration,
     record: Record,
     fixed: bool,
@@ -168,6 +181,10 @@ impl Journey {
         Ok(self.record)
     }
 
+    fn is_taught(&self, name: &str) -> bool {
+        self.taught.values().any(|taught| taught == name)
+    }
+
     fn score(&mut self, answer: &Answer, readings: &SensorReadings) {
         self.record.latencies_ms.push(answer.latency_ms);
         let truth = &readings.frame.truth;
@@ -176,11 +193,12 @@ impl Journey {
             .landmarks
             .iter()
             .filter(|l| {
-                l.state == ViewState::Full && l.min_side_px() >= MIN_SIDE_PX && self.taught.contains(&l.name)
+                l.state == ViewState::Full && l.min_side_px() >= MIN_SIDE_PX && self.is_taught(&l.name)
             })
             .count();
         for named in named_landmarks(answer) {
-            let is_true = is_true(named.name, named.quad, truth, size_px);
+            let name = self.taught.get(named.name).map_or(named.name, String::as_str);
+            let is_true = is_true(name, named.quad, truth, size_px);
             self.record.count(named.is_guided(), is_true);
             if !is_true {
                 let by_pose = if named.is_guided() { " by pose" } else { "" };

@@ -4,6 +4,7 @@
 
 mod drive;
 mod summary;
+mod surveying;
 mod teaching;
 
 use super::{
@@ -48,6 +49,10 @@ pub(crate) struct Args {
     /// The building, its pictures and all noise follow from it.
     #[arg(long, default_value_t = 2)]
     seed: u64,
+    /// The first robot knows neither its pose nor what hangs where: it surveys the building in one
+    /// drive, as `waymark survey` does. Otherwise it knows its pose and is told the names.
+    #[arg(long)]
+    survey: bool,
     /// Where the page listens [default: 127.0.0.1:8080, or a free port if that is taken].
     #[arg(long)]
     http: Option<String>,
@@ -82,7 +87,11 @@ pub(crate) async fn run(args: &Args) -> anyhow::Result<ExitCode> {
     screen::complain(&format!("Waymark demo. Watch it at {}", page(&server)));
 
     let building = Arc::new(Building::corridor(args.seed));
-    let taught = teaching::teach(&building, &server, args.seed).await?;
+    let taught = if args.survey {
+        surveying::survey(&building, &server, (args.seed, args.rate_hz)).await?
+    } else {
+        teaching::teach(&building, &server, args.seed).await?
+    };
     screen::complain(&format!(
         "First drive: {} walls, {} of {} landmarks in use, learnt from {} views; in {} frames the poster was not found, \
          {} views did not agree with the others.",

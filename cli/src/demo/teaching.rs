@@ -1,11 +1,11 @@
-//! The demo's first part: teaches the server over HTTP what the surveying robot measured
-//! (`cli/survey.rs`).
+//! The demo's first part: teaches the server over HTTP what the robot of the first drive measured
+//! (`cli/first_drive.rs`).
 
 use super::MAP;
 use crate::{
+    first_drive::{first_drive, known_poses, place_on_walls},
     pictures, screen,
     simulated_errors::SimulatedRobotErrors,
-    survey::{known_poses, place_on_walls, survey},
 };
 use client::{
     LandmarkRegion, MapClient,
@@ -48,16 +48,16 @@ pub(super) async fn teach(
     let camera = *robot.camera().intrinsics();
     let stops = known_poses(stops(building, &LessonParams { seed, ..LessonParams::default() }));
     let exact = SimulatedRobotErrors::none(&camera);
-    let work = move || survey(robot, &stops, &exact, &DetectParams::default());
-    let survey = tokio::task::spawn_blocking(work).await??;
+    let work = move || first_drive(robot, &stops, &exact, &DetectParams::default());
+    let driven = tokio::task::spawn_blocking(work).await??;
 
-    let mut taught = Taught { walls: survey.walls.len(), views_missed: survey.missed, ..Taught::default() };
-    let walls: WallsBody = survey.walls.iter().map(|w| [w.a.into(), w.b.into()]).collect();
+    let mut taught = Taught { walls: driven.walls.len(), views_missed: driven.missed, ..Taught::default() };
+    let walls: WallsBody = driven.walls.iter().map(|w| [w.a.into(), w.b.into()]).collect();
     maps.set_walls(MAP, &walls).await?;
-    let progress = screen::progress(survey.views.values().map(Vec::len).sum(), "teaching");
-    for (name, views) in &survey.views {
+    let progress = screen::progress(driven.views.values().map(Vec::len).sum(), "teaching");
+    for (name, views) in &driven.views {
         taught.landmarks += 1;
-        let Some((place, agreed)) = place_on_walls(views, &survey.walls, &camera) else {
+        let Some((place, agreed)) = place_on_walls(views, &driven.walls, &camera) else {
             screen::complain(&format!("{name} is on no wall of the laser's; it is left out"));
             continue;
         };

@@ -4,6 +4,7 @@ pub(crate) mod record;
 pub(crate) mod recorder;
 pub(crate) mod replay;
 mod bag_args;
+pub(crate) mod drive_args;
 mod playable;
 mod player;
 mod poses;

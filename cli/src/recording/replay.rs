@@ -80,9 +80,9 @@ pub(crate) struct Args {
 }
 
 /// Topics and frames of a bag, where they have other names than usual.
-#[derive(Debug, clap::Args)]
+#[derive(Debug, Clone, Default, clap::Args)]
 #[command(next_help_heading = "Bags of ROS 2")]
-struct BagArgs {
+pub(super) struct BagArgs {
     /// A topic of images, as `NAME=TOPIC` with the camera's name; may be given several times
     /// [default: all of the bag].
     #[arg(long, value_name = "NAME=TOPIC")]
@@ -208,7 +208,7 @@ pub(super) fn open_messages(path: &Path) -> anyhow::Result<(BufReader<File>, Vec
     Ok((opened(path)?, channels))
 }
 
-pub(super) fn unreadable(path: &Path) -> String {
+pub(crate) fn unreadable(path: &Path) -> String {
     format!("cannot play {}", path.display())
 }
 
@@ -261,7 +261,7 @@ pub(super) fn robot_of(channel: &Arc<ChannelInfo>) -> Option<&str> {
     channel.topic.split('/').skip_while(|chunk| *chunk != "robot").nth(1).filter(|_| is_ours)
 }
 
-fn settings(args: &BagArgs, channels: &[Arc<ChannelInfo>]) -> anyhow::Result<RobotSettings> {
+pub(super) fn settings(args: &BagArgs, channels: &[Arc<ChannelInfo>]) -> anyhow::Result<RobotSettings> {
     let cameras = if args.image.is_empty() {
         bag::cameras(channels.iter().map(AsRef::as_ref))
     } else {

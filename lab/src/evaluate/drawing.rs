@@ -7,8 +7,8 @@ use super::{
     statistics::median,
 };
 use cli::{
+    first_drive::{first_drive, known_poses, place_on_walls},
     simulated_errors::SimulatedRobotErrors,
-    survey::{known_poses, place_on_walls, survey},
 };
 use formats::svg::{put, text};
 use map::{place::LandmarkPlace, segments::LaserSegment};
@@ -79,20 +79,20 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
         ..LessonParams::default()
     };
     let stops = known_poses(stops(&building, &lesson));
-    let survey = survey(robot, &stops, &errors, &DetectParams::default())?;
-    let placed: Vec<Placed> = survey
+    let driven = first_drive(robot, &stops, &errors, &DetectParams::default())?;
+    let placed: Vec<Placed> = driven
         .views
         .iter()
         .filter_map(|(name, views)| {
-            let (place, _) = place_on_walls(views, &survey.walls, &camera)?;
+            let (place, _) = place_on_walls(views, &driven.walls, &camera)?;
             let truth = building.landmark(name)?;
             let at = Vector3::new(place.x_m, place.y_m, place.z_m);
             let error_m = (truth.map_from_landmark.translation.vector - at).norm();
             Some(Placed { kind: truth.kind, name: name.clone(), place, error_m })
         })
         .collect();
-    let report = report(args.seed, &building, &survey.walls, &placed);
-    write_plot(args.draw.as_deref(), || svg(&survey.walls, &placed))?;
+    let report = report(args.seed, &building, &driven.walls, &placed);
+    write_plot(args.draw.as_deref(), || svg(&driven.walls, &placed))?;
     say(args.json, &report, || {
         vec![format!(
             "drawing: seed {}; {} walls, {:.1} m; {} of {} posters and windows and {} of {} doors placed, {:.3} m off (median)",

@@ -20,6 +20,7 @@ pub(crate) mod modalities;
 pub(crate) mod outside;
 pub(crate) mod recognition;
 pub(crate) mod roll;
+pub(crate) mod survey;
 pub(crate) mod visibility;
 
 /// What to evaluate.
@@ -96,6 +97,13 @@ pub(crate) enum Command {
     ///   waymark-lab evaluate joint --buildings 4 --cases a,d,e
     #[command(verbatim_doc_comment)]
     Joint(joint::Args),
+    /// The map that `waymark survey` makes of a simulated drive, against the truth.
+    ///
+    /// A robot with odometry, laser and a camera whose mounting is stated wrongly drives through a
+    /// corridor and back. Beside it two steps: the laser map, then each object alone. For example:
+    ///   waymark-lab evaluate survey --buildings 2 --ahead
+    #[command(verbatim_doc_comment)]
+    Survey(survey::Args),
     /// Occupancy grids imported: share of wall cells explained, and of walls on wall cells.
     ///
     /// For example:
@@ -170,6 +178,7 @@ pub(crate) fn run(command: &Command) -> anyhow::Result<()> {
         Command::Navigation(args) => navigation::run(args),
         Command::Mapping(args) => mapping::run(args),
         Command::Joint(args) => joint::run(args),
+        Command::Survey(args) => survey::run(args),
         Command::Grids(args) => grids::run(args),
         Command::Drawing(args) => drawing::run(args),
         Command::Modalities(args) => modalities::run(args),

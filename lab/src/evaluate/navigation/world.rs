@@ -8,9 +8,9 @@ use super::{
 use crate::evaluate::experiment::{lesson::points_of, mixed, of_each};
 use anyhow::Context as _;
 use cli::{
+    first_drive::{FirstView, first_drive, known_poses, place_on_walls},
     screen,
     simulated_errors::SimulatedRobotErrors,
-    survey::{SurveyView, known_poses, place_on_walls, survey},
 };
 use engine::snapshot::{LandmarkInfo, MapSnapshot, StoredModel, look_alike_classes};
 use map::{
@@ -109,18 +109,18 @@ impl World {
         } else {
             (None, known_poses(stops))
         };
-        let mut survey = survey(robot, &stops, &wrong, &p.detect)?;
-        let walls = walls.unwrap_or_else(|| std::mem::take(&mut survey.walls));
+        let mut driven = first_drive(robot, &stops, &wrong, &p.detect)?;
+        let walls = walls.unwrap_or_else(|| std::mem::take(&mut driven.walls));
         if true_lessons {
-            survey.views.iter_mut().for_each(|(name, views_of_one)| take_true_corners(name, views_of_one));
+            driven.views.iter_mut().for_each(|(name, views_of_one)| take_true_corners(name, views_of_one));
         }
-        let found: Vec<(&String, &Vec<SurveyView>)> = survey.views.iter().collect();
+        let found: Vec<(&String, &Vec<FirstView>)> = driven.views.iter().collect();
         let lessons: Vec<Lesson> = of_each(&found, "views", |i, (name, views_of_one)| {
             let (mut place, agreed) = place_on_walls(views_of_one, &walls, &camera)?;
             if true_lessons {
                 place = true_place(&building, name)?;
             }
-            let views_of_one: Vec<&SurveyView> = agreed.iter().map(|&i| &views_of_one[i]).collect();
+            let views_of_one: Vec<&FirstView> = agreed.iter().map(|&i| &views_of_one[i]).collect();
             let views = views(&views_of_one, mixed(&[seed, 12, i as u64]), &p);
             let each = views.iter().step_by(views.len().div_ceil(NEGATIVES).max(1));
             let icons = each.map(|v| features(v.icon.clone(), &p.recognise)).collect();
@@ -151,8 +151,8 @@ impl World {
     }
 }
 
-fn views(views_of_one: &[&SurveyView], seed: u64, p: &Params) -> Vec<TrainingView> {
-    let image = |view: &SurveyView| view.readings.frame.image.clone();
+fn views(views_of_one: &[&FirstView], seed: u64, p: &Params) -> Vec<TrainingView> {
+    let image = |view: &FirstView| view.readings.frame.image.clone();
     let photographed =
         views_of_one.iter().filter_map(|l| TrainingView::photographed(&image(l), &l.quad.corners_px, p).ok());
     let mut views: Vec<TrainingView> = photographed.collect();
@@ -218,7 +218,7 @@ fn snapshot(
     Ok(map)
 }
 
-fn take_true_corners(name: &str, views_of_one: &mut [SurveyView]) {
+fn take_true_corners(name: &str, views_of_one: &mut [FirstView]) {
     for view in views_of_one {
         if let Some(truth) = view.readings.frame.truth.landmark(name) {
             view.quad.corners_px = truth.corners_px;

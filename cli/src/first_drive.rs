@@ -31,13 +31,13 @@ use vision::{
 /// The person clicks on the quad that is the poster.
 const IOU_CLICKED: f64 = 0.7;
 
-/// How well a surveying robot with a known pose says to know it: standard deviations of x, y
+/// How well a robot with a known pose says to know it: standard deviations of x, y
 /// (metres) and heading (radians).
 const KNOWN_SIGMA: [f64; 3] = [0.01, 0.01, 0.002];
 
 /// A frame in which a poster was found.
 #[derive(Debug)]
-pub struct SurveyView {
+pub struct FirstView {
     /// The poster's quad.
     pub quad: Quad,
     /// The frame, and the truth about it.
@@ -47,13 +47,13 @@ pub struct SurveyView {
     extrinsics: CameraExtrinsics,
 }
 
-/// What a surveying robot gathered.
+/// What the robot gathered.
 #[derive(Debug)]
-pub struct Survey {
+pub struct FirstDrive {
     /// Walls from its laser.
     pub walls: Vec<LaserSegment>,
     /// Views by name of the poster.
-    pub views: BTreeMap<String, Vec<SurveyView>>,
+    pub views: BTreeMap<String, Vec<FirstView>>,
     /// Frames of a poster in which the detector did not find it.
     pub missed: usize,
 }
@@ -71,21 +71,21 @@ pub fn known_poses(stops: Vec<Stop>) -> Vec<(Stop, Pose2Covariance)> {
 
 /// Drives to all stops, each with the pose that the robot states there. Errors: a scan or a pose is
 /// out of range.
-pub fn survey(
+pub fn first_drive(
     mut robot: Robot,
     stops: &[(Stop, Pose2Covariance)],
     errors: &SimulatedRobotErrors,
     p: &DetectParams,
-) -> anyhow::Result<Survey> {
+) -> anyhow::Result<FirstDrive> {
     let progress = screen::progress(stops.len(), "first drive");
     let mut walls = Walls::new(WallParams::default());
-    let (mut views, mut missed) = (BTreeMap::<String, Vec<SurveyView>>::new(), 0);
+    let (mut views, mut missed) = (BTreeMap::<String, Vec<FirstView>>::new(), 0);
     for (stop, map_from_robot) in stops {
         let readings = robot.look(&stop.step);
         let extrinsics = errors.extrinsics(&readings.step.robot_from_camera)?;
         walls.add(map_from_robot, &lines::segments(&readings.scan, &LineParams::default()))?;
         match clicked(&readings, &stop.landmark, p) {
-            Some(quad) => views.entry(stop.landmark.clone()).or_default().push(SurveyView {
+            Some(quad) => views.entry(stop.landmark.clone()).or_default().push(FirstView {
                 quad,
                 readings,
                 map_from_robot: *map_from_robot,
@@ -96,7 +96,7 @@ pub fn survey(
         progress.inc(1);
     }
     progress.finish_and_clear();
-    Ok(Survey { walls: walls.segments().cloned().collect(), views, missed })
+    Ok(FirstDrive { walls: walls.segments().cloned().collect(), views, missed })
 }
 
 /// The detected quad that a person would click on.
@@ -112,7 +112,7 @@ fn clicked(readings: &SensorReadings, name: &str, p: &DetectParams) -> Option<Qu
 /// show another border of the same object, or another object: their icons would not fit the model
 /// (method 7, rectangle consistency).
 pub fn place_on_walls(
-    views: &[SurveyView],
+    views: &[FirstView],
     walls: &[LaserSegment],
     camera: &Intrinsics,
 ) -> Option<(LandmarkPlace, Vec<usize>)> {

@@ -1,0 +1,66 @@
+//! A corridor, a drive there and back, and what was to be seen.
+
+use crate::evaluate::experiment::mixed;
+use cli::survey::{SimulatedDrive, simulated_drive};
+use sim::{
+    building::Building,
+    corridor::CorridorParams,
+    drive::DriveParams,
+    gaze::GazeParams,
+    robot::SensorReadings,
+    truth::{LandmarkView, ViewState},
+};
+use std::{collections::BTreeSet, sync::Arc};
+
+/// A frame shows a poster if it is this large and no more oblique.
+const MIN_SIDE_PX: f64 = 30.0;
+const MAX_ANGLE_RAD: f64 = 60.0 * std::f64::consts::PI / 180.0;
+
+/// What is drawn.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Course {
+    pub(super) length_m: f64,
+    pub(super) posters: usize,
+    pub(super) rate_hz: f64,
+    /// The camera points ahead; else a head turns it to posters.
+    pub(super) ahead: bool,
+    pub(super) seed: u64,
+}
+
+/// A drive there and back.
+pub(super) struct Driven {
+    pub(super) building: Arc<Building>,
+    pub(super) drive: SimulatedDrive,
+    /// Posters that some frame shows in full.
+    pub(super) shown: BTreeSet<String>,
+}
+
+pub(super) fn drive(course: &Course) -> anyhow::Result<Driven> {
+    let corridor = CorridorParams {
+        length_m: course.length_m,
+        posters: course.posters,
+        first_poster: mixed(&[course.seed, 21]),
+        ..CorridorParams::default()
+    };
+    let building = Arc::new(Building::corridor_with(&corridor, course.seed));
+    let drive = DriveParams {
+        seed: mixed(&[course.seed, 22]),
+        legs: 2,
+        rate_hz: course.rate_hz,
+        gaze: GazeParams { look_at_posters: !course.ahead, ..GazeParams::default() },
+        ..DriveParams::default()
+    };
+    let mut shown = BTreeSet::new();
+    let is_shown = |view: &&LandmarkView| {
+        view.state == ViewState::Full
+            && view.min_side_px() >= MIN_SIDE_PX
+            && view.view_angle_rad <= MAX_ANGLE_RAD
+    };
+    let drive = simulated_drive(&building, drive, |readings: &SensorReadings| {
+        let views = readings.frame.truth.landmarks.iter().filter(is_shown);
+        shown.extend(views.map(|view| view.name.clone()));
+    })?;
+    let posters: BTreeSet<&str> = building.posters().map(|poster| poster.name.as_str()).collect();
+    shown.retain(|name| posters.contains(name.as_str()));
+    Ok(Driven { building, drive, shown })
+}

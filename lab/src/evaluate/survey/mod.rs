@@ -1,0 +1,262 @@
+//! `waymark-lab evaluate survey`: what `waymark survey` makes of a simulated drive, against the
+//! truth and against two steps (the laser map, then each object alone with the camera as stated).
+
+mod drive;
+
+use super::{
+    experiment::{of_each, say},
+    statistics::quantile,
+};
+use cli::survey::{SurveyedBuilding, SurveyedObject, surveyed};
+use drive::{Course, Driven, drive};
+use map::{
+    place::LandmarkPlace,
+    placement::{PlacementParams, PosedView, placement, view_on_wall},
+    pose2::{Pose2, Pose2Covariance},
+};
+use nalgebra::{Matrix3, Point2, Vector2, Vector3};
+use serde::Serialize;
+use sim::building::LandmarkTruth;
+use vision::params::Params;
+
+/// An object is a poster if its centre is so near, as a share of the longer side.
+const NEAR_SHARE: f64 = 0.5;
+/// How well neighbouring frames are known relative to each other in two steps.
+const NEAR_SIGMA: [f64; 3] = [0.02, 0.02, 0.005];
+
+/// `waymark-lab evaluate survey`.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
+    /// Buildings, each drawn from a seed of its own.
+    #[arg(long, default_value_t = 6, value_parser = clap::value_parser!(u32).range(1..=1_000))]
+    buildings: u32,
+    /// Seed of the first building; the others follow.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Length of the corridor.
+    #[arg(long, value_name = "M", default_value_t = 25.0)]
+    length_m: f64,
+    /// Posters in the corridor.
+    #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=64))]
+    posters: u32,
+    /// Frames and scans a second.
+    #[arg(long, default_value_t = 5.0)]
+    rate_hz: f64,
+    /// The camera points ahead; else a head turns it to posters.
+    #[arg(long)]
+    ahead: bool,
+    /// Print one JSON object instead of a table.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Errors in one building, or in all.
+#[derive(Debug, Default, Serialize)]
+struct Figures {
+    /// Posters that were to be seen, and those of them that became landmarks.
+    shown: usize,
+    placed: usize,
+    /// Why each of the others did not.
+    lost: Vec<String>,
+    /// Landmarks that are no poster, door or window.
+    strangers: usize,
+    /// Distances on the floor in the frame of the first pose, and after a rigid alignment, m.
+    joint_m: Vec<f64>,
+    joint_aligned_m: Vec<f64>,
+    two_steps_m: Vec<f64>,
+    two_steps_aligned_m: Vec<f64>,
+    /// Errors of the sides, %.
+    size_percent: Vec<f64>,
+    two_steps_size_percent: Vec<f64>,
+    /// Squared errors on the floor over their covariance, for each degree of freedom.
+    nees: Vec<f64>,
+    /// Errors of the mounting's rotation as stated and as found, degrees.
+    stated_deg: Vec<f64>,
+    found_deg: Vec<f64>,
+}
+
+impl Figures {
+    fn add(&mut self, other: Self) {
+        self.shown += other.shown;
+        self.placed += other.placed;
+        self.lost.extend(other.lost);
+        self.strangers += other.strangers;
+        for (all, more) in [
+            (&mut self.joint_m, other.joint_m),
+            (&mut self.joint_aligned_m, other.joint_aligned_m),
+            (&mut self.two_steps_m, other.two_steps_m),
+            (&mut self.two_steps_aligned_m, other.two_steps_aligned_m),
+            (&mut self.size_percent, other.size_percent),
+            (&mut self.two_steps_size_percent, other.two_steps_size_percent),
+            (&mut self.nees, other.nees),
+            (&mut self.stated_deg, other.stated_deg),
+            (&mut self.found_deg, other.found_deg),
+        ] {
+            all.extend(more);
+        }
+    }
+
+    fn lines(&self) -> Vec<String> {
+        let quantile = |all: &[f64], share| quantile(&mut all.to_vec(), share).unwrap_or(f64::NAN);
+        let millimetres =
+            |all: &[f64]| format!("{:4.0}, {:4.0} mm", 1e3 * quantile(all, 0.5), 1e3 * quantile(all, 0.95));
+        let percent = |all: &[f64]| format!("{:.2}, {:.2} %", quantile(all, 0.5), quantile(all, 0.95));
+        let mean = |all: &[f64]| all.iter().sum::<f64>() / all.len().max(1) as f64;
+        let mut lines = vec![
+            format!(
+                "{} of {} posters in full view became landmarks; {} landmarks are something else",
+                self.placed, self.shown, self.strangers
+            ),
+            "median, 95 %".to_owned(),
+            format!("  landmark, joint      {}", millimetres(&self.joint_m)),
+            format!("  landmark, two steps  {}", millimetres(&self.two_steps_m)),
+            format!("  aligned, joint       {}", millimetres(&self.joint_aligned_m)),
+            format!("  aligned, two steps   {}", millimetres(&self.two_steps_aligned_m)),
+            format!("  size, joint          {}", percent(&self.size_percent)),
+            format!("  size, two steps      {}", percent(&self.two_steps_size_percent)),
+            format!(
+                "  mounting, stated     {:.2}, {:.2} deg",
+                quantile(&self.stated_deg, 0.5),
+                quantile(&self.stated_deg, 0.95)
+            ),
+            format!(
+                "  mounting, found      {:.2}, {:.2} deg",
+                quantile(&self.found_deg, 0.5),
+                quantile(&self.found_deg, 0.95)
+            ),
+            format!("NEES of landmarks for each degree of freedom: {:.2}", mean(&self.nees)),
+        ];
+        lines.extend(self.lost.iter().map(|lost| format!("  lost: {lost}")));
+        lines
+    }
+}
+
+pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
+    let seeds: Vec<u64> = (0..u64::from(args.buildings)).map(|i| args.seed + i).collect();
+    let course = |seed: u64| Course {
+        length_m: args.length_m,
+        posters: args.posters as usize,
+        rate_hz: args.rate_hz,
+        ahead: args.ahead,
+        seed,
+    };
+    let drives = of_each(&seeds, "drives", |_, seed| drive(&course(*seed)));
+    let mut all = Figures::default();
+    for driven in drives {
+        let driven = driven?;
+        let building = surveyed(&driven.drive.log, &Params::default())?;
+        all.add(figures(&driven, &building));
+    }
+    say(args.json, &all, || all.lines())
+}
+
+fn figures(driven: &Driven, building: &SurveyedBuilding) -> Figures {
+    let mut made = Figures { shown: driven.shown.len(), ..Figures::default() };
+    let (mut joint, mut two) = (Vec::new(), Vec::new());
+    let mut named = std::collections::BTreeSet::new();
+    for object in building.objects.iter().filter(|object| object.refused.is_none()) {
+        let Some(truth) = truth_of(driven, &object.place) else {
+            made.strangers += 1;
+            continue;
+        };
+        if !driven.shown.contains(&truth.name) {
+            continue;
+        }
+        named.insert(truth.name.clone());
+        let at = floor(truth);
+        let here = Vector2::new(object.place.x_m, object.place.y_m);
+        let covariance = object.place.covariance.fixed_view::<2, 2>(0, 0).into_owned();
+        let d = here - at;
+        made.joint_m.push(d.norm());
+        made.nees.extend(covariance.cholesky().map(|c| d.dot(&c.solve(&d)) / 2.0));
+        made.size_percent.extend(size_errors(&object.place, truth));
+        joint.push((here, at));
+        if let Some(place) = two_steps(driven, building, object) {
+            let here = Vector2::new(place.x_m, place.y_m);
+            made.two_steps_m.push((here - at).norm());
+            made.two_steps_size_percent.extend(size_errors(&place, truth));
+            two.push((here, at));
+        }
+    }
+    made.placed = named.len();
+    let lost = driven.shown.iter().filter(|name| !named.contains(*name));
+    made.lost = lost.map(|name| format!("{name}: {}", why_lost(driven, building, name))).collect();
+    (made.joint_aligned_m, made.two_steps_aligned_m) = (aligned(&joint), aligned(&two));
+    let angle = |found: &nalgebra::Isometry3<f64>| {
+        found.rotation.angle_to(&driven.drive.mounting.rotation).to_degrees()
+    };
+    made.stated_deg.push(angle(&building.stated.robot_from_camera));
+    made.found_deg.push(angle(&building.camera.0.robot_from_camera));
+    made
+}
+
+/// The truth that hangs where a place is, if any.
+fn truth_of<'a>(driven: &'a Driven, place: &LandmarkPlace) -> Option<&'a LandmarkTruth> {
+    let here = Vector2::new(place.x_m, place.y_m);
+    let off = |truth: &&LandmarkTruth| (here - floor(truth)).norm();
+    let near = |truth: &&LandmarkTruth| {
+        off(truth) < NEAR_SHARE * truth.width_m.max(truth.height_m)
+            && (truth.map_from_landmark.translation.z - place.z_m).abs() < NEAR_SHARE * truth.height_m
+    };
+    driven.building.landmarks().iter().filter(near).min_by(|a, b| off(a).total_cmp(&off(b)))
+}
+
+/// Why a poster is no landmark.
+fn why_lost(driven: &Driven, building: &SurveyedBuilding, name: &str) -> String {
+    let of_it = |object: &&SurveyedObject| truth_of(driven, &object.place).is_some_and(|t| t.name == name);
+    let refused: Vec<&str> =
+        building.objects.iter().filter(of_it).filter_map(|object| object.refused.as_deref()).collect();
+    if refused.is_empty() { "no object was followed there".to_owned() } else { refused.join("; ") }
+}
+
+/// Centre of a landmark on the floor.
+fn floor(truth: &LandmarkTruth) -> Vector2<f64> {
+    truth.map_from_landmark.translation.vector.xy()
+}
+
+fn size_errors(place: &LandmarkPlace, truth: &LandmarkTruth) -> [f64; 2] {
+    [place.size.width_m / truth.width_m, place.size.height_m / truth.height_m]
+        .map(|r| 100.0 * (r - 1.0).abs())
+}
+
+/// The place of an object by the laser map's walls and poses and the camera as stated.
+fn two_steps(driven: &Driven, building: &SurveyedBuilding, object: &SurveyedObject) -> Option<LandmarkPlace> {
+    let sigmas = Vector3::from(NEAR_SIGMA);
+    let covariance = Matrix3::from_diagonal(&sigmas.component_mul(&sigmas));
+    let p = PlacementParams::default();
+    let on_wall = |view: &cli::survey::ObjectView| {
+        let frame = &driven.drive.log.frames[view.frame].frame;
+        let posed = PosedView {
+            corners: &view.corners_px,
+            covariance_px2: &view.covariance_px2,
+            camera: frame.intrinsics.as_ref()?,
+            map_from_robot: &Pose2Covariance { pose: building.laser_frames[view.frame], covariance },
+            mounting: frame.mounting.as_ref()?,
+        };
+        view_on_wall(&posed, &building.laser_walls, &p).ok()
+    };
+    let views: Vec<_> = object.views.iter().filter_map(on_wall).collect();
+    placement(&views, &building.laser_walls, &p).ok().map(|made| made.place)
+}
+
+/// Distances after the rigid motion that lays the found points best on the true ones.
+fn aligned(pairs: &[(Vector2<f64>, Vector2<f64>)]) -> Vec<f64> {
+    if pairs.is_empty() {
+        return Vec::new();
+    }
+    let n = pairs.len() as f64;
+    let mean = |of: fn(&(Vector2<f64>, Vector2<f64>)) -> Vector2<f64>| {
+        pairs.iter().map(of).sum::<Vector2<f64>>() / n
+    };
+    let (found, truth) = (mean(|p| p.0), mean(|p| p.1));
+    let (mut dot, mut cross) = (0.0, 0.0);
+    for (a, b) in pairs {
+        let (a, b) = (a - found, b - truth);
+        (dot, cross) = (dot + a.dot(&b), cross + a.perp(&b));
+    }
+    let turn = Pose2::new(0.0, 0.0, cross.atan2(dot));
+    let off = |(a, b): &(Vector2<f64>, Vector2<f64>)| {
+        (turn.apply(&Point2::from(a - found)).coords + truth - b).norm()
+    };
+    pairs.iter().map(off).collect()
+}
