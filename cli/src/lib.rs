@@ -23,7 +23,6 @@ mod landmark;
 pub mod map;
 mod names;
 mod notify;
-pub mod parallel;
 pub mod parameters;
 pub mod pictures;
 mod recognise;

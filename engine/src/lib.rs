@@ -37,3 +37,4 @@ pub mod scan_job;
 #[cfg(any(test, feature = "scene"))]
 pub mod scene;
 pub mod snapshot;
+pub mod survey;

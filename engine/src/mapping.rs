@@ -1,18 +1,22 @@
-//! Mappings: walls of a map made while a robot drives. In: the scans of one robot in order, each
-//! with its odometry. Out: progress, and the walls once somebody finishes the mapping and stores
-//! them. A bounded queue passes scans to `map::slam` on a thread of its own. A journal stores them,
-//! so that a mapping resumes after a restart of the server.
+//! Mappings: walls of a map made while a robot drives, and landmarks where they are asked for. In:
+//! the scans of one robot in order, each with its odometry, and its frames. Out: progress, and what
+//! was made once somebody finishes the mapping and stores it. A bounded queue passes scans to
+//! `map::slam` on a thread of its own; frames wait for `survey`. A journal stores both, so that a
+//! mapping resumes after a restart of the server.
 
 mod journal;
 mod session;
+mod tap;
 
 pub use session::{MAX_SCANS, QUEUE};
+pub use tap::MappingTap;
 
 use crate::scan_job::ScanJob;
 use crate::supervision::panics::Panics;
+use crate::survey::{Drive, SurveyedBuilding};
 use journal::{Journal, JournalHeader, JournalReader};
 use map::pose2::Pose2;
-use protos::Name;
+use protos::{CheckedFrame, Name};
 use session::{Session, Start};
 use std::{
     collections::BTreeMap,
@@ -31,6 +35,24 @@ pub const MAX_SESSIONS: usize = 64;
 
 /// Walls in the map frame, with their covariance relative to the map's first pose.
 pub type Walls = Vec<map::segments::LaserSegment>;
+
+/// What a mapping made.
+#[derive(Debug, Clone)]
+pub struct MadeMap {
+    /// The walls: those of the survey, where there is one.
+    pub walls: Walls,
+    /// What the frames showed, where landmarks were asked for.
+    pub survey: Option<Arc<MadeSurvey>>,
+}
+
+/// A drive and what it gave.
+#[derive(Debug)]
+pub struct MadeSurvey {
+    /// The drive.
+    pub drive: Drive,
+    /// What it gave.
+    pub building: SurveyedBuilding,
+}
 
 /// Stage of a mapping.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -63,6 +85,14 @@ pub struct MappingProgress {
     pub scans: u64,
     /// Scans that were dropped: the queue was full, a new epoch began, or there were too many.
     pub dropped: u64,
+    /// Frames that were taken; `None` where no landmarks were asked for.
+    pub frames: Option<usize>,
+    /// Frames that cannot be used: how many of the most frequent kind, and why.
+    pub frames_refused: Option<(u64, String)>,
+    /// Landmarks that are proposed, once they are found.
+    pub landmarks: Option<usize>,
+    /// Number of the gathering that has them, once they are stored.
+    pub gathering: Option<i64>,
     /// Distance driven by odometry, m.
     pub distance_m: f64,
     /// `map_from_robot`: x, y (m), theta (rad); absent before the first scan.
@@ -141,8 +171,14 @@ impl MappingSessions {
         }
     }
 
-    /// Starts a mapping with a robot whose first pose is `origin` (map frame).
-    pub fn begin(&self, map: &Name, robot: &Name, origin: Pose2) -> Result<MappingProgress, MappingError> {
+    /// Starts a mapping with a robot whose first pose is `origin` (map frame); its frames are taken
+    /// as well if `landmarks` are wanted.
+    pub fn begin(
+        &self,
+        map: &Name,
+        robot: &Name,
+        (origin, landmarks): (Pose2, bool),
+    ) -> Result<MappingProgress, MappingError> {
         let mut all = self.lock();
         if all.get(map.as_str()).is_some_and(Session::is_open) {
             return Err(MappingError::AlreadyMapping);
@@ -154,7 +190,7 @@ impl MappingSessions {
         if open().count() >= MAX_MAPPINGS {
             return Err(MappingError::TooMany);
         }
-        let head = JournalHeader::new(map, robot, &origin);
+        let head = JournalHeader::new(map, robot, (&origin, landmarks));
         let journal = self.dir.get().map(|dir| Journal::create(dir, &head));
         let session = Session::begin(Start::New(head, journal), self.around()).ok_or(MappingError::Thread)?;
         let progress = session.progress();
@@ -181,17 +217,26 @@ impl MappingSessions {
         }
     }
 
+    /// Takes a frame of a robot with an open mapping that looks for landmarks.
+    pub fn offer_frame(&self, robot: &Name, map: &str, frame: &CheckedFrame) {
+        // A worker does not wait while a mapping begins: a frame may be missed.
+        let Ok(mut all) = self.all.try_lock() else { return };
+        if let Some(session) = all.get_mut(map).filter(|s| s.takes() && s.robot == *robot) {
+            session.offer_frame(frame);
+        }
+    }
+
     /// Takes no more scans; the walls come once the pose graph is optimised, or at once where they
     /// are held already. Their fate is reported to [`MappingSessions::stored`] or
     /// [`MappingSessions::hold`].
     pub fn finish(
         &self,
         map: &str,
-    ) -> Result<(MappingProgress, oneshot::Receiver<Result<Walls, String>>), MappingError> {
+    ) -> Result<(MappingProgress, oneshot::Receiver<Result<MadeMap, String>>), MappingError> {
         let mut all = self.lock();
         let session = all.get_mut(map).filter(|s| s.can_finish()).ok_or(MappingError::None)?;
-        let walls = session.finish().ok_or(MappingError::None)?;
-        Ok((session.progress(), walls))
+        let made = session.finish().ok_or(MappingError::None)?;
+        Ok((session.progress(), made))
     }
 
     /// The number of walls that were stored, or why they were not.
@@ -206,19 +251,26 @@ impl MappingSessions {
         }
     }
 
+    /// Where the landmarks of a stored map are proposed, or why they are not.
+    pub fn proposed(&self, map: &str, gathering: Result<Option<i64>, String>) {
+        if let Some(session) = self.lock().get(map) {
+            session.proposed(gathering);
+        }
+    }
+
     /// Holds the walls until somebody accepts them with [`MappingSessions::finish`], or says why
     /// there are none. The journal stays: after a restart the mapping resumes, and is finished once
     /// more.
-    pub fn hold(&self, map: &str, walls: Result<Walls, String>) {
+    pub fn hold(&self, map: &str, made: Result<MadeMap, String>) {
         // Another mapping of the map may have begun after this one was cancelled.
         if let Some(session) = self.lock().get_mut(map).filter(|session| session.is_finishing()) {
-            session.hold(walls);
+            session.hold(made);
         }
     }
 
     /// The walls that are held.
     pub fn held(&self, map: &str) -> Option<Walls> {
-        self.lock().get(map).and_then(|session| session.held.clone())
+        self.lock().get(map).and_then(|session| session.held.as_ref().map(|made| made.walls.clone()))
     }
 
     /// Cancels a mapping: the map stays as it is. False if there is none.

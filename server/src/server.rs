@@ -33,6 +33,7 @@ use engine::{
     findings::{LandmarkFinding, findings},
     intake::Intake,
     live::LiveHub,
+    mapping::MappingTap,
     motion::MotionTracker,
     panics::Panics,
     quotas::{Quotas, Rates},
@@ -292,14 +293,23 @@ fn engine(
 ) -> (Engine, Records) {
     let (findings, found) = findings();
     let (records, recorded) = answer_records(kept_frames.clone());
+    let motion = Arc::new(MotionTracker::new(snapshots.clone(), live.clone()).with_quotas(quotas(config)));
+    let mappings = Arc::new(MappingTap::new(motion.clone()));
     let engine = Engine {
         slots: Arc::new(Slots::new(config.limits.cameras, config.limits.waiting_frame_bytes)),
-        motion: Arc::new(MotionTracker::new(snapshots.clone(), live.clone()).with_quotas(quotas(config))),
+        motion,
         snapshots,
         limits: ImageLimits { bytes: config.limits.frame_bytes, pixels: config.limits.frame_pixels },
         vitals,
         relocalisers: Arc::default(),
-        observers: vec![Arc::new(records), live.clone(), times.clone(), Arc::new(findings), Arc::new(tap)],
+        observers: vec![
+            Arc::new(records),
+            live.clone(),
+            times.clone(),
+            Arc::new(findings),
+            Arc::new(tap),
+            mappings,
+        ],
         search: config.search_frames.policy(config.workers),
     };
     resume_mappings(&engine, config);

@@ -1,26 +1,28 @@
 //! Claim: a driving robot that sends scans over zenoh makes the walls of a map, the same as
 //! `waymark map build` from a scan log of them; they are stored when the mapping is finished, not
-//! before.
+//! before. One that sends frames, too, makes its landmarks in the same drive, and nobody clicks.
 
 use client::{
-    Delivery, RobotClient, RobotOptions,
-    api::{NewMap, WallBody, WallsBody},
+    Capture, Delivery, RobotClient, RobotOptions,
+    api::{LandmarkStatus, MappingStageBody, NewMap, NewMapping, WallBody, WallsBody},
 };
+use nalgebra::Vector3;
 use reqwest::{Method, StatusCode};
 use serde_json::{Value, json};
 use server::config::Limits;
 use sim::{
-    building::Building,
+    building::{Building, LandmarkTruth},
     corridor::CorridorParams,
     drive::{Drive, DriveParams, Step},
     laser::{LaserParams, scan},
+    robot::{Robot, RobotParams},
 };
 use std::{fmt::Write as _, sync::Arc, time::Duration};
 use tests::{
     Child, Inside, SOON,
     command::waymark,
     eventually,
-    robots::{MAP, call, scan_of},
+    robots::{MAP, call, jpeg, scan_of},
 };
 
 /// Unprocessed scans at a time: fewer than the server's queue holds.
@@ -125,6 +127,58 @@ async fn a_drive_over_zenoh_gives_the_walls_of_its_scan_log() {
     let off = live.iter().zip(&file).flat_map(|(a, b)| a.iter().zip(b).map(|(a, b)| (a - b).abs()));
     let off = off.fold(0.0, f64::max);
     assert!(off < 1e-6, "{off} m");
+    client.close().await.expect("closed");
+    inside.server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn one_drive_over_zenoh_gives_walls_and_landmarks_in_use() {
+    let inside = Inside::start(Limits::default()).await;
+    let params = CorridorParams { length_m: 12.0, posters: 4, ..CorridorParams::default() };
+    let building = Arc::new(Building::corridor_with(&params, 4));
+    let maps = inside.maps();
+    maps.create_map(&NewMap::new(MAP)).await.expect("map");
+    maps.put_robot("r1", MAP).await.expect("robot");
+    let drive = DriveParams { legs: 2, rate_hz: 2.0, ..DriveParams::default() };
+    let mut robot = Robot::new(building.clone(), &RobotParams { drive, ..RobotParams::default() });
+    let camera = *robot.camera().intrinsics();
+    let options = RobotOptions::new(&inside.server.zenoh_endpoint, "default", "r1");
+    let client = RobotClient::connect(&options).await.expect("connected");
+    let first = robot.clone().next().expect("a step").step.map_from_robot;
+    let origin = [first.x_m, first.y_m, first.theta_rad];
+    let new = NewMapping { robot: "r1".into(), origin, landmarks: true };
+    maps.start_mapping(MAP, &new).await.expect("begun");
+    let mut sent = 0_u64;
+    while let Some(readings) = robot.next() {
+        let step = &readings.step;
+        client.publish_scan(scan_of(&readings.scan, &step.odom_from_robot, sent as i64)).await.expect("sent");
+        sent += 1;
+        let mapped = || async { (maps.mapping(MAP).await.ok()?.scans >= sent).then_some(()) };
+        eventually("mapped", mapped).await;
+        let image = jpeg(&readings.frame.image);
+        let frame = Capture::encoded(image).expect("a picture").with_intrinsics(&camera);
+        let frame = frame.with_mounting(&step.robot_from_camera).with_odometry(&step.odom_from_robot);
+        client.recognise("front", frame, SOON).await.expect("answered");
+    }
+    let driven = maps.mapping(MAP).await.expect("progress");
+    assert!(driven.frames > Some(30) && driven.frames_refused.is_none(), "{driven:?}");
+    maps.accept_mapping(MAP).await.expect("finished");
+    let over = || async { maps.mapping(MAP).await.ok().filter(|p| p.stage != MappingStageBody::Finishing) };
+    let done = eventually("stored", over).await;
+    assert_eq!((done.stage, &done.reason), (MappingStageBody::Done, &None), "{done:?}");
+    assert!(done.gathering.is_some() && done.landmarks >= Some(3), "{done:?}");
+    let learnt = || async {
+        let landmarks = maps.landmarks(MAP).await.ok()?;
+        let in_use = landmarks.iter().filter(|l| l.status == LandmarkStatus::Active).count();
+        (in_use >= 3).then_some(landmarks)
+    };
+    for landmark in eventually("learnt", learnt).await {
+        let place = landmark.place.expect("a place");
+        let at = Vector3::new(place.x_m, place.y_m, place.z_m);
+        let off = |truth: &LandmarkTruth| (truth.map_from_landmark.translation.vector - at).norm();
+        let nearest = building.landmarks().iter().map(off).fold(f64::INFINITY, f64::min);
+        assert!(nearest < 0.15 && landmark.name.starts_with(MAP), "{nearest} m off: {landmark:?}");
+    }
     client.close().await.expect("closed");
     inside.server.stop().await;
 }

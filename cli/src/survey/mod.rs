@@ -1,28 +1,26 @@
 //! `waymark survey`: the map of a building from one drive.
 //!
 //! ```text
-//! drive_log (scans, frames, odometry) -> sightings (quads of frames) -> objects (quads of one
-//! object) -> building (walls, objects and camera in one estimate) -> upload, report
+//! drive_log (a file) -> engine::survey (walls, objects and camera in one estimate) -> upload, report
 //! ```
 
 mod drive_log;
-mod sightings;
-mod objects;
-mod building;
 pub(crate) mod upload;
 pub(crate) mod report;
 mod simulated;
 
-pub use building::{SurveyedBuilding, SurveyedObject, surveyed};
-pub use drive_log::{DriveLog, LoggedFrame, LoggedScan};
-pub use objects::ObjectView;
+pub use drive_log::DriveLog;
 pub use simulated::{SimulatedDrive, simulated_drive};
 
 use crate::{arg_parsers::numbers, recording::drive_args::DriveArgs, screen, session::ServerArgs};
+use anyhow::Context as _;
 use client::protos::Name;
+use engine::survey::{self, Effort, SurveyedBuilding};
+use indicatif::ProgressBar;
 use map::pose2::Pose2;
+use map::slam::{Slam, SlamMap, SlamParams};
 use report::SurveyReport;
-use std::path::PathBuf;
+use std::{num::NonZeroUsize, path::PathBuf, sync::Mutex};
 use vision::params::Params;
 
 /// `waymark survey`.
@@ -54,6 +52,42 @@ fn origin(text: &str) -> Result<Pose2, String> {
     let pose = Pose2::new(x_m, y_m, theta_rad);
     pose.check().map_err(|error| error.to_string())?;
     Ok(pose)
+}
+
+/// Makes the laser map of a drive, then surveys it, with progress.
+pub fn surveyed(log: &DriveLog, params: &Params) -> anyhow::Result<SurveyedBuilding> {
+    let slam = laser_map(log)?;
+    let bars: Mutex<Option<(&'static str, ProgressBar)>> = Mutex::new(None);
+    let told = |what: &'static str, done: usize, of: usize| {
+        let mut bar = bars.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        if bar.as_ref().is_none_or(|(before, _)| *before != what)
+            && let Some((_, before)) = bar.replace((what, screen::progress(of, what)))
+        {
+            before.finish_and_clear();
+        }
+        if let Some((_, bar)) = bar.as_ref() {
+            bar.set_position(done as u64);
+        }
+    };
+    let threads = std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
+    let made = survey::surveyed(&log.drive, slam, &log.origin, (params, Effort { threads, told: &told }));
+    if let Some((_, bar)) = bars.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner) {
+        bar.finish_and_clear();
+    }
+    Ok(made?)
+}
+
+fn laser_map(log: &DriveLog) -> anyhow::Result<SlamMap> {
+    let bar = screen::progress(log.scans.len(), "mapping");
+    let mut slam = Slam::new(SlamParams::default());
+    for (i, (stamp, scan)) in log.drive.scans.iter().zip(&log.scans).enumerate() {
+        slam.add(&stamp.odom, scan).with_context(|| format!("scan {i}"))?;
+        bar.inc(1);
+    }
+    bar.set_message("fitting");
+    let map = slam.finish()?;
+    bar.finish_and_clear();
+    Ok(map)
 }
 
 /// Runs the command.

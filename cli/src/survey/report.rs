@@ -1,8 +1,9 @@
 //! What a survey found, for people and for programs.
 
-use super::{building::SurveyedBuilding, drive_log::DriveLog};
+use super::drive_log::DriveLog;
 use crate::screen::{Table, counted};
 use client::api::Landmark;
+use engine::survey::{SurveyedBuilding, SurveyedObject};
 use serde::Serialize;
 use std::{collections::BTreeMap, fmt::Write as _};
 
@@ -66,7 +67,7 @@ impl SurveyReport {
             problems.insert("bad_image".to_owned(), (building.undecodable as u64, first));
         }
         let mut number = 0;
-        let line = |object: &super::SurveyedObject| {
+        let line = |object: &SurveyedObject| {
             number += usize::from(object.refused.is_none());
             let name = sent.filter(|_| object.refused.is_none()).map(|(map, _)| format!("{map}-{number:02}"));
             let place = &object.place;
@@ -84,11 +85,12 @@ impl SurveyReport {
             }
         };
         let landmarks = building.objects.iter().map(line).collect();
-        let steps = log.scans.windows(2).map(|pair| pair[0].odom.between(&pair[1].odom).position().norm());
+        let steps =
+            log.drive.scans.windows(2).map(|pair| pair[0].odom.between(&pair[1].odom).position().norm());
         let active = |landmark: &&Landmark| landmark.status == client::api::LandmarkStatus::Active;
         Self {
             scans: log.scans.len(),
-            frames: log.frames.len(),
+            frames: log.drive.frames.len(),
             walls: building.walls.len(),
             loops: building.loops,
             distance_m: steps.sum(),

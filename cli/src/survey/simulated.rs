@@ -1,10 +1,11 @@
 //! A simulated drive as a recording has it: scans, odometry, and frames with a camera whose
 //! intrinsics and mounting are stated wrongly.
 
-use super::drive_log::{DriveLog, LoggedFrame, LoggedScan};
+use super::drive_log::DriveLog;
 use crate::{pictures, simulated_errors::SimulatedRobotErrors};
 use anyhow::Context as _;
 use client::protos::convert::frame::{CheckedFrame, EncodedImage, Encoding, Pixels};
+use engine::survey::{Drive, DriveFrame, ScanStamp};
 use map::extrinsics::CameraExtrinsics;
 use nalgebra::{Isometry3, Vector3, Vector6};
 use sim::{
@@ -41,7 +42,7 @@ pub fn simulated_drive(
     let error = Vector6::new(turn, turn, turn, shift, shift, shift).map(|s| s * random.normal());
     let (turn, shift): (Vector3<f64>, Vector3<f64>) =
         (error.fixed_rows::<3>(0).into(), error.fixed_rows::<3>(3).into());
-    let (mut log, mut first) = (DriveLog::default(), None);
+    let (mut drive, mut scans, mut first) = (Drive::default(), Vec::new(), None);
     while let Some(readings) = robot.next() {
         sensed(&readings);
         let step = &readings.step;
@@ -64,9 +65,10 @@ pub fn simulated_drive(
             deadline_ms: None,
             map: None,
         };
-        log.frames.push(LoggedFrame { odom, frame });
-        log.scans.push(LoggedScan { captured_ns, odom, scan: readings.scan });
+        drive.frames.push(DriveFrame { odom, frame });
+        drive.scans.push(ScanStamp { captured_ns, odom });
+        scans.push(readings.scan);
     }
     let (origin, mounting) = first.context("a drive without a step")?;
-    Ok(SimulatedDrive { log: DriveLog { origin, ..log }, mounting })
+    Ok(SimulatedDrive { log: DriveLog { origin, scans, drive }, mounting })
 }

@@ -1,12 +1,7 @@
 //! Puts a surveyed building on a server: walls, then the views of each landmark with how each was
 //! taken. The server places the landmarks by them, and learns them.
 
-use super::{
-    building::{SurveyedBuilding, SurveyedObject, with_focal},
-    drive_log::{DriveLog, LoggedFrame},
-    objects::ObjectView,
-    sightings::picture,
-};
+use super::drive_log::DriveLog;
 use crate::{
     failure::{Class, Failure},
     pictures, screen,
@@ -20,6 +15,7 @@ use client::{
         geometry::{intrinsics_wire, pose2_covariance_wire, pose3_wire},
     },
 };
+use engine::survey::{DriveFrame, ObjectView, SurveyedBuilding, SurveyedObject, picture};
 use std::time::Duration;
 
 /// Most views of a landmark that are sent.
@@ -84,16 +80,16 @@ fn spread(object: &SurveyedObject) -> impl Iterator<Item = &ObjectView> {
 }
 
 fn new_view(log: &DriveLog, building: &SurveyedBuilding, view: &ObjectView) -> anyhow::Result<NewView> {
-    let LoggedFrame { frame, .. } = &log.frames[view.frame];
+    let DriveFrame { frame, .. } = &log.drive.frames[view.frame];
     let camera = frame.intrinsics.as_ref().context("a frame without intrinsics")?;
     let mounting = frame.mounting.as_ref().context("a frame without a mounting")?;
     let image = match &frame.pixels {
         Pixels::Image(sent) if matches!(sent.encoding, Encoding::Jpeg | Encoding::Png) => sent.bytes.to_vec(),
-        _ => pictures::photograph_jpeg(picture(&log.frames[view.frame])?.grey())?,
+        _ => pictures::photograph_jpeg(picture(&log.drive.frames[view.frame])?.grey())?,
     };
     let variances = |c: &nalgebra::Matrix2<f64>| [c[(0, 0)], c[(0, 1)], c[(1, 1)]];
     let capture = CaptureMetadata {
-        intrinsics: intrinsics_wire(&with_focal(camera, building.camera.0.focal_px)),
+        intrinsics: intrinsics_wire(&building.intrinsics(camera)),
         map_from_robot: pose2_covariance_wire(&building.frames[view.frame]),
         robot_from_camera: pose3_wire(&building.mounting(&mounting.robot_from_camera)),
         ceiling_height_m: None,

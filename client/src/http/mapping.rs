@@ -41,6 +41,13 @@ impl MapClient {
     /// Then [`MapClient::finish_mapping`] stores them, and [`MapClient::cancel_mapping`] gives them
     /// up.
     pub async fn hold_mapping(&self, map: &str) -> Result<MappingProgressBody, ClientError> {
-        self.send(self.ask_query(&FINISH, &[&map], &FinishMappingQuery { hold: true })?).await
+        let query = FinishMappingQuery { hold: true, accept: false };
+        self.send(self.ask_query(&FINISH, &[&map], &query)?).await
+    }
+
+    /// Ends the drive, stores the walls, and accepts and learns the landmarks that pass every gate.
+    pub async fn accept_mapping(&self, map: &str) -> Result<MappingProgressBody, ClientError> {
+        let query = FinishMappingQuery { hold: false, accept: true };
+        self.send(self.ask_query(&FINISH, &[&map], &query)?).await
     }
 }

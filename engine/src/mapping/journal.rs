@@ -1,14 +1,23 @@
-//! The journal of a mapping: its scans on disk, so that a restart of the server loses no drive. One
-//! append-only file a map. In: scans as they are mapped. Out: the same scans at the next start, up
-//! to the first record that is not whole.
+//! The journal of a mapping: its scans and frames on disk, so that a restart of the server loses no
+//! drive. One append-only file a map. In: what is mapped. Out: the same at the next start, up to the
+//! first record that is not whole.
 //!
 //! A record is its length (4 bytes, little-endian), the first 8 bytes of its SHA-256, and its
-//! bytes. The first record is the header as JSON; the others are scans as on the wire, which are
-//! checked again when they are read.
+//! bytes. The first record is the header as JSON; the others are one byte of their kind and a scan
+//! or frame as on the wire, which is checked again when it is read.
 
 use crate::scan_job::ScanJob;
 use map::pose2::Pose2;
-use protos::{Name, convert::CheckedScan, convert::geometry::pose2_wire, prost::Message, v1};
+use protos::{
+    CheckedFrame, Name,
+    convert::{
+        CheckedScan,
+        frame::{Encoding, MAX_FRAME_IMAGE_BYTES, Pixels},
+        geometry::{intrinsics_wire, pose2_wire, pose3_wire},
+    },
+    prost::{Message, bytes::Bytes},
+    v1,
+};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 use std::{
@@ -19,8 +28,11 @@ use std::{
 
 /// Largest journal: some hours of a large scanner.
 pub(super) const MAX_BYTES: u64 = 2 << 30;
-/// Largest record: a scan of the most beams that are accepted.
-const MAX_RECORD: u32 = crate::limits::MAX_SCAN_BYTES as u32;
+/// Largest record: a frame with the largest image.
+const MAX_RECORD: u32 = (MAX_FRAME_IMAGE_BYTES + crate::limits::MAX_SCAN_BYTES) as u32;
+/// First byte of a record.
+const SCAN: u8 = 1;
+const FRAME: u8 = 2;
 /// Scans after which the file is synced, in case of a power cut.
 const SYNC_EVERY: u32 = 50;
 /// Bytes of the length and the digest.
@@ -39,12 +51,31 @@ pub(super) struct JournalHeader {
     pub robot: Name,
     /// The robot's first pose: x, y (map frame, m), theta (rad).
     pub origin: [f64; 3],
+    /// Whether frames are taken.
+    pub landmarks: bool,
+}
+
+/// What a robot sends while it makes a map.
+#[derive(Debug, Clone)]
+pub(super) enum Record {
+    Scan(ScanJob),
+    Frame(Box<CheckedFrame>),
+}
+
+impl Record {
+    /// Epoch of a scan.
+    pub(super) fn epoch(&self) -> Option<u64> {
+        match self {
+            Self::Scan(job) => Some(job.epoch),
+            Self::Frame(_) => None,
+        }
+    }
 }
 
 impl JournalHeader {
-    pub(super) fn new(map: &Name, robot: &Name, origin: &Pose2) -> Self {
+    pub(super) fn new(map: &Name, robot: &Name, (origin, landmarks): (&Pose2, bool)) -> Self {
         let origin = [origin.x_m, origin.y_m, origin.theta_rad];
-        Self { waymark_mapping: 1, map: map.clone(), robot: robot.clone(), origin }
+        Self { waymark_mapping: 2, map: map.clone(), robot: robot.clone(), origin, landmarks }
     }
 
     /// The first pose, if it is in range.
@@ -93,22 +124,13 @@ impl Journal {
         Ok(made)
     }
 
-    /// Adds a scan.
-    pub(super) fn scan(&mut self, job: &ScanJob) -> io::Result<()> {
-        let scan = &job.scan;
-        let wire = v1::Scan {
-            epoch: job.epoch,
-            seq: 0,
-            captured_ns: job.captured_ns,
-            odom_from_robot: Some(pose2_wire(&job.odom_from_robot)),
-            robot_from_laser: Some(pose2_wire(scan.robot_from_laser())),
-            first_bearing_rad: scan.bearing_rad(0),
-            bearing_step_rad: scan.bearing_step_rad(),
-            max_range_m: scan.max_range_m(),
-            ranges_m: scan.ranges_m().to_vec(),
-            ..v1::Scan::default()
+    /// Adds a scan or a frame.
+    pub(super) fn put_record(&mut self, record: &Record) -> io::Result<()> {
+        let (kind, bytes) = match record {
+            Record::Scan(job) => (SCAN, scan_wire(job).encode_to_vec()),
+            Record::Frame(frame) => (FRAME, frame_wire(frame).encode_to_vec()),
         };
-        self.put(&wire.encode_to_vec())?;
+        self.put(&[&[kind], &bytes[..]].concat())?;
         self.unsynced += 1;
         if self.unsynced >= SYNC_EVERY {
             self.unsynced = 0;
@@ -121,11 +143,57 @@ impl Journal {
         let framed = framed(record)?;
         let bytes = self.bytes + framed.len() as u64;
         if bytes > MAX_BYTES {
-            return Err(io::Error::other(format!("more than {MAX_BYTES} bytes of scans")));
+            return Err(io::Error::other(format!("more than {MAX_BYTES} bytes of scans and frames")));
         }
         self.file.write_all(&framed)?;
         self.bytes = bytes;
         Ok(())
+    }
+}
+
+fn scan_wire(job: &ScanJob) -> v1::Scan {
+    let scan = &job.scan;
+    v1::Scan {
+        epoch: job.epoch,
+        captured_ns: job.captured_ns,
+        odom_from_robot: Some(pose2_wire(&job.odom_from_robot)),
+        robot_from_laser: Some(pose2_wire(scan.robot_from_laser())),
+        first_bearing_rad: scan.bearing_rad(0),
+        bearing_step_rad: scan.bearing_step_rad(),
+        max_range_m: scan.max_range_m(),
+        ranges_m: scan.ranges_m().to_vec(),
+        ..v1::Scan::default()
+    }
+}
+
+fn encoding_wire(encoding: Encoding) -> v1::ImageEncoding {
+    match encoding {
+        Encoding::Jpeg => v1::ImageEncoding::Jpeg,
+        Encoding::Png => v1::ImageEncoding::Png,
+        Encoding::Gray8 => v1::ImageEncoding::Gray8,
+        Encoding::Rgb8 => v1::ImageEncoding::Rgb8,
+        Encoding::Bgr8 => v1::ImageEncoding::Bgr8,
+    }
+}
+
+/// What a survey needs of a frame.
+fn frame_wire(frame: &CheckedFrame) -> v1::Frame {
+    let (encoding, image) = match &frame.pixels {
+        Pixels::Image(image) => (encoding_wire(image.encoding), image.bytes.clone()),
+        Pixels::Quads(_) => (v1::ImageEncoding::Unspecified, Bytes::new()),
+    };
+    v1::Frame {
+        epoch: frame.epoch,
+        seq: frame.seq,
+        captured_ns: frame.captured_ns,
+        width_px: frame.width_px,
+        height_px: frame.height_px,
+        encoding: encoding.into(),
+        image,
+        intrinsics: frame.intrinsics.as_ref().map(intrinsics_wire),
+        robot_from_camera: frame.mounting.as_ref().map(|m| pose3_wire(&m.robot_from_camera)),
+        odometry: frame.odometry.as_ref().map(pose2_wire),
+        ..v1::Frame::default()
     }
 }
 
@@ -168,23 +236,38 @@ impl JournalReader {
         let record = record(&mut from, &mut whole).ok_or_else(|| io::Error::other("it has no head"))?;
         let head: JournalHeader = serde_json::from_slice(&record)?;
         let named = path.file_stem().is_some_and(|stem| stem == head.map.as_str());
-        if !named || head.waymark_mapping != 1 || head.origin().is_none() {
+        if !named || head.waymark_mapping != 2 || head.origin().is_none() {
             return Err(io::Error::other("its head is not one of this map"));
         }
         Ok(Self { head, from, file, whole })
     }
 
-    /// The next scan; `None` at the end, or before the first that is not whole.
-    pub(super) fn next(&mut self) -> Option<ScanJob> {
+    /// The next scan or frame; `None` at the end, or before the first that is not whole.
+    pub(super) fn next(&mut self) -> Option<Record> {
         let before = self.whole;
         let read = record(&mut self.from, &mut self.whole);
-        let wire = read.and_then(|bytes| v1::Scan::decode(&*bytes).ok());
-        let Some(checked) = wire.and_then(|wire| CheckedScan::try_from(wire).ok()) else {
+        let next = read.and_then(|bytes| self.parsed(&bytes));
+        if next.is_none() {
             self.whole = before;
-            return None;
-        };
-        let CheckedScan { epoch, captured_ns, odom_from_robot, scan, .. } = checked;
-        Some(ScanJob { map: self.head.map.to_string(), epoch, captured_ns, odom_from_robot, scan })
+        }
+        next
+    }
+
+    fn parsed(&self, bytes: &[u8]) -> Option<Record> {
+        let (kind, wire) = bytes.split_first()?;
+        match *kind {
+            SCAN => {
+                let checked = CheckedScan::try_from(v1::Scan::decode(wire).ok()?).ok()?;
+                let CheckedScan { epoch, captured_ns, odom_from_robot, scan, .. } = checked;
+                let map = self.head.map.to_string();
+                Some(Record::Scan(ScanJob { map, epoch, captured_ns, odom_from_robot, scan }))
+            }
+            FRAME => {
+                let frame = CheckedFrame::try_from(v1::Frame::decode(wire).ok()?).ok()?;
+                Some(Record::Frame(Box::new(frame)))
+            }
+            _ => None,
+        }
     }
 
     /// The journal for appending after the last whole record.
@@ -229,17 +312,22 @@ mod tests {
         ScanJob { map: "hall".into(), epoch: 7, captured_ns: i, odom_from_robot, scan }
     }
 
+    fn scan_of(record: Record) -> ScanJob {
+        let Record::Scan(job) = record else { panic!("{record:?}") };
+        job
+    }
+
     fn written(dir: &Path, scans: i64) {
-        let head = JournalHeader::new(&name("hall"), &name("r1"), &Pose2::new(1.0, 2.0, 0.5));
+        let head = JournalHeader::new(&name("hall"), &name("r1"), (&Pose2::new(1.0, 2.0, 0.5), true));
         let mut journal = Journal::create(dir, &head).unwrap();
         for i in 1..=scans {
-            journal.scan(&job(i)).unwrap();
+            journal.put_record(&Record::Scan(job(i))).unwrap();
         }
     }
 
     fn read(dir: &Path) -> (Vec<i64>, Option<Journal>) {
         let Some(mut reader) = JournalReader::all(dir).pop() else { return (Vec::new(), None) };
-        let scans = std::iter::from_fn(|| reader.next()).map(|job| job.captured_ns).collect();
+        let scans = std::iter::from_fn(|| reader.next()).map(|record| scan_of(record).captured_ns).collect();
         (scans, reader.reopened().ok())
     }
 
@@ -252,12 +340,12 @@ mod tests {
             (reader.head.robot.as_str(), reader.head.origin()),
             ("r1", Some(Pose2::new(1.0, 2.0, 0.5)))
         );
-        let first = reader.next().unwrap();
+        let first = scan_of(reader.next().unwrap());
         assert_eq!((first.epoch, first.odom_from_robot), (7, job(1).odom_from_robot));
         assert!((first.scan.ranges_m()[0] - 3.5).abs() < 1e-9 && first.scan.ranges_m()[1].is_nan());
         let (scans, journal) = read(dir.path());
         assert_eq!(scans, [1, 2, 3]);
-        journal.unwrap().scan(&job(4)).unwrap();
+        journal.unwrap().put_record(&Record::Scan(job(4))).unwrap();
         assert_eq!(read(dir.path()).0, [1, 2, 3, 4]);
         remove(dir.path(), "hall");
         remove(dir.path(), "hall");
@@ -277,7 +365,7 @@ mod tests {
             std::fs::write(&file, &three[..end]).unwrap();
             let (scans, journal) = read(dir.path());
             assert_eq!(scans, [1, 2], "{end}");
-            journal.unwrap().scan(&job(9)).unwrap();
+            journal.unwrap().put_record(&Record::Scan(job(9))).unwrap();
             assert_eq!(read(dir.path()).0, [1, 2, 9], "{end}");
         }
     }
@@ -300,7 +388,7 @@ mod tests {
         flipped(whole.len() - third as usize - 1);
         let (scans, journal) = read(dir.path());
         assert_eq!(scans, [1]);
-        journal.unwrap().scan(&job(9)).unwrap();
+        journal.unwrap().put_record(&Record::Scan(job(9))).unwrap();
         assert_eq!(read(dir.path()).0, [1, 9], "what came after the damage does not come back");
         flipped(20);
         assert!(JournalReader::all(dir.path()).is_empty());
@@ -317,7 +405,7 @@ mod tests {
         written(dir.path(), 1);
         let mut journal = read(dir.path()).1.unwrap();
         journal.bytes = MAX_BYTES - 60;
-        assert!(journal.scan(&job(2)).unwrap_err().to_string().contains("more than"));
+        assert!(journal.put_record(&Record::Scan(job(2))).unwrap_err().to_string().contains("more than"));
         assert_eq!(read(dir.path()).0, [1], "nothing of it was written");
     }
 }

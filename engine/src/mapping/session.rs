@@ -1,8 +1,8 @@
 //! One mapping: its queue, its thread, its progress.
 
 use super::{
-    MappingProgress, MappingStage, Shared, Walls,
-    journal::{Journal, JournalHeader, JournalReader},
+    MadeMap, MadeSurvey, MappingProgress, MappingStage, Shared, Walls,
+    journal::{Journal, JournalHeader, JournalReader, Record},
 };
 use crate::{
     scan_job::ScanJob,
@@ -10,15 +10,17 @@ use crate::{
         panics::{Edge, Panics},
         threads::{self, Class},
     },
+    survey::{DriveReading, Effort, ScanStamp, WHILE_DRIVING, surveyed},
 };
 use map::{
     pose2::{Pose2, Pose2Covariance},
     slam::{Slam, SlamMap, SlamParams},
 };
 use nalgebra::Matrix3;
-use protos::Name;
+use protos::{CheckedFrame, Name};
 use std::{
     io,
+    num::NonZeroUsize,
     sync::{
         Arc, Mutex, MutexGuard, PoisonError,
         atomic::{AtomicBool, Ordering},
@@ -26,8 +28,9 @@ use std::{
     },
 };
 use tokio::sync::oneshot;
+use vision::params::Params;
 
-/// Scans that wait to be mapped; more are dropped and counted.
+/// Scans and frames that wait to be mapped; more are dropped, and scans are counted.
 pub const QUEUE: usize = 64;
 /// Most scans of one mapping.
 pub const MAX_SCANS: u64 = 100_000;
@@ -38,8 +41,8 @@ const OWN_HANDLES: usize = 2;
 
 /// What the thread shall do next.
 enum Command {
-    Scan(Box<ScanJob>),
-    Finish(oneshot::Sender<Result<Walls, String>>),
+    Record(Box<Record>),
+    Finish(oneshot::Sender<Result<MadeMap, String>>),
 }
 
 /// How a mapping starts.
@@ -57,8 +60,10 @@ pub(super) struct Session {
     /// Epoch of the first scan: another epoch has another odometry.
     epoch: Option<u64>,
     commands: Option<SyncSender<Command>>,
-    /// Walls that wait to be accepted.
-    pub(super) held: Option<Walls>,
+    /// What waits to be accepted.
+    pub(super) held: Option<MadeMap>,
+    /// Whether frames are taken.
+    landmarks: bool,
     progress: Shared,
 }
 
@@ -74,7 +79,8 @@ impl Session {
             Start::New(..) => None,
             Start::Resumed(journal) => journal.next(),
         };
-        let epoch = first.as_ref().map(|job| job.epoch);
+        let epoch = first.as_ref().and_then(Record::epoch);
+        let landmarks = head.landmarks;
         let stage =
             if matches!(start, Start::New(..)) { MappingStage::Mapping } else { MappingStage::Resuming };
         let progress = Arc::new(Mutex::new(MappingProgress {
@@ -83,6 +89,10 @@ impl Session {
             stage,
             scans: 0,
             dropped: 0,
+            frames: landmarks.then_some(0),
+            frames_refused: None,
+            landmarks: None,
+            gathering: None,
             distance_m: 0.0,
             pose: None,
             segments: None,
@@ -94,7 +104,7 @@ impl Session {
         let shared = progress.clone();
         let work = move || {
             // A panic leaves nothing shared half changed: the map so far belongs to this thread.
-            let mapper = Mapper::new(shared.clone(), origin, no_room);
+            let mapper = Mapper::new(shared.clone(), (origin, landmarks), no_room);
             let run = || mapper.run(start, first, &received);
             if panics.catch(Edge::Mapping, "a mapping", "this mapping has failed", run).is_none() {
                 fail(&shared, "the server failed on these scans; see its log");
@@ -102,7 +112,7 @@ impl Session {
         };
         let thread = threads::spawn(Class::Background, "mapping", work);
         thread.inspect_err(|error| tracing::error!(%error, "mapping_thread_failed")).ok()?;
-        Some(Self { robot: head.robot, epoch, commands: Some(commands), held: None, progress })
+        Some(Self { robot: head.robot, epoch, commands: Some(commands), held: None, landmarks, progress })
     }
 
     /// Whether it is open: resuming, mapping, or waiting to be accepted or stored.
@@ -136,35 +146,53 @@ impl Session {
     pub(super) fn offer(&mut self, job: ScanJob) {
         let is_same = *self.epoch.get_or_insert(job.epoch) == job.epoch;
         let has_room = lock(&self.progress).scans < MAX_SCANS;
-        let sent = |commands: &SyncSender<Command>| commands.try_send(Command::Scan(Box::new(job))).is_ok();
+        let sent = |commands: &SyncSender<Command>| {
+            commands.try_send(Command::Record(Box::new(Record::Scan(job)))).is_ok()
+        };
         if !(is_same && has_room && self.commands.as_ref().is_some_and(sent)) {
             lock(&self.progress).dropped += 1;
         }
     }
 
-    /// Asks for the walls: those that are held, or those of all scans, after the scans that wait.
-    /// `None` if the queue is full or the thread has ended.
-    pub(super) fn finish(&mut self) -> Option<oneshot::Receiver<Result<Walls, String>>> {
-        let (reply, walls) = oneshot::channel();
+    /// Queues a frame, or drops it; never waits. One of another epoch has another odometry.
+    pub(super) fn offer_frame(&mut self, frame: &CheckedFrame) {
+        if let (true, Some(commands)) = (self.landmarks && self.epoch == Some(frame.epoch), &self.commands) {
+            drop(commands.try_send(Command::Record(Box::new(Record::Frame(Box::new(frame.clone()))))));
+        }
+    }
+
+    /// Asks for what was made: what is held, or that of all scans, after those that wait. `None` if
+    /// the queue is full or the thread has ended.
+    pub(super) fn finish(&mut self) -> Option<oneshot::Receiver<Result<MadeMap, String>>> {
+        let (reply, made) = oneshot::channel();
         if let Some(held) = self.held.take() {
             lock(&self.progress).stage = MappingStage::Finishing;
-            return reply.send(Ok(held)).is_ok().then_some(walls);
+            return reply.send(Ok(held)).is_ok().then_some(made);
         }
         self.commands.as_ref()?.try_send(Command::Finish(reply)).ok()?;
         self.commands = None;
         lock(&self.progress).stage = MappingStage::Finishing;
-        Some(walls)
+        Some(made)
     }
 
-    /// Holds the walls until they are asked for again.
-    pub(super) fn hold(&mut self, walls: Result<Walls, String>) {
+    /// Holds what was made until it is asked for again.
+    pub(super) fn hold(&mut self, made: Result<MadeMap, String>) {
         let mut progress = lock(&self.progress);
-        match walls {
-            Ok(walls) => {
-                (progress.stage, progress.segments) = (MappingStage::Found, Some(walls.len()));
-                self.held = Some(walls);
+        match made {
+            Ok(made) => {
+                (progress.stage, progress.segments) = (MappingStage::Found, Some(made.walls.len()));
+                self.held = Some(made);
             }
             Err(reason) => (progress.stage, progress.reason) = (MappingStage::Failed, Some(reason)),
+        }
+    }
+
+    /// Records where landmarks are proposed.
+    pub(super) fn proposed(&self, gathering: Result<Option<i64>, String>) {
+        let mut progress = lock(&self.progress);
+        match gathering {
+            Ok(gathering) => progress.gathering = gathering,
+            Err(reason) => progress.reason = Some(format!("no landmarks are proposed: {reason}")),
         }
     }
 
@@ -184,18 +212,21 @@ struct Mapper {
     progress: Shared,
     origin: Pose2,
     last: Option<Pose2>,
+    /// The drive, where landmarks are wanted.
+    drive: Option<DriveReading>,
     journal: Option<Journal>,
     no_room: Arc<AtomicBool>,
 }
 
 impl Mapper {
-    fn new(progress: Shared, origin: Pose2, no_room: Arc<AtomicBool>) -> Self {
+    fn new(progress: Shared, (origin, landmarks): (Pose2, bool), no_room: Arc<AtomicBool>) -> Self {
         let slam = Slam::new(SlamParams::default());
-        Self { slam, progress, origin, last: None, journal: None, no_room }
+        let drive = landmarks.then(|| DriveReading::new(WHILE_DRIVING));
+        Self { slam, progress, origin, last: None, drive, journal: None, no_room }
     }
 
     /// Maps the journal, then scans until the mapping finishes or is cancelled.
-    fn run(mut self, start: Start, first: Option<ScanJob>, commands: &Receiver<Command>) {
+    fn run(mut self, start: Start, first: Option<Record>, commands: &Receiver<Command>) {
         let ready = match start {
             Start::New(_, journal) => {
                 self.write_to(journal);
@@ -209,13 +240,13 @@ impl Mapper {
     }
 
     /// Maps the scans of a journal, as long as the session exists.
-    fn resume(&mut self, mut journal: JournalReader, first: Option<ScanJob>) -> Result<(), String> {
+    fn resume(&mut self, mut journal: JournalReader, first: Option<Record>) -> Result<(), String> {
         let mut next = first;
-        while let Some(job) = next {
+        while let Some(record) = next {
             if Arc::strong_count(&self.progress) <= OWN_HANDLES {
                 return Ok(());
             }
-            self.add(&job)?;
+            self.add(&record)?;
             next = journal.next();
         }
         self.write_to(Some(journal.reopened()));
@@ -229,33 +260,53 @@ impl Mapper {
     fn obey(&mut self, commands: &Receiver<Command>) -> Result<(), String> {
         while let Ok(command) = commands.recv() {
             match command {
-                Command::Scan(job) => {
-                    let no_room = self.no_room.load(Ordering::Relaxed);
-                    let write = |journal: &mut Journal| {
-                        if no_room {
-                            return Err(io::Error::other("the disk of the data directory is nearly full"));
-                        }
-                        journal.scan(&job)
-                    };
-                    let written = self.journal.as_mut().map(write);
-                    if let Some(Err(error)) = written {
-                        self.write_to(Some(Err(error)));
+                Command::Record(record) => {
+                    if self.add(&record)? {
+                        self.write(&record);
                     }
-                    self.add(&job)?;
                 }
                 Command::Finish(reply) => {
-                    let slam = std::mem::replace(&mut self.slam, Slam::new(SlamParams::default()));
-                    let made = slam.finish().map_err(|error| error.to_string());
-                    if let Ok(map) = &made {
-                        lock(&self.progress).loop_closures = Some(map.loops.len());
-                    }
                     // An error means that nobody waits: the mapping was cancelled.
-                    drop(reply.send(made.map(|map| walls(&map, &self.origin))));
+                    drop(reply.send(self.made()));
                     break;
                 }
             }
         }
         Ok(())
+    }
+
+    /// Fits everything once more, and looks at the frames.
+    fn made(&mut self) -> Result<MadeMap, String> {
+        let slam = std::mem::replace(&mut self.slam, Slam::new(SlamParams::default()));
+        let map = slam.finish().map_err(|error| error.to_string())?;
+        lock(&self.progress).loop_closures = Some(map.loops.len());
+        let Some((drive, _)) = self.drive.take().map(DriveReading::finished) else {
+            return Ok(MadeMap { walls: walls(&map, &self.origin), survey: None });
+        };
+        if drive.frames.is_empty() {
+            return Ok(MadeMap { walls: walls(&map, &self.origin), survey: None });
+        }
+        let effort = Effort { threads: NonZeroUsize::MIN, told: &|_, _, _| {} };
+        let made = surveyed(&drive, map, &self.origin, (&Params::default(), effort));
+        let building = made.map_err(|error| error.to_string())?;
+        let proposed = building.objects.iter().filter(|object| object.refused.is_none()).count();
+        lock(&self.progress).landmarks = Some(proposed);
+        let walls = building.walls.clone();
+        Ok(MadeMap { walls, survey: Some(Arc::new(MadeSurvey { drive, building })) })
+    }
+
+    fn write(&mut self, record: &Record) {
+        let no_room = self.no_room.load(Ordering::Relaxed);
+        let write = |journal: &mut Journal| {
+            if no_room {
+                return Err(io::Error::other("the disk of the data directory is nearly full"));
+            }
+            journal.put_record(record)
+        };
+        let written = self.journal.as_mut().map(write);
+        if let Some(Err(error)) = written {
+            self.write_to(Some(Err(error)));
+        }
     }
 
     /// Writes scans to this journal from now on. Without a journal the mapping continues, and its
@@ -270,8 +321,26 @@ impl Mapper {
         });
     }
 
-    fn add(&mut self, job: &ScanJob) -> Result<(), String> {
+    /// Takes a scan or a frame; whether it is to be kept.
+    fn add(&mut self, record: &Record) -> Result<bool, String> {
+        match record {
+            Record::Scan(job) => self.add_scan(job).map(|()| true),
+            Record::Frame(frame) => {
+                let Some(drive) = &mut self.drive else { return Ok(false) };
+                let kept = drive.frame((**frame).clone());
+                let mut progress = lock(&self.progress);
+                progress.frames = Some(drive.frames());
+                progress.frames_refused = drive.problems().values().max_by_key(|(count, _)| *count).cloned();
+                Ok(kept)
+            }
+        }
+    }
+
+    fn add_scan(&mut self, job: &ScanJob) -> Result<(), String> {
         let at = self.slam.add(&job.odom_from_robot, &job.scan).map_err(|error| error.to_string())?;
+        if let Some(drive) = &mut self.drive {
+            drive.scan(ScanStamp { captured_ns: job.captured_ns, odom: job.odom_from_robot });
+        }
         let on_map = self.origin.compose(&at);
         let mut progress = lock(&self.progress);
         progress.scans += 1;

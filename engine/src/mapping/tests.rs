@@ -2,10 +2,18 @@
 
 use super::*;
 use map::{
+    extrinsics::CameraExtrinsics,
     laser::Scan,
     slam::{Slam, SlamParams},
 };
-use sim::{building::Building, drive::DriveParams, laser::LaserParams, odometry::OdometryParams};
+use protos::convert::frame::{EncodedImage, Encoding, Pixels};
+use sim::{
+    building::Building,
+    drive::DriveParams,
+    laser::LaserParams,
+    odometry::OdometryParams,
+    robot::{Robot, RobotParams},
+};
 use std::time::{Duration, Instant};
 
 fn name(text: &str) -> Name {
@@ -35,7 +43,7 @@ async fn scans_become_the_walls_that_mapping_them_gives() {
     let steps: Vec<_> = sim::drive::Drive::new(building.clone(), &drive).step_by(3).take(60).collect();
     let (mappings, mut slam) = (MappingSessions::default(), Slam::new(SlamParams::default()));
     let origin = Pose2::new(3.0, 1.0, 0.5);
-    mappings.begin(&name("hall"), &name("r1"), origin).unwrap();
+    mappings.begin(&name("hall"), &name("r1"), (origin, false)).unwrap();
     for (i, step) in steps.iter().enumerate() {
         let seen = scan(&building, &step.map_from_robot, i as u64);
         slam.add(&step.odom_from_robot, &seen).unwrap();
@@ -48,9 +56,11 @@ async fn scans_become_the_walls_that_mapping_them_gives() {
     let so_far = mappings.progress("hall").unwrap();
     assert_eq!((so_far.stage, so_far.scans, so_far.dropped), (MappingStage::Mapping, 60, 1));
     assert!(so_far.distance_m > 10.0 && so_far.pose.is_some());
-    let (finishing, walls) = mappings.finish("hall").unwrap();
+    let (finishing, made) = mappings.finish("hall").unwrap();
     assert_eq!(finishing.stage, MappingStage::Finishing);
-    let walls = walls.await.unwrap().unwrap();
+    let made = made.await.unwrap().unwrap();
+    let walls = made.walls.clone();
+    assert!(made.survey.is_none());
     let expected: Vec<_> = slam.finish().unwrap().walls;
     assert_eq!(walls.len(), expected.len());
     for (got, wall) in walls.iter().zip(&expected) {
@@ -59,18 +69,21 @@ async fn scans_become_the_walls_that_mapping_them_gives() {
         let (was, is) = (wall.covariance_about_middle(), got.covariance_about_middle());
         assert!(was[(1, 1)] > 0.0 && (was - is).norm() < 1e-9 * (1.0 + was.norm()), "{was} {is}");
     }
-    mappings.hold("hall", Ok(walls.clone()));
+    mappings.hold("hall", Ok(made));
     let held = mappings.progress("hall").unwrap();
     assert_eq!((held.stage, held.segments), (MappingStage::Found, Some(walls.len())));
     assert_eq!(mappings.held("hall").as_ref(), Some(&walls));
-    assert_eq!(mappings.begin(&name("hall"), &name("r1"), origin), Err(MappingError::AlreadyMapping));
+    assert_eq!(
+        mappings.begin(&name("hall"), &name("r1"), (origin, false)),
+        Err(MappingError::AlreadyMapping)
+    );
     let (_, again) = mappings.finish("hall").unwrap();
-    assert_eq!(again.await.unwrap().unwrap(), walls);
+    assert_eq!(again.await.unwrap().unwrap().walls, walls);
     assert_eq!(mappings.held("hall"), None);
     mappings.stored("hall", Ok(walls.len()));
     assert_eq!(mappings.progress("hall").unwrap().stage, MappingStage::Done);
     assert_eq!(mappings.finish("hall").unwrap_err(), MappingError::None);
-    mappings.begin(&name("hall"), &name("r1"), origin).unwrap();
+    mappings.begin(&name("hall"), &name("r1"), (origin, false)).unwrap();
     // Late word of the one before.
     mappings.hold("hall", Err("the mapping was given up".into()));
     assert_eq!(mappings.progress("hall").unwrap().stage, MappingStage::Mapping);
@@ -80,7 +93,7 @@ async fn scans_become_the_walls_that_mapping_them_gives() {
 fn mappings_are_bounded_and_one_robot_makes_one_map() {
     let mappings = MappingSessions::default();
     let begin = |map: usize, robot: &str| {
-        mappings.begin(&name(&format!("m{map}")), &name(robot), Pose2::default()).map(|p| p.stage)
+        mappings.begin(&name(&format!("m{map}")), &name(robot), (Pose2::default(), false)).map(|p| p.stage)
     };
     for i in 0..MAX_MAPPINGS {
         assert_eq!(begin(i, &format!("r{i}")), Ok(MappingStage::Mapping));
@@ -97,7 +110,7 @@ fn old_mappings_are_forgotten_at_the_bound() {
     let mappings = MappingSessions::default();
     for i in 0..=MAX_SESSIONS {
         let map = format!("m{i:03}");
-        mappings.begin(&name(&map), &name("r1"), Pose2::default()).unwrap();
+        mappings.begin(&name(&map), &name("r1"), (Pose2::default(), false)).unwrap();
         mappings.stored(&map, Err("planted".into()));
     }
     assert_eq!(mappings.progress("m000"), None);
@@ -109,7 +122,7 @@ fn old_mappings_are_forgotten_at_the_bound() {
 fn what_the_queue_does_not_hold_is_dropped_and_counted() {
     let mappings = MappingSessions::default();
     let building = Building::corridor(7);
-    mappings.begin(&name("hall"), &name("r1"), Pose2::default()).unwrap();
+    mappings.begin(&name("hall"), &name("r1"), (Pose2::default(), false)).unwrap();
     let sent = 4 * QUEUE as u64;
     for i in 0..sent {
         let at = Pose2::new(2.0 + 0.02 * i as f64, 0.0, 0.0);
@@ -132,7 +145,7 @@ async fn a_mapping_resumes_after_a_restart_as_if_there_had_been_none() {
     let (mut slam, origin) = (Slam::new(SlamParams::default()), Pose2::new(3.0, 1.0, 0.5));
     let mut mappings = MappingSessions::default();
     mappings.resume_in(dir.path().join("mapping"), |_, _| true);
-    mappings.begin(&name("hall"), &name("r1"), origin).unwrap();
+    mappings.begin(&name("hall"), &name("r1"), (origin, false)).unwrap();
     for (i, step) in steps_of(&building).iter().enumerate() {
         if i == 25 {
             mappings = MappingSessions::default();
@@ -153,7 +166,7 @@ async fn a_mapping_resumes_after_a_restart_as_if_there_had_been_none() {
         (MappingStage::Mapping, 1, None),
         "its epoch is that of the journal"
     );
-    let walls = mappings.finish("hall").unwrap().1.await.unwrap().unwrap();
+    let walls = mappings.finish("hall").unwrap().1.await.unwrap().unwrap().walls;
     let expected = slam.finish().unwrap().walls;
     assert_eq!(walls.len(), expected.len());
     for (got, wall) in walls.iter().zip(&expected) {
@@ -173,7 +186,7 @@ fn a_journal_error_is_reported_and_a_cancelled_journal_is_removed() {
     std::fs::write(&file, "not a folder").unwrap();
     let mappings = MappingSessions::default();
     mappings.resume_in(file, |_, _| true);
-    mappings.begin(&name("hall"), &name("r1"), Pose2::default()).unwrap();
+    mappings.begin(&name("hall"), &name("r1"), (Pose2::default(), false)).unwrap();
     let seen = scan(&building, &Pose2::new(3.0, 0.0, 0.0), 1);
     mappings.offer(&name("r1"), job("hall", 1, Pose2::default(), seen));
     wait(|| mappings.progress("hall").unwrap().scans == 1);
@@ -181,11 +194,86 @@ fn a_journal_error_is_reported_and_a_cancelled_journal_is_removed() {
     let folder = dir.path().join("mapping");
     let mappings = MappingSessions::default();
     mappings.resume_in(folder.clone(), |_, _| true);
-    mappings.begin(&name("hall"), &name("r1"), Pose2::default()).unwrap();
-    mappings.begin(&name("house"), &name("r2"), Pose2::default()).unwrap();
+    mappings.begin(&name("hall"), &name("r1"), (Pose2::default(), false)).unwrap();
+    mappings.begin(&name("house"), &name("r2"), (Pose2::default(), false)).unwrap();
     let files = || std::fs::read_dir(&folder).unwrap().count();
     assert!(files() == 2 && mappings.cancel("hall") && files() == 1);
     let again = MappingSessions::default();
     again.resume_in(folder.clone(), |_, robot| robot.as_str() != "r2");
     assert!(again.progress("house").is_none() && files() == 0, "its robot is on another map");
+}
+
+/// What a robot sends of its frames.
+fn frame(readings: &sim::robot::SensorReadings, camera: &vision::frame::Intrinsics) -> CheckedFrame {
+    let image = &readings.frame.image;
+    let bytes = crate::picture::png(image.width(), image.height(), image.data()).unwrap();
+    CheckedFrame {
+        epoch: 5,
+        seq: readings.step.index,
+        captured_ns: (readings.step.time_s * 1e9) as i64,
+        width_px: image.width() as u32,
+        height_px: image.height() as u32,
+        pixels: Pixels::Image(EncodedImage { encoding: Encoding::Png, bytes: bytes.into() }),
+        intrinsics: Some(*camera),
+        mounting: Some(CameraExtrinsics::new(readings.step.robot_from_camera).unwrap()),
+        odometry: None,
+        prior: None,
+        deadline_ms: None,
+        map: None,
+    }
+}
+
+#[tokio::test]
+async fn frames_of_a_drive_give_landmarks_also_after_a_restart() {
+    let (building, dir) = (Arc::new(Building::corridor(7)), tempfile::tempdir().unwrap());
+    let journals = || dir.path().join("mapping");
+    let drive = DriveParams { rate_hz: 2.0, ..DriveParams::default() };
+    let mut robot = Robot::new(building.clone(), &RobotParams { drive, ..RobotParams::default() });
+    let camera = *robot.camera().intrinsics();
+    let origin = robot.clone().next().unwrap().step.map_from_robot;
+    let mut mappings = MappingSessions::default();
+    mappings.resume_in(journals(), |_, _| true);
+    mappings.begin(&name("hall"), &name("r1"), (origin, true)).unwrap();
+    let mut scans = 0;
+    while let Some(readings) = robot.next() {
+        if scans == 30 {
+            mappings = MappingSessions::default();
+            mappings.resume_in(journals(), |_, _| true);
+            wait(|| mappings.progress("hall").unwrap().stage == MappingStage::Mapping);
+            assert!(mappings.progress("hall").unwrap().frames > Some(10), "frames are in the journal");
+        }
+        let step = &readings.step;
+        let captured_ns = (step.time_s * 1e9) as i64;
+        let job = ScanJob { captured_ns, ..job("hall", 5, step.odom_from_robot, readings.scan.clone()) };
+        assert!(mappings.offer(&name("r1"), job).is_none());
+        let mut sent = frame(&readings, &camera);
+        mappings.offer_frame(&name("r1"), "hall", &sent);
+        (sent.epoch, sent.mounting) = (6, None);
+        mappings.offer_frame(&name("r1"), "hall", &sent);
+        if step.index == 3 {
+            sent.epoch = 5;
+            mappings.offer_frame(&name("r1"), "hall", &sent);
+        }
+        scans += 1;
+        wait(|| mappings.progress("hall").unwrap().scans == scans);
+    }
+    let progress = mappings.progress("hall").unwrap();
+    assert!(progress.frames.is_some_and(|frames| frames > 40), "{progress:?}");
+    let made = mappings.finish("hall").unwrap().1.await.unwrap().unwrap();
+    let survey = made.survey.unwrap();
+    let found: Vec<_> = survey.building.objects.iter().filter(|object| object.refused.is_none()).collect();
+    assert_eq!(mappings.progress("hall").unwrap().landmarks, Some(found.len()));
+    assert!(found.len() >= 3 && !made.walls.is_empty(), "{}", found.len());
+    for object in found {
+        // What hangs there: in the frame of the building, since the origin was told.
+        let at = object.place.map_from_landmark().translation.vector;
+        let off =
+            |truth: &sim::building::LandmarkTruth| (truth.map_from_landmark.translation.vector - at).norm();
+        let nearest = building.landmarks().iter().map(off).fold(f64::INFINITY, f64::min);
+        assert!(nearest < 0.2, "{nearest} m: {:?}", object.place);
+    }
+    mappings.proposed("hall", Ok(Some(7)));
+    assert_eq!(mappings.progress("hall").unwrap().gathering, Some(7));
+    mappings.proposed("hall", Err("the disk is full".into()));
+    assert!(mappings.progress("hall").unwrap().reason.unwrap().contains("disk is full"));
 }

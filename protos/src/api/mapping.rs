@@ -15,6 +15,10 @@ pub struct NewMapping {
     #[serde(default)]
     #[cfg_attr(feature = "openapi", schema(value_type = super::arrays::Triple))]
     pub origin: [f64; 3],
+    /// Look for landmarks, too: its frames, with intrinsics and mounting, are kept until the end,
+    /// and objects on walls become tracks of a gathering.
+    #[serde(default)]
+    pub landmarks: bool,
 }
 
 /// How far a mapping has come.
@@ -52,6 +56,18 @@ pub struct MappingProgressBody {
     /// Scans that were not: the queue was full, the robot's software was started again, or there
     /// were too many.
     pub dropped: u64,
+    /// Frames that were taken; absent where no landmarks are looked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub frames: Option<usize>,
+    /// What of the frames cannot be used: how often, and why.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub frames_refused: Option<String>,
+    /// Number of landmarks that are proposed, once they are found.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub landmarks: Option<usize>,
+    /// The gathering whose tracks these are, once the walls are stored.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gathering: Option<i64>,
     /// Way driven, metres.
     pub distance_m: f64,
     /// Where the robot is in the map so far: x, y, theta; absent before the first scan.
@@ -61,7 +77,7 @@ pub struct MappingProgressBody {
     pub segments: Option<usize>,
     /// Loop closures, once fitted.
     pub loop_closures: Option<usize>,
-    /// Why it failed.
+    /// Why it failed, or why a finished one proposes no landmarks.
     pub reason: Option<String>,
     /// Why further scans are not kept on disk: a restart of the server would lose them. Absent
     /// while they are.
@@ -81,4 +97,7 @@ pub struct FinishMappingQuery {
     /// without it, they replace those of the map; `DELETE` gives them up.
     #[serde(default)]
     pub hold: bool,
+    /// Accept the proposed landmarks that pass every gate, and learn them: `MAP-01` and so on.
+    #[serde(default)]
+    pub accept: bool,
 }

@@ -3,7 +3,7 @@
 //! under load (`waymark-lab bench load`).
 
 use super::Config;
-use engine::{decode::PICTURE_BYTES_PER_PX, live};
+use engine::{decode::PICTURE_BYTES_PER_PX, live, mapping::MAX_MAPPINGS, survey::WHILE_DRIVING};
 
 /// The program itself: code, runtime, router, caches of the database.
 const PROGRAM_BYTES: usize = 96 << 20;
@@ -32,7 +32,7 @@ pub struct MemoryShare {
 
 impl Config {
     /// Every share.
-    pub fn memory_shares(&self) -> [MemoryShare; 9] {
+    pub fn memory_shares(&self) -> [MemoryShare; 10] {
         let limits = &self.limits;
         let share = |what, bytes| MemoryShare { what, bytes };
         [
@@ -50,6 +50,7 @@ impl Config {
                 limits.connections * CONNECTION_BYTES + limits.streams * STREAM_BYTES,
             ),
             share("robots", limits.robots * ROBOT_BYTES),
+            share("frames of drives that make maps", MAX_MAPPINGS * WHILE_DRIVING.image_bytes),
         ]
     }
 

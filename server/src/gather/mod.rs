@@ -6,6 +6,7 @@
 
 mod frame_observations;
 mod frame_tap;
+mod surveyed;
 pub(crate) mod track_summaries;
 
 pub(crate) use frame_tap::GatheringCounts;
@@ -31,6 +32,7 @@ use engine::{
 use frame_tap::{ActiveGatherings, lock};
 use map::tracks::{GatherParams, StoredTrack, Track, TrackOutcome, ViewTracker};
 use protos::{
+    CheckedFrame,
     api::{GatheringChange, ServerEventBody},
     convert::{Encoding, Pixels},
 };
@@ -316,7 +318,8 @@ fn new_views(offered: &OfferedFrame, params: &Params) -> Vec<(StoredTrack, NewVi
         if let Some(capture) = &mut capture {
             capture.set_detected_corners(&border.covariance_px2);
         }
-        views.extend(new_view(offered, crop, capture.as_ref()).map(|view| (stored, view)));
+        let pictured = (&offered.frame, &offered.gathered.image);
+        views.extend(new_view(pictured, crop, capture.as_ref()).map(|view| (stored, view)));
     }
     views
 }
@@ -337,8 +340,11 @@ fn view_of(
     Some((QuadCrop { corners_px: border.corners_px, icon }, border))
 }
 
-fn new_view(offered: &OfferedFrame, crop: QuadCrop, capture: Option<&StoredCapture>) -> Option<NewView> {
-    let (frame, grey) = (&offered.frame, &offered.gathered.image);
+fn new_view(
+    (frame, grey): (&CheckedFrame, &GrayImage),
+    crop: QuadCrop,
+    capture: Option<&StoredCapture>,
+) -> Option<NewView> {
     // Only whole images are offered.
     let Pixels::Image(sent) = &frame.pixels else { return None };
     let (image, image_kind) = match sent.encoding {

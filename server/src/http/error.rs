@@ -49,6 +49,11 @@ impl ApiError {
         self
     }
 
+    /// What is wrong, in words.
+    pub(crate) fn told(&self) -> &str {
+        &self.detail
+    }
+
     /// Says it in other words.
     pub(crate) fn detail(mut self, detail: impl Into<String>) -> Self {
         self.detail = detail.into();

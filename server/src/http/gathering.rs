@@ -2,7 +2,7 @@
 //! them.
 
 use super::{
-    AppState,
+    App, AppState,
     answers::{created, page},
     authorise::check_robot,
     error::ApiError,
@@ -24,8 +24,9 @@ use crate::{
 use axum::{Extension, Json, extract::State, http::StatusCode, response::Response};
 use protos::api::{
     AcceptRequest, AcceptanceBody, AcceptedTrackBody, ExtendedLandmark, Gathering, GatheringCountsBody,
-    NewGatheringBody, Page, PageQuery, Problem, TrackList,
+    NewGatheringBody, Page, PageQuery, Problem, TrackList, TrackSummary,
 };
+use std::collections::BTreeSet;
 use utoipa_axum::{router::OpenApiRouter, routes};
 use vision::model::LandmarkId;
 
@@ -182,15 +183,44 @@ async fn list_tracks(
     State(app): State<AppState>,
     PathParams((map, id)): PathParams<(String, i64)>,
 ) -> Result<Json<TrackList>, ApiError> {
-    gatherings::get(app.store.reads(), &map, id).await?;
+    Ok(Json(TrackList { tracks: summaries(&app, &map, id).await? }))
+}
+
+async fn summaries(app: &AppState, map: &str, id: i64) -> Result<Vec<TrackSummary>, ApiError> {
+    gatherings::get(app.store.reads(), map, id).await?;
     let mut tracks = vec![];
     for track in gatherings::tracks(app.store.reads(), id).await?.into_iter().filter(|t| t.state == "open") {
         let views = gatherings::track_views(app.store.reads(), id, track.number).await?;
         tracks.push((track, views));
     }
-    let walls = app.store.snapshots().get(&map).map(|map| map.walls.clone()).unwrap_or_default();
-    let work = move |app: &super::App| track_summaries(&tracks, &walls, &app.config.params);
-    Ok(Json(TrackList { tracks: app.on_vision_thread(work).await? }))
+    let walls = app.store.snapshots().get(map).map(|map| map.walls.clone()).unwrap_or_default();
+    app.clone().on_vision_thread(move |app: &App| track_summaries(&tracks, &walls, &app.config.params)).await
+}
+
+/// Accepts the tracks of a gathering that pass every gate, under the first free names of the map,
+/// and learns them.
+pub(super) async fn accept_passing(app: &AppState, map: &str, id: i64) -> Result<(), ApiError> {
+    let known = app.store.snapshots().get(map);
+    let taken: BTreeSet<String> =
+        known.iter().flat_map(|map| map.landmarks.values().map(|landmark| landmark.name.clone())).collect();
+    let mut free = (1..).map(|number| format!("{map}-{number:02}")).filter(|name| !taken.contains(name));
+    let passing = summaries(app, map, id).await?.into_iter().filter(|track| track.passes);
+    let picks: Vec<TrackAcceptance> =
+        passing.map(|track| TrackAcceptance { number: track.number, name: free.next() }).collect();
+    if picks.is_empty() {
+        return Ok(());
+    }
+    app.gatherer.accept((map, id), picks, true, bounds(app)).await?;
+    Ok(())
+}
+
+fn bounds(app: &App) -> track_acceptance::AcceptanceLimits {
+    let limits = &app.config.limits;
+    track_acceptance::AcceptanceLimits {
+        landmarks: limits.landmarks,
+        views: limits.views,
+        jobs: (limits.jobs, limits.jobs_kept),
+    }
 }
 
 /// Discards a track. While the gathering goes on, no more views of it are kept.
@@ -255,13 +285,7 @@ async fn accept(
         Ok(TrackAcceptance { number: pick.track, name: name.map(|n| n.to_string()) })
     };
     let picks = decision.tracks.into_iter().enumerate().map(pick).collect::<Result<Vec<_>, ApiError>>()?;
-    let limits = &app.config.limits;
-    let bounds = track_acceptance::AcceptanceLimits {
-        landmarks: limits.landmarks,
-        views: limits.views,
-        jobs: (limits.jobs, limits.jobs_kept),
-    };
-    created(acceptance_shown, app.gatherer.accept((&map, id), picks, decision.learn, bounds)).await
+    created(acceptance_shown, app.gatherer.accept((&map, id), picks, decision.learn, bounds(&app))).await
 }
 
 fn acceptance_shown(done: &AcceptanceResult) -> (StatusCode, AcceptanceBody) {

@@ -5,6 +5,7 @@ use super::{
     authorise::check_robot,
     error::ApiError,
     extract::{Body, PathParams, QueryParams, name},
+    gathering::accept_passing,
 };
 use crate::{
     identity::Principal,
@@ -16,13 +17,13 @@ use crate::{
 };
 use axum::{Extension, Json, extract::State, http::StatusCode};
 use engine::{
-    mapping::{MappingError, MappingProgress, MappingStage, Walls},
+    mapping::{MadeMap, MadeSurvey, MappingError, MappingProgress, MappingStage},
     panics::Edge,
 };
 use futures::FutureExt;
 use map::pose2::Pose2;
 use protos::api::{FinishMappingQuery, MappingProgressBody, MappingStageBody, NewMapping, Problem, WallBody};
-use std::panic::AssertUnwindSafe;
+use std::{panic::AssertUnwindSafe, sync::Arc};
 use tokio::sync::oneshot;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
@@ -54,6 +55,10 @@ fn shown(progress: MappingProgress) -> MappingProgressBody {
         },
         scans: progress.scans,
         dropped: progress.dropped,
+        frames: progress.frames,
+        frames_refused: progress.frames_refused.map(|(count, first)| format!("{count} times {first}")),
+        landmarks: progress.landmarks,
+        gathering: progress.gathering,
         distance_m: progress.distance_m,
         pose: progress.pose,
         segments: progress.segments,
@@ -64,8 +69,8 @@ fn shown(progress: MappingProgress) -> MappingProgressBody {
     }
 }
 
-/// Begins to make the walls of a map from the scans of a robot. While it lasts, they are mapped and
-/// localise nothing. The map stays as it is until the mapping is finished. The scans are kept on
+/// Begins to make the walls of a map from the scans of a robot, and with `landmarks` to look for
+/// landmarks in its frames. While it lasts, scans are mapped and localise nothing. The map stays as it is until the mapping is finished. The scans are kept on
 /// disk until then: after a restart of the server the mapping goes on by itself (`resuming`), with
 /// a robot whose software went on; `journal_error` says if they cannot be.
 #[utoipa::path(post, path = "/maps/{map}/mapping", operation_id = "startMapping",
@@ -92,7 +97,8 @@ async fn begin(
     origin.check().map_err(|e| ApiError::invalid("out_of_range", "origin", e.to_string()))?;
     let (map, robot) = (name("map", map)?, name("robot", new.robot)?);
     // It opens a file.
-    let begun = tokio::task::spawn_blocking(move || app.motion.mappings().begin(&map, &robot, origin)).await;
+    let what = (origin, new.landmarks);
+    let begun = tokio::task::spawn_blocking(move || app.motion.mappings().begin(&map, &robot, what)).await;
     let begun = begun.map_err(|e| ApiError::internal(&e))?;
     Ok((StatusCode::CREATED, Json(shown(begun.map_err(refused)?))))
 }
@@ -131,26 +137,28 @@ async fn cancel(
 }
 
 /// Ends the drive: everything is fitted once more, and the walls replace those of the map in one
-/// transaction, or are held until this is asked again. Answers at once; `stage` says when they are
-/// stored or held.
+/// transaction, or are held until this is asked again. Then the landmarks that were found are
+/// tracks of `gathering`, for a person to accept. Answers at once; `stage` says when all is stored
+/// or held.
 #[utoipa::path(post, path = "/maps/{map}/mapping/finish", operation_id = "finishMapping",
     tag = "maps", params(("map" = String, Path), FinishMappingQuery),
     responses((status = 202, body = MappingProgressBody), (status = 404, body = Problem, description = "unknown_map, not_mapping")))]
 async fn finish(
     State(app): State<AppState>,
     PathParams(map): PathParams<String>,
-    QueryParams(FinishMappingQuery { hold }): QueryParams<FinishMappingQuery>,
+    QueryParams(FinishMappingQuery { hold, accept }): QueryParams<FinishMappingQuery>,
 ) -> Result<(StatusCode, Json<MappingProgressBody>), ApiError> {
     maps::get(app.store.reads(), &map).await?;
-    let (progress, walls) = app.motion.mappings().finish(&map).map_err(refused)?;
+    let (progress, made) = app.motion.mappings().finish(&map).map_err(refused)?;
+    let robot = progress.robot.clone();
     // Whoever asked may go away: it is stored all the same.
     tokio::spawn(inherited(Actor::current(), async move {
         if hold {
-            let found = found(&app, walls).await.map(|(walls, _)| walls);
+            let found = found(&app, made).await.map(|(made, _)| made);
             app.motion.mappings().hold(&map, found);
             return;
         }
-        let storing = AssertUnwindSafe(store(&app, &map, walls)).catch_unwind().await;
+        let storing = AssertUnwindSafe(store(&app, (&map, &robot), made, accept)).catch_unwind().await;
         let stored = storing.unwrap_or_else(|cause| {
             let panics = app.store.vitals().panics();
             panics.caught(Edge::Mapping, cause.as_ref(), "a finished mapping", "it has failed");
@@ -164,36 +172,54 @@ async fn finish(
     Ok((StatusCode::ACCEPTED, Json(shown(progress))))
 }
 
-/// The walls when they come, as they are computed with and as they are stored, or why there are
-/// none to be stored.
+/// What was made when it comes, and the walls as they are stored, or why there are none.
 async fn found(
     app: &App,
-    walls: oneshot::Receiver<Result<Walls, String>>,
-) -> Result<(Walls, Vec<StoredWall>), String> {
-    let walls = walls.await.map_err(|_gone| "the mapping was given up".to_owned())??;
-    let (count, max) = (walls.len(), app.config.limits.laser_segments);
+    made: oneshot::Receiver<Result<MadeMap, String>>,
+) -> Result<(MadeMap, Vec<StoredWall>), String> {
+    let made = made.await.map_err(|_gone| "the mapping was given up".to_owned())??;
+    let (count, max) = (made.walls.len(), app.config.limits.laser_segments);
     if count == 0 {
         return Err("the scans show no wall".to_owned());
     }
     if count > max {
         return Err(format!("{count} walls are more than {max}"));
     }
-    let stored: Vec<StoredWall> = walls.iter().map(StoredWall::from).collect();
+    let stored: Vec<StoredWall> = made.walls.iter().map(StoredWall::from).collect();
     match stored.iter().find_map(|wall| wall.segment().err()) {
         Some(error) => Err(error.to_string()),
-        None => Ok((walls, stored)),
+        None => Ok((made, stored)),
     }
 }
 
-/// Stores the walls when they come; how many.
+/// Stores the walls when they come, then what landmarks are proposed; how many walls.
 async fn store(
-    app: &App,
-    map: &str,
-    walls: oneshot::Receiver<Result<Walls, String>>,
+    app: &AppState,
+    (map, robot): (&str, &str),
+    made: oneshot::Receiver<Result<MadeMap, String>>,
+    accept: bool,
 ) -> Result<usize, String> {
-    let (_, walls) = found(app, walls).await?;
-    let (map, count) = (map.to_owned(), walls.len());
-    let write = app.store.write(move |tx| Box::pin(async move { walls::replace(tx, &map, &walls).await }));
+    let (made, walls) = found(app, made).await?;
+    let (name, count) = (map.to_owned(), walls.len());
+    let write = app.store.write(move |tx| Box::pin(async move { walls::replace(tx, &name, &walls).await }));
     write.await.map_err(|error| error.to_string())?;
+    if let Some(survey) = made.survey {
+        let proposed = propose(app, (map, robot), survey, accept).await;
+        app.motion.mappings().proposed(map, proposed);
+    }
     Ok(count)
+}
+
+/// Proposes the landmarks of a survey, and accepts those that pass every gate if they are to be.
+async fn propose(
+    app: &AppState,
+    (map, robot): (&str, &str),
+    survey: Arc<MadeSurvey>,
+    accept: bool,
+) -> Result<Option<i64>, String> {
+    let gathering = app.gatherer.propose(map, robot, survey).await.map_err(|error| error.to_string())?;
+    if let (true, Some(id)) = (accept, gathering) {
+        accept_passing(app, map, id).await.map_err(|error| error.told().to_owned())?;
+    }
+    Ok(gathering)
 }

@@ -186,7 +186,7 @@ for (const [size, where] of [[undefined, "desk"], [PHONE, "phone"]]) {
     const found = [[0, 0.1, 8.1, 0.1], [8.1, 0.1, 8.1, 5]].map(([ax, ay, bx, by]) => ({ a: [ax, ay], b: [bx, by], covariance: [1e-6, 0, 1e-4] }));
     const asked = [];
     let stage = "mapping";
-    const told = () => ({ map, robot: `sweeper-${where}`, stage, scans: 400, dropped: 0, distance_m: 31.5, ...(stage === "found" && { segments: 2, walls: found }), ...(stage === "done" && { segments: 2 }) });
+    const told = () => ({ map, robot: `sweeper-${where}`, stage, scans: 400, dropped: 0, distance_m: 31.5, frames: 60, ...(stage !== "mapping" && { segments: 2, landmarks: 3 }), ...(stage === "found" && { walls: found }), ...(stage === "done" && { gathering: 5 }) });
     await page.route(new RegExp(`/maps/${map}/mapping(/finish)?(\\?.*)?$`), async (route) => {
       const request = route.request();
       const { pathname, search } = new URL(request.url());
@@ -208,6 +208,7 @@ for (const [size, where] of [[undefined, "desk"], [PHONE, "phone"]]) {
       await page.getByRole("heading", { name: "2 walls found" }).waitFor();
     };
     await finish();
+    await page.getByText("3 landmarks found; they are proposed once the walls are taken").waitFor();
     await page.getByText(/Dashed: what the scans were taken for\. Plain: the 1 wall of the map, which they replace\. Nothing is replaced so far\./).waitFor();
     await page.getByRole("application").scrollIntoViewIfNeeded();
     await page.waitForTimeout(500);
@@ -223,6 +224,7 @@ for (const [size, where] of [[undefined, "desk"], [PHONE, "phone"]]) {
     await done.waitFor();
     assert.deepEqual(asked, ["POST mapping", "POST finish?hold=true", "DELETE mapping", "POST mapping", "POST finish?hold=true", "POST finish"]);
     assert.equal((await wallsOf(map)).length, 2);
+    assert.equal(await page.getByRole("link", { name: "look at them and accept them" }).getAttribute("href"), `/maps/${map}/gather`);
     await done.getByRole("button", { name: "Undo" }).click();
     await eventually("way back", async () => (await wallsOf(map)).length === 1);
     assert.deepEqual(page.faults, []);

@@ -16,12 +16,17 @@ pub(crate) mod look_alikes;
 pub(crate) mod answers;
 pub(crate) mod confidence;
 
-pub(crate) use cli::parallel::of_each;
 use cli::screen;
 use lesson::Taught;
 use pictures::Part;
 use serde::Serialize;
-use std::path::{Path, PathBuf};
+use std::{
+    path::{Path, PathBuf},
+    sync::{
+        Mutex, PoisonError,
+        atomic::{AtomicUsize, Ordering},
+    },
+};
 use vision::params::{Params, preset::Preset};
 
 /// Arguments of every experiment.
@@ -162,4 +167,34 @@ pub(crate) fn mixed(parts: &[u64]) -> u64 {
     parts.iter().fold(0x7761_796d_6172_6b00, |seed, part| {
         vision::random::Random::new(seed ^ part.wrapping_mul(0x9e37_79b9_7f4a_7c15)).next_u64()
     })
+}
+
+/// `work` on every item, over all processors, with a progress bar; results in the order of the
+/// items.
+pub(crate) fn of_each<T: Sync, R: Send>(
+    items: &[T],
+    what: &'static str,
+    work: impl Fn(usize, &T) -> R + Sync,
+) -> Vec<R> {
+    let progress = screen::progress(items.len(), what);
+    let threads = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    let next = AtomicUsize::new(0);
+    let results = Mutex::new(Vec::with_capacity(items.len()));
+    std::thread::scope(|scope| {
+        for _ in 0..threads.min(items.len()) {
+            scope.spawn(|| {
+                loop {
+                    let index = next.fetch_add(1, Ordering::Relaxed);
+                    let Some(item) = items.get(index) else { return };
+                    let result = work(index, item);
+                    results.lock().unwrap_or_else(PoisonError::into_inner).push((index, result));
+                    progress.inc(1);
+                }
+            });
+        }
+    });
+    progress.finish_and_clear();
+    let mut results = results.into_inner().unwrap_or_else(PoisonError::into_inner);
+    results.sort_unstable_by_key(|(index, _)| *index);
+    results.into_iter().map(|(_, result)| result).collect()
 }

@@ -7,8 +7,9 @@ use super::{
     experiment::{of_each, say},
     statistics::quantile,
 };
-use cli::survey::{SurveyedBuilding, SurveyedObject, surveyed};
+use cli::survey::surveyed;
 use drive::{Course, Driven, drive};
+use engine::survey::{ObjectView, SurveyedBuilding, SurveyedObject};
 use map::{
     place::LandmarkPlace,
     placement::{PlacementParams, PosedView, placement, view_on_wall},
@@ -224,8 +225,8 @@ fn two_steps(driven: &Driven, building: &SurveyedBuilding, object: &SurveyedObje
     let sigmas = Vector3::from(NEAR_SIGMA);
     let covariance = Matrix3::from_diagonal(&sigmas.component_mul(&sigmas));
     let p = PlacementParams::default();
-    let on_wall = |view: &cli::survey::ObjectView| {
-        let frame = &driven.drive.log.frames[view.frame].frame;
+    let on_wall = |view: &ObjectView| {
+        let frame = &driven.drive.log.drive.frames[view.frame].frame;
         let posed = PosedView {
             corners: &view.corners_px,
             covariance_px2: &view.covariance_px2,

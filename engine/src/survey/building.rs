@@ -2,23 +2,22 @@
 //! the objects with their places and views, the camera as it was found, and what each object fails.
 
 use super::{
-    drive_log::DriveLog,
+    drive::{Drive, DriveFrame},
     objects::{Known, ObjectView, SeenObject, objects},
+    parallel::Effort,
     sightings::{sightings, straight},
 };
-use crate::screen;
-use anyhow::Context as _;
 use map::{
     extrinsics::CameraExtrinsics,
     fuse::FuseParams,
     joint::{
-        CameraState, CameraStated, FrameSeen, JointLaserMap, JointParams, LaserDrive, MappedWall, ObjectSeen,
-        QuadView,
+        CameraState, CameraStated, FrameSeen, JointError, JointLaserMap, JointParams, LaserDrive, MappedWall,
+        ObjectSeen, QuadView,
     },
     place::LandmarkPlace,
     pose2::{Pose2, Pose2Covariance},
     segments::LaserSegment,
-    slam::{Slam, SlamMap, SlamParams},
+    slam::SlamMap,
 };
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point2, SVector, Vector2};
 use vision::{
@@ -84,44 +83,52 @@ impl SurveyedBuilding {
     }
 }
 
-/// Surveys a drive.
-pub fn surveyed(log: &DriveLog, params: &Params) -> anyhow::Result<SurveyedBuilding> {
-    let slam = laser_map(log)?;
-    let (seen, undecodable) = sightings(log, params);
-    let first = log.frames.first().context("a drive without frames")?;
-    let camera = first.frame.intrinsics.context("a frame without intrinsics")?;
-    let mounted = first.frame.mounting.as_ref().context("a frame without a mounting")?;
-    let stated = state_of(&camera, &mounted.robot_from_camera);
+/// Why a drive gives no building.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SurveyError {
+    /// There is nothing to look at.
+    #[error("no frame with intrinsics and the camera's mounting")]
+    NoFrame,
+    /// The estimate cannot be computed.
+    #[error(transparent)]
+    Joint(#[from] JointError),
+    /// The camera as found is not on the robot.
+    #[error("the drive puts the camera off its robot")]
+    Camera,
+}
+
+/// Surveys a drive whose scans made this laser map; its first pose is `origin`.
+pub fn surveyed(
+    drive: &Drive,
+    slam: SlamMap,
+    origin: &Pose2,
+    (params, effort): (&Params, Effort<'_>),
+) -> Result<SurveyedBuilding, SurveyError> {
+    let slam = &beginning_at(slam, origin);
+    let (seen, undecodable) = sightings(drive, params, effort);
+    let camera = drive.frames.first().and_then(|first| first.frame.intrinsics).ok_or(SurveyError::NoFrame)?;
+    let mountings: Vec<CameraExtrinsics> =
+        drive.frames.iter().filter_map(|frame| frame.frame.mounting.clone()).collect();
+    if mountings.len() < drive.frames.len() {
+        return Err(SurveyError::NoFrame);
+    }
+    let stated = state_of(&camera, &mountings[0].robot_from_camera);
     let mut known = Known {
         walls: slam.walls.iter().enumerate().map(|(of, wall)| whole(of, wall)).collect(),
-        frames: by_laser(log, &slam),
-        mountings: log.frames.iter().filter_map(|frame| frame.frame.mounting.clone()).collect(),
+        frames: by_laser(drive, slam),
+        mountings,
         camera,
     };
-    anyhow::ensure!(known.mountings.len() == log.frames.len(), "a frame without a mounting");
     let mut round = 0;
     loop {
         round += 1;
-        let found = objects(log, &seen, &known, params);
-        let map = solved(log, &slam, &found, &camera, &stated)?;
+        let found = objects(drive, &seen, &known, (params, effort));
+        let map = solved(drive, slam, &found, &camera, &stated)?;
         if round == ROUNDS {
-            return Ok(made(log, &slam, found, map, stated, undecodable));
+            return Ok(made(drive, slam, found, map, stated, undecodable));
         }
-        known = corrected(log, &map, &camera, &stated)?;
+        known = corrected(drive, &map, &camera, &stated)?;
     }
-}
-
-fn laser_map(log: &DriveLog) -> anyhow::Result<SlamMap> {
-    let bar = screen::progress(log.scans.len(), "mapping");
-    let mut slam = Slam::new(SlamParams::default());
-    for (i, scan) in log.scans.iter().enumerate() {
-        slam.add(&scan.odom, &scan.scan).with_context(|| format!("scan {i}"))?;
-        bar.inc(1);
-    }
-    bar.set_message("fitting");
-    let map = slam.finish()?;
-    bar.finish_and_clear();
-    Ok(beginning_at(map, &log.origin))
 }
 
 /// The map in a frame where its first pose is `origin`.
@@ -139,13 +146,13 @@ fn whole(of: usize, wall: &LaserSegment) -> MappedWall {
 }
 
 /// The pose of each frame by the laser map: odometry since the scan before.
-fn by_laser(log: &DriveLog, slam: &SlamMap) -> Vec<Pose2> {
-    let pose = |frame: &super::drive_log::LoggedFrame| {
-        let after = log.scans.partition_point(|scan| scan.captured_ns <= frame.frame.captured_ns);
+fn by_laser(drive: &Drive, slam: &SlamMap) -> Vec<Pose2> {
+    let pose = |frame: &DriveFrame| {
+        let after = drive.scans.partition_point(|scan| scan.captured_ns <= frame.frame.captured_ns);
         let scan = after.saturating_sub(1);
-        slam.path[scan].compose(&log.scans[scan].odom.between(&frame.odom))
+        slam.path[scan].compose(&drive.scans[scan].odom.between(&frame.odom))
     };
-    log.frames.iter().map(pose).collect()
+    drive.frames.iter().map(pose).collect()
 }
 
 /// The camera without its lens.
@@ -160,20 +167,17 @@ fn state_of(camera: &Intrinsics, robot_from_camera: &Isometry3<f64>) -> CameraSt
 }
 
 fn solved(
-    log: &DriveLog,
+    drive: &Drive,
     slam: &SlamMap,
     found: &[SeenObject],
     camera: &Intrinsics,
     stated: &CameraState,
-) -> anyhow::Result<JointLaserMap> {
-    let scans_ns: Vec<i64> = log.scans.iter().map(|scan| scan.captured_ns).collect();
-    let frame = |frame: &super::drive_log::LoggedFrame| FrameSeen {
-        captured_ns: frame.frame.captured_ns,
-        odom: frame.odom,
-    };
-    let frames: Vec<FrameSeen> = log.frames.iter().map(frame).collect();
+) -> Result<JointLaserMap, SurveyError> {
+    let scans_ns: Vec<i64> = drive.scans.iter().map(|scan| scan.captured_ns).collect();
+    let frame = |frame: &DriveFrame| FrameSeen { captured_ns: frame.frame.captured_ns, odom: frame.odom };
+    let frames: Vec<FrameSeen> = drive.frames.iter().map(frame).collect();
     let view = |view: &ObjectView| {
-        let mounting = log.frames[view.frame].frame.mounting.as_ref()?;
+        let mounting = drive.frames[view.frame].frame.mounting.as_ref()?;
         Some(QuadView {
             keyframe: view.frame,
             mounting_from_camera: stated.robot_from_camera.inverse() * mounting.robot_from_camera,
@@ -190,28 +194,30 @@ fn solved(
     let [turn, shift] = MOUNTING_SIGMA;
     let (focal, centre) = (intrinsics.focal_px.max(1e-3), intrinsics.center_px.max(1e-3));
     let sigmas = SVector::from([turn, turn, turn, shift, shift, shift, focal, centre, centre, K1_SIGMA]);
-    let drive = LaserDrive { map: slam, scans_ns: &scans_ns, frames: &frames, objects: &objects };
+    let laser = LaserDrive { map: slam, scans_ns: &scans_ns, frames: &frames, objects: &objects };
     let camera = CameraStated { camera: *stated, sigmas: Some(sigmas) };
-    Ok(drive.joint_map(camera, &JointParams::default(), &FuseParams::default())?)
+    Ok(laser.joint_map(camera, &JointParams::default(), &FuseParams::default())?)
 }
 
 /// What the next round starts from.
 fn corrected(
-    log: &DriveLog,
+    drive: &Drive,
     map: &JointLaserMap,
     camera: &Intrinsics,
     stated: &CameraState,
-) -> anyhow::Result<Known> {
+) -> Result<Known, SurveyError> {
     let turned = map.camera.robot_from_camera * stated.robot_from_camera.inverse();
     let sigmas = map.camera_sigmas.fixed_rows::<6>(0);
     let covariance = Matrix6::from_diagonal(&sigmas.component_mul(&sigmas));
-    let mounting = |frame: &super::drive_log::LoggedFrame| {
+    let mounting = |frame: &DriveFrame| {
         let stated = frame.frame.mounting.as_ref()?;
         let made = CameraExtrinsics { robot_from_camera: turned * stated.robot_from_camera, covariance };
         made.check().ok().map(|()| made)
     };
-    let mountings: Vec<CameraExtrinsics> = log.frames.iter().filter_map(mounting).collect();
-    anyhow::ensure!(mountings.len() == log.frames.len(), "the drive puts the camera off its robot");
+    let mountings: Vec<CameraExtrinsics> = drive.frames.iter().filter_map(mounting).collect();
+    if mountings.len() < drive.frames.len() {
+        return Err(SurveyError::Camera);
+    }
     Ok(Known {
         walls: map.walls.clone(),
         frames: map.frames.iter().map(|frame| frame.pose).collect(),
@@ -220,13 +226,19 @@ fn corrected(
     })
 }
 
-/// The intrinsics with a focal length as found; their lens stays.
-pub(super) fn with_focal(camera: &Intrinsics, focal_px: f64) -> Intrinsics {
+impl SurveyedBuilding {
+    /// Intrinsics with the focal length as found; their lens stays.
+    pub fn intrinsics(&self, stated: &Intrinsics) -> Intrinsics {
+        with_focal(stated, self.camera.0.focal_px)
+    }
+}
+
+fn with_focal(camera: &Intrinsics, focal_px: f64) -> Intrinsics {
     Intrinsics { fx_px: focal_px, fy_px: focal_px * camera.fy_px / camera.fx_px, ..*camera }
 }
 
 fn made(
-    log: &DriveLog,
+    drive: &Drive,
     slam: &SlamMap,
     found: Vec<SeenObject>,
     map: JointLaserMap,
@@ -241,11 +253,11 @@ fn made(
         objects.push(SurveyedObject { place: mapped.place, views: seen.views, refused });
     }
     refuse_twins(&mut objects);
-    debug_assert_eq!(map.frames.len(), log.frames.len());
+    debug_assert_eq!(map.frames.len(), drive.frames.len());
     SurveyedBuilding {
         walls: map.walls.into_iter().map(|wall| wall.segment).collect(),
         laser_walls: slam.walls.clone(),
-        laser_frames: by_laser(log, slam),
+        laser_frames: by_laser(drive, slam),
         objects,
         frames: map.frames,
         camera: (map.camera, map.camera_sigmas),

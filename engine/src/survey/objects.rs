@@ -5,10 +5,10 @@
 //! (`map::tracks`), whatever passage they are of. Its views are cut along the border of the first.
 
 use super::{
-    drive_log::DriveLog,
+    drive::Drive,
+    parallel::Effort,
     sightings::{Sighting, picture},
 };
-use crate::parallel::of_each;
 use map::{
     extrinsics::CameraExtrinsics,
     joint::MappedWall,
@@ -31,6 +31,8 @@ use vision::{
 /// How well neighbouring frames are known relative to each other: standard deviations of x and y
 /// (metres) and heading (radians).
 const NEAR_SIGMA: [f64; 3] = [0.02, 0.02, 0.005];
+/// Sightings of an object before its first view: a place on a wall is evidence besides.
+const MIN_SIGHTINGS: u32 = 2;
 /// Fewest views of an object.
 const MIN_VIEWS: usize = 3;
 /// The tracker's name of the camera.
@@ -68,19 +70,20 @@ pub(super) struct Known {
 
 /// Follows objects through the drive.
 pub(super) fn objects(
-    log: &DriveLog,
+    drive: &Drive,
     seen: &[Vec<Sighting>],
     known: &Known,
-    params: &Params,
+    (params, effort): (&Params, Effort<'_>),
 ) -> Vec<SeenObject> {
     let walls: Vec<LaserSegment> = known.walls.iter().map(|wall| wall.segment.clone()).collect();
-    let mut tracker = ViewTracker::new(GatherParams::default());
+    let mut tracker =
+        ViewTracker::new(GatherParams { min_sightings: MIN_SIGHTINGS, ..GatherParams::default() });
     let mut kept: BTreeMap<u32, Kept> = BTreeMap::new();
     for (frame, sightings) in seen.iter().enumerate() {
         let placed: Vec<(QuadObservation, [Matrix2<f64>; 4], (usize, f64))> =
             sightings.iter().filter_map(|sighting| observed(frame, sighting, known, &walls)).collect();
         let quads: Vec<QuadObservation> = placed.iter().map(|(quad, ..)| quad.clone()).collect();
-        let at = (log.frames[frame].frame.captured_ns, CAMERA);
+        let at = (drive.frames[frame].frame.captured_ns, CAMERA);
         let outcomes = tracker.update(at, &quads, |_| false, true, &params.recognise);
         for ((quad, covariance_px2, on_wall), outcome) in placed.into_iter().zip(outcomes) {
             let TrackOutcome::Keep(number) = outcome else { continue };
@@ -92,7 +95,8 @@ pub(super) fn objects(
             object.views.push(ObjectView { frame, corners_px: quad.corners_px, covariance_px2 });
         }
     }
-    along_first_border(log, kept.into_values().filter(|object| object.views.len() >= MIN_VIEWS), params)
+    let objects = kept.into_values().filter(|object| object.views.len() >= MIN_VIEWS);
+    along_first_border(drive, objects, (params, effort))
 }
 
 /// A followed object.
@@ -137,9 +141,9 @@ fn observed(
 /// The objects with every view along the border of the first; views that show something else there
 /// are left out.
 fn along_first_border(
-    log: &DriveLog,
+    drive: &Drive,
     objects: impl Iterator<Item = Kept>,
-    params: &Params,
+    (params, effort): (&Params, Effort<'_>),
 ) -> Vec<SeenObject> {
     let objects: Vec<Kept> = objects.collect();
     let mut by_frame: BTreeMap<usize, Vec<(usize, usize)>> = BTreeMap::new();
@@ -149,8 +153,8 @@ fn along_first_border(
         }
     }
     let by_frame: Vec<(usize, Vec<(usize, usize)>)> = by_frame.into_iter().collect();
-    let cut = of_each(&by_frame, "borders", |_, (frame, views)| {
-        let Ok(picture) = picture(&log.frames[*frame]) else { return Vec::new() };
+    let cut = effort.of_each(&by_frame, "borders", |_, (frame, views)| {
+        let Ok(picture) = picture(&drive.frames[*frame]) else { return Vec::new() };
         let border = |&(object, view): &(usize, usize)| {
             let at = &objects[object].views[view];
             let (corners_px, covariance_px2) = (at.corners_px, at.covariance_px2);

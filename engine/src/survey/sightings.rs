@@ -1,11 +1,13 @@
 //! The quads of a drive's frames. In: the drive. Out: for each frame its full quads, with what they
 //! show.
 
-use super::drive_log::{DriveLog, LoggedFrame};
-use crate::parallel::of_each;
-use client::protos::Rejection;
-use engine::decode::{ImageLimits, decode_frame};
+use super::{
+    drive::{Drive, DriveFrame},
+    parallel::Effort,
+};
+use crate::frame::decode::{ImageLimits, decode_frame};
 use nalgebra::{Matrix2, Point2};
+use protos::Rejection;
 use std::collections::BTreeMap;
 use vision::{
     detect::{Quad, QuadKind},
@@ -36,18 +38,18 @@ pub(super) struct Sighting {
 }
 
 /// Sightings of each frame; none of one that cannot be decoded. Also how many of these there are.
-pub(super) fn sightings(log: &DriveLog, params: &Params) -> (Vec<Vec<Sighting>>, usize) {
-    let seen = of_each(&log.frames, "looking", |_, frame| of_frame(frame, params));
+pub(super) fn sightings(drive: &Drive, params: &Params, effort: Effort<'_>) -> (Vec<Vec<Sighting>>, usize) {
+    let seen = effort.of_each(&drive.frames, "looking", |_, frame| of_frame(frame, params));
     let lost = seen.iter().filter(|seen| seen.is_err()).count();
     (seen.into_iter().map(Result::unwrap_or_default).collect(), lost)
 }
 
-/// The picture of a frame.
-pub(super) fn picture(frame: &LoggedFrame) -> Result<Picture, Rejection> {
+/// The picture of a frame. Errors: it is too large, or cannot be decoded.
+pub fn picture(frame: &DriveFrame) -> Result<Picture, Rejection> {
     decode_frame(&frame.frame, ImageLimits::UPLOAD)
 }
 
-fn of_frame(frame: &LoggedFrame, params: &Params) -> Result<Vec<Sighting>, Rejection> {
+fn of_frame(frame: &DriveFrame, params: &Params) -> Result<Vec<Sighting>, Rejection> {
     let picture = picture(frame)?;
     let mounting = frame.frame.mounting.as_ref();
     let camera = FrameCamera {

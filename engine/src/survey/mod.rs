@@ -1,0 +1,21 @@
+//! The map of a building from one drive: walls, objects and camera in one estimate (method 29.4).
+//!
+//! ```text
+//! drive (scans' odometry, frames) -> sightings (quads of frames) -> objects (quads of one object)
+//!     -> building (walls, objects, camera)
+//! ```
+//!
+//! In: a drive with its finished laser map. Out: walls, objects with places and views, the camera
+//! as found. Commands read a drive of a file; the server's mappings make it of messages.
+
+mod parallel;
+mod drive;
+mod sightings;
+mod objects;
+mod building;
+
+pub use building::{SurveyError, SurveyedBuilding, SurveyedObject, surveyed};
+pub use drive::{Drive, DriveBounds, DriveFrame, DriveReading, OF_FILE, ScanStamp, WHILE_DRIVING};
+pub use objects::ObjectView;
+pub use parallel::Effort;
+pub use sightings::picture;
