@@ -14,7 +14,7 @@ const SERVER: &[&str] = &["--server", "--token", "--json"];
 const MAP: &[&str] = &["--map", "--server", "--token", "--json"];
 
 /// Options that each command must name in its help, beside those of its group.
-const OPTIONS: [(&str, &[&str], &[&str]); 65] = [
+const OPTIONS: [(&str, &[&str], &[&str]); 66] = [
     ("", &[], &["--log", "--version", "Exit status"]),
     ("demo", &[], &["--robots", "--rate-hz", "--legs", "--seed", "--http", "--data", "--stay", "--json"]),
     ("sample", &[], &["<FOLDER>"]),
@@ -143,6 +143,22 @@ const OPTIONS: [(&str, &[&str], &[&str]); 65] = [
     ("landmark size", MAP, &["<LANDMARK>", "<SIZE>", "--yes"]),
     ("landmark rename", MAP, &["<LANDMARK>", "<NEW_NAME>"]),
     ("landmark health", MAP, &["<LANDMARK>", "quarantined"]),
+    (
+        "landmark learning",
+        MAP,
+        &[
+            "<LANDMARK>",
+            "--weights",
+            "--min-views",
+            "--min-saliency-f",
+            "--min-stable-points",
+            "--min-visibility-confidence",
+            "--refuse-one-side",
+            "--use-despite-gates",
+            "--defaults",
+            "--why",
+        ],
+    ),
     ("landmark delete", MAP, &["<LANDMARKS>", "--yes"]),
     ("landmark accept", MAP, &["<GATHERING>", "<NUMBER[=NAME]>"]),
     ("view list", MAP, &["<LANDMARK>"]),
