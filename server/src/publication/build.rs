@@ -206,8 +206,8 @@ fn visibility(
 
 type Models = (BTreeMap<LandmarkId, StoredModel>, BTreeMap<LandmarkId, String>);
 
-/// Models of a map, read only where the digest is not that of the previous snapshot; and those that
-/// must not be used.
+/// Models of a map, read only where the previous snapshot has not the same by the same rules; and
+/// those that must not be used.
 async fn models(
     conn: &mut SqliteConnection,
     (map_id, landmarks): (i64, &BTreeMap<LandmarkId, LandmarkInfo>),
@@ -216,6 +216,7 @@ async fn models(
     panics: &Panics,
 ) -> Result<Models, StoreError> {
     let (mut learnt, mut unusable) = Models::default();
+    let before = before.filter(|map| *map.params == *params);
     for (id, digest) in models::digests(&mut *conn, map_id).await? {
         let rules = landmarks.get(&id).map(|l| l.rules).unwrap_or_default();
         let same = before.and_then(|map| map.learnt.get(&id));

@@ -2,9 +2,22 @@
 
 use super::*;
 use crate::{publication::build, store::history};
-use engine::snapshot::{MapSnapshot, Snapshots};
+use engine::snapshot::{MapSnapshot, Snapshots, StoredModel};
 use map::landmark_health::LandmarkHealth;
-use vision::{params::preset::Preset, pose::LandmarkSize};
+use vision::{
+    model::{
+        landmark_model::{GateFailure, ModelStatus},
+        threshold::Threshold,
+    },
+    params::preset::Preset,
+    pose::LandmarkSize,
+};
+
+/// Thresholds and gates of every model.
+fn models(map: &MapSnapshot) -> Vec<(ModelStatus, Vec<GateFailure>, Threshold)> {
+    let of = |l: &StoredModel| (l.model.status.clone(), l.model.waived.clone(), l.model.hausdorff);
+    map.learnt.values().map(of).collect()
+}
 
 /// The map as it is built without a version before it.
 async fn from_nothing(store: &Catalogue, config: &Config, map: &MapSnapshot) -> MapSnapshot {
@@ -76,6 +89,8 @@ async fn a_maps_preset_goes_over_the_servers_settings() {
     assert_eq!((&*own.params, own.distance), (&Preset::Paper.over(&config.params), paper.distance));
     assert_eq!((own.version, own.learnt.len()), (before.version + 1, before.learnt.len()));
     assert!(own.params.detect.edges == before.params.detect.edges && own.unusable_models.is_empty());
+    assert_eq!(models(&own), models(&from_nothing(&store, &config, &own).await));
+    assert_ne!(models(&own), models(&before), "the preset refuses what is seen from one side");
     // Nothing changes, so there is no new version.
     store.write(move |tx| Box::pin(maps::set_pipeline(tx, "a", move |_| paper))).await.unwrap();
     assert_eq!(of(&store).version, own.version);
