@@ -1,6 +1,6 @@
-//! Claim: detection and recognition (E1, E3 to E8) are no worse than they were, by small runs of the
-//! commands that measure them. Beside each bound is what was measured with it: the margin, mostly
-//! 5 to 20 %, is more than rounding and less than a real loss.
+//! Claim: detection and recognition (E1, E3 to E8) are no worse than they were, by small runs of
+//! the commands that measure them. Beside each bound is what was measured with it: the margin,
+//! mostly 5 to 20 %, is more than rounding and less than a real loss.
 
 use crate::lab;
 use serde_json::Value;
