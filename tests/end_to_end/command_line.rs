@@ -14,7 +14,7 @@ const SERVER: &[&str] = &["--server", "--token", "--json"];
 const MAP: &[&str] = &["--map", "--server", "--token", "--json"];
 
 /// Options that each command must name in its help, beside those of its group.
-const OPTIONS: [(&str, &[&str], &[&str]); 66] = [
+const OPTIONS: [(&str, &[&str], &[&str]); 67] = [
     ("", &[], &["--log", "--version", "Exit status"]),
     ("demo", &[], &["--robots", "--rate-hz", "--legs", "--seed", "--http", "--data", "--stay", "--json"]),
     ("sample", &[], &["<FOLDER>"]),
@@ -80,6 +80,7 @@ const OPTIONS: [(&str, &[&str], &[&str]); 66] = [
         SERVER,
         &["--image", "--focal-px", "--camera-height-m", "--tilt-deg", "--pan-deg", "--defaults", "<MAP>"],
     ),
+    ("map learning", SERVER, &["<MAP>", "--weights", "--use-despite-gates", "--defaults", "--why"]),
     ("map fusion", SERVER, &["<MAP>", "[MODE]", "near_best"]),
     ("map delete", SERVER, &["<MAP>", "--yes"]),
     (

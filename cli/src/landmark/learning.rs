@@ -21,7 +21,7 @@ pub(super) async fn run(session: &Session, map: &str, args: &Args) -> anyhow::Re
     let landmark = session.maps().landmark(map, name).await?;
     let Some(why) = &args.settings.why else {
         let own = landmark.learning.as_ref().map(learning_settings::text);
-        let told = own.unwrap_or_else(|| "weights and gates as the server has them".to_owned());
+        let told = own.unwrap_or_else(|| "weights and gates as the map has them".to_owned());
         return session.show(&landmark, &format!("{name}: {told}"));
     };
     let learning = args.settings.over(landmark.learning, why);

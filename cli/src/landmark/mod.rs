@@ -92,12 +92,12 @@ enum Verb {
         #[arg(value_enum)]
         health: HealthWord,
     },
-    /// Show or set weights and gates of a landmark, where others than the server's are wanted
+    /// Show or set weights and gates of a landmark, where others than the map's are wanted
     ///
     /// A landmark that failed a gate is not in use. Where you know better, say so and why; the
-    /// gates are judged again at once, and lessons keep to it. For example, a scan in plain
-    /// colours that nothing else resembles, a stricter threshold, and back to the server's
-    /// settings:
+    /// gates are judged again at once, and lessons keep to it. For example, a scan in plain colours
+    /// that nothing else resembles, a stricter threshold, and back to the settings of `waymark map
+    /// learning`:
     ///   waymark landmark learning poster --use-despite-gates true --why "nothing else hangs there"
     ///   waymark landmark learning poster --weights 20:1 --why "the next door looks like it"
     ///   waymark landmark learning poster --defaults --why "taught anew"

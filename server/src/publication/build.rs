@@ -47,7 +47,8 @@ pub(super) async fn snapshot(
     #[cfg(test)]
     tests::planted(&head.name);
     let MapPipeline { preset, distance } = head.pipeline;
-    let params = preset.map_or_else(|| params.clone(), |preset| Arc::new(preset.over(params)));
+    let params = preset.map_or_else(|| (**params).clone(), |preset| preset.over(params));
+    let params = Arc::new(learning_rules::rules(head.learning.as_deref()).over(&params));
     let (learnt, unusable_models) = models(conn, (id, &landmarks), before, &params, panics).await?;
     for (id, reason) in &unusable_models {
         let landmark = landmarks.get(id).map_or("", |l: &LandmarkInfo| l.name.as_str());
