@@ -11,6 +11,8 @@ CREATE TABLE maps (
     -- Which detector and decision; NULL: as the server's settings say.
     preset            TEXT    CHECK (preset IN ('default', 'paper')),
     distance          TEXT    NOT NULL CHECK (distance IN ('both', 'correlation', 'hausdorff')),
+    -- JSON: weights and gates of its own, with the reason; NULL: those of the server.
+    learning          TEXT    CHECK (length(learning) <= 1024),
     created_ms        INTEGER NOT NULL,
     -- Revisions (see 0008_history.sql): of the map and of all that is in it, when that changed last, and of the floor plan.
     revision          INTEGER NOT NULL DEFAULT 1 CHECK (revision >= 1),

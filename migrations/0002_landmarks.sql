@@ -39,7 +39,7 @@ CREATE TABLE landmarks (
     -- not a table, because only the present health is acted on.
     health           TEXT    NOT NULL DEFAULT 'sound' CHECK (health IN ('sound', 'flagged', 'quarantined')),
     finding          TEXT,
-    -- JSON: weights and gates of its own, with the reason; NULL: those of the server.
+    -- JSON: weights and gates of its own, with the reason; NULL: those of the map.
     learning         TEXT    CHECK (length(learning) <= 1024),
     created_ms       INTEGER NOT NULL,
     -- Of name, size, place, views, learning and model. A person's word on the health comes with an update of size and place.

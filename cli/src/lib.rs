@@ -20,6 +20,7 @@ mod history;
 mod identity;
 mod job;
 mod landmark;
+mod learning_settings;
 pub mod map;
 mod names;
 mod notify;

@@ -1,5 +1,5 @@
-//! Weights and gates of one landmark: as the API has them, as text for the store, as rules for
-//! `vision`.
+//! Weights and gates of a map or of one landmark: as the API has them, as text for the store, as
+//! rules for `vision`.
 
 use crate::label::check_label;
 use protos::api::LearningSettings;
@@ -42,7 +42,7 @@ pub(crate) fn rules(text: Option<&str>) -> LearnRules {
         min_stable_points: of.min_stable_points,
         min_v_c: of.min_visibility_confidence,
         refuse_one_side: of.refuse_one_side,
-        use_despite_gates: of.use_despite_gates.unwrap_or_default(),
+        use_despite_gates: of.use_despite_gates,
     }
 }
 
@@ -67,7 +67,10 @@ mod tests {
         assert!(stored.chars().count() <= 1024, "{}", stored.chars().count());
         assert_eq!(shown(Some(&stored)).as_ref(), Some(&long));
         let own = rules(Some(&stored));
-        assert_eq!((own.min_views, own.min_v_c, own.use_despite_gates), (Some(200), Some(10.0 / 3.0), true));
+        assert_eq!(
+            (own.min_views, own.min_v_c, own.use_despite_gates),
+            (Some(200), Some(10.0 / 3.0), Some(true))
+        );
         for none in [None, Some(""), Some("{\"reason\":\"x\",\"other\":1}")] {
             assert_eq!(rules(none), LearnRules::default(), "{none:?}");
         }

@@ -246,6 +246,10 @@ async fn a_landmark_is_taught_changed_and_deleted() {
     assert_eq!(desk.done("landmark list").lines().count(), 2);
     place(&desk).await;
     assert!(desk.done("landmark health first quarantined").contains("health  quarantined"));
+    let own = desk.done("map learning office --min-views 4 --why few");
+    assert_eq!(own, "office: --min-views 4, because: few\n");
+    let own = desk.done("landmark learning first --min-views 5 --why few");
+    assert!(own.contains("own     --min-views 5, because: few"), "{own}");
     let icon = desk.path("icon.png");
     desk.done(&format!("view show first 1 --out {icon}"));
     assert!(image::open(&icon).is_ok());

@@ -14,7 +14,7 @@ const SERVER: &[&str] = &["--server", "--token", "--json"];
 const MAP: &[&str] = &["--map", "--server", "--token", "--json"];
 
 /// Options that each command must name in its help, beside those of its group.
-const OPTIONS: [(&str, &[&str], &[&str]); 66] = [
+const OPTIONS: [(&str, &[&str], &[&str]); 68] = [
     ("", &[], &["--log", "--version", "Exit status"]),
     (
         "demo",
@@ -85,6 +85,7 @@ const OPTIONS: [(&str, &[&str], &[&str]); 66] = [
         SERVER,
         &["--image", "--focal-px", "--camera-height-m", "--tilt-deg", "--pan-deg", "--defaults", "<MAP>"],
     ),
+    ("map learning", SERVER, &["<MAP>", "--weights", "--use-despite-gates", "--defaults", "--why"]),
     ("map fusion", SERVER, &["<MAP>", "[MODE]", "near_best"]),
     ("map delete", SERVER, &["<MAP>", "--yes"]),
     (
@@ -148,6 +149,22 @@ const OPTIONS: [(&str, &[&str], &[&str]); 66] = [
     ("landmark size", MAP, &["<LANDMARK>", "<SIZE>", "--yes"]),
     ("landmark rename", MAP, &["<LANDMARK>", "<NEW_NAME>"]),
     ("landmark health", MAP, &["<LANDMARK>", "quarantined"]),
+    (
+        "landmark learning",
+        MAP,
+        &[
+            "<LANDMARK>",
+            "--weights",
+            "--min-views",
+            "--min-saliency-f",
+            "--min-stable-points",
+            "--min-visibility-confidence",
+            "--refuse-one-side",
+            "--use-despite-gates",
+            "--defaults",
+            "--why",
+        ],
+    ),
     ("landmark delete", MAP, &["<LANDMARKS>", "--yes"]),
     ("landmark accept", MAP, &["<GATHERING>", "<NUMBER[=NAME]>"]),
     ("view list", MAP, &["<LANDMARK>"]),

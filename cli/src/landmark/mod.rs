@@ -2,6 +2,7 @@
 
 mod accept;
 mod edit;
+mod learning;
 mod photograph;
 mod place;
 mod quad_choice;
@@ -91,6 +92,17 @@ enum Verb {
         #[arg(value_enum)]
         health: HealthWord,
     },
+    /// Show or set weights and gates of a landmark, where others than the map's are wanted
+    ///
+    /// A landmark that failed a gate is not in use. Where you know better, say so and why; the
+    /// gates are judged again at once, and lessons keep to it. For example, a scan in plain colours
+    /// that nothing else resembles, a stricter threshold, and back to the settings of `waymark map
+    /// learning`:
+    ///   waymark landmark learning poster --use-despite-gates true --why "nothing else hangs there"
+    ///   waymark landmark learning poster --weights 20:1 --why "the next door looks like it"
+    ///   waymark landmark learning poster --defaults --why "taught anew"
+    #[command(verbatim_doc_comment)]
+    Learning(learning::Args),
     /// Delete a landmark with its views and model; `waymark history undo` brings all of it back.
     Delete {
         /// The landmarks.
@@ -142,6 +154,7 @@ pub(crate) async fn run(args: &Args) -> anyhow::Result<()> {
             Verb::Health { landmark, health } => {
                 edit::health(&session, map, landmark, (*health).into()).await
             }
+            Verb::Learning(learning) => learning::run(&session, map, learning).await,
             Verb::Delete { landmarks, consent } => edit::delete(&session, map, landmarks, *consent).await,
             Verb::Accept(accept) => accept::run(&session, map, accept).await,
         }

@@ -2,6 +2,7 @@
 
 use super::{HealthWord, reasons};
 use crate::{
+    learning_settings,
     screen::{Table, counted},
     session::Session,
 };
@@ -135,6 +136,7 @@ pub(super) fn facts(landmark: &Landmark) -> String {
             counted(model.generated_views, "generated view")
         ));
     }
+    lines.extend(landmark.learning.as_ref().map(|own| format!("  own     {}", learning_settings::text(own))));
     lines.extend(aspect_text(landmark).map(|text| format!("  caution {text}")));
     lines.join("\n")
 }

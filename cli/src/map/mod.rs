@@ -7,6 +7,7 @@ mod difference;
 mod export;
 mod fusion;
 mod import;
+mod learning;
 mod location;
 mod underlay;
 mod visibility;
@@ -110,6 +111,13 @@ enum Verb {
     /// Show or set the fusion mode of a map: what is fused where reference runs know the best
     /// modality.
     Fusion(fusion::FusionArgs),
+    /// Show or set weights and gates of a map, where others than the server's are wanted
+    ///
+    /// What a landmark sets of its own goes before. For example, few wrong names before many right
+    /// ones, in a house of equal doors:
+    ///   waymark map learning office --weights 20:1 --why "doors look alike here"
+    #[command(verbatim_doc_comment)]
+    Learning(learning::Args),
     /// Give a map another name; no robot may be on it.
     Rename {
         /// The map.
@@ -220,6 +228,7 @@ pub(crate) async fn run(args: &Args) -> anyhow::Result<()> {
         Verb::Build(args) => build::run(args).await,
         Verb::Import(args) => import::run(args).await,
         Verb::Export(args) => export::run(args).await,
+        Verb::Learning(args) => learning::run(args).await,
         Verb::Fusion(args) => fusion::run(args).await,
         Verb::Save(args) => bundle::save(args).await,
         Verb::Load(args) => bundle::load(args).await,
@@ -343,6 +352,7 @@ async fn show(session: &Session, name: &str) -> anyhow::Result<()> {
         format!("  landmarks  {}, {active} active, {placed} of these with size and place", landmarks.len()),
         format!("  walls      {}, {length_m:.1} m", counted(walls.segments.len() as u64, "segment")),
         format!("  pipeline   {}", pipeline(&map)),
+        format!("  learning   {}", learning::text(&map)),
     ];
     session.show(&map, &text.join("\n"))?;
     if active > placed {

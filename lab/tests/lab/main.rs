@@ -2,6 +2,7 @@
 
 mod command_line;
 mod evaluate;
+mod floors;
 mod outside;
 mod plot;
 mod real_pictures;

@@ -2,6 +2,7 @@
 //! contradictions, bounds.
 
 mod corridor_drive;
+mod gate;
 mod laser_drive;
 mod odometry;
 mod replay;

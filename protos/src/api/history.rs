@@ -53,7 +53,7 @@ pub struct ChangeSummary {
     /// Reference runs that are gone.
     pub reference_runs_removed: u64,
     /// Which settings differ: `name`, `site`, `building`, `floor`, `parent`, `pipeline`
-    /// (detector or decision), `fusion_mode`, `areas`, `visibility_settings`.
+    /// (detector or decision), `learning`, `fusion_mode`, `areas`, `visibility_settings`.
     pub settings: Vec<String>,
     /// Names of the first landmarks that differ, at most 8.
     pub landmarks: Vec<String>,

@@ -170,8 +170,8 @@ pub struct LandmarkModelBody {
     pub facts: serde_json::Map<String, Value>,
 }
 
-/// Weights and gates of one landmark, where a person wants others than the server has. What is
-/// absent is as there.
+/// Weights and gates of a map or of one landmark, where a person wants others than the server has.
+/// What is absent of a landmark is as the map has it, and of a map as the server has it.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]

@@ -1,5 +1,6 @@
 //! `/maps`: maps, where they are, and how they lie to each other.
 
+use super::landmarks::LearningSettings;
 use serde::{Deserialize, Serialize};
 use vision::{params::preset::Preset, recognise::DistanceKind};
 
@@ -89,6 +90,9 @@ pub struct Map {
     pub preset: Option<PipelinePreset>,
     /// Which distance decides.
     pub distance: Distance,
+    /// Weights and gates of its landmarks, if a person has set some.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub learning: Option<LearningSettings>,
     /// The map that it is a draft of.
     #[serde(default)]
     pub draft_of: Option<String>,
@@ -193,6 +197,14 @@ pub struct MapPatch {
     /// Which distance decides; absent where `preset` changes: that of the preset.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub distance: Option<Distance>,
+    /// Weights and gates of its landmarks; what a landmark sets of its own goes before.
+    #[serde(
+        default,
+        deserialize_with = "super::patch::null_or_value",
+        skip_serializing_if = "Option::is_none"
+    )]
+    #[cfg_attr(feature = "openapi", schema(value_type = Option<LearningSettings>))]
+    pub learning: Option<Option<LearningSettings>>,
     /// The site it belongs to, in words: 1 to 64 characters.
     #[serde(
         default,

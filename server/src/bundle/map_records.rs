@@ -4,6 +4,7 @@
 use super::{BundleError, MAP, MODALITIES, UNDERLAY, VISIBILITY, WALLS, invalid};
 use crate::{
     label::check_label,
+    learning_rules,
     store::{
         contents::{MapSettings, RunContents},
         map_locations::MapLocation,
@@ -21,7 +22,10 @@ use map::{
     visibility::VisibilitySettings,
 };
 use nalgebra::Matrix3;
-use protos::{Name, api::Parent};
+use protos::{
+    Name,
+    api::{LearningSettings, Parent},
+};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use std::f64::consts::TAU;
@@ -42,6 +46,9 @@ pub(super) struct MapRecord {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     preset: Option<Preset>,
     distance: DistanceKind,
+    /// Absent: none of its own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    learning: Option<LearningSettings>,
     site: Option<String>,
     building: Option<String>,
     floor: Option<String>,
@@ -112,7 +119,7 @@ pub(super) fn picture_file(sha256: &[u8], kind: &str) -> String {
 }
 
 impl MapRecord {
-    pub(super) fn of(settings: &MapSettings) -> Self {
+    pub(super) fn of(settings: &MapSettings) -> Result<Self, serde_json::Error> {
         let MapLocation { site, building, floor, link } = settings.location.clone();
         let parent = link.map(|link| Parent {
             map: link.parent,
@@ -123,18 +130,21 @@ impl MapRecord {
             covariance: Some(std::array::from_fn(|i| link.parent_from_map.covariance[(i / 3, i % 3)])),
         });
         let MapPipeline { preset, distance } = settings.pipeline;
-        Self { preset, distance, site, building, floor, parent }
+        let learning = settings.learning.as_deref().map(parsed).transpose()?;
+        Ok(Self { preset, distance, learning, site, building, floor, parent })
     }
 
-    /// Pipeline and location, checked.
-    pub(super) fn checked(self) -> Result<(MapPipeline, MapLocation), BundleError> {
+    /// Pipeline, weights and gates as text, and location, checked.
+    pub(super) fn checked(self) -> Result<(MapPipeline, Option<String>, MapLocation), BundleError> {
         for (field, word) in [("site", &self.site), ("building", &self.building), ("floor", &self.floor)] {
             let Some(text) = word else { continue };
             check_label(text, MAX_WORD).map_err(|e| invalid(MAP, field, e))?;
         }
         let link = self.parent.map(link_of).transpose()?;
+        let learning = self.learning.map(|own| learning_rules::text(&own)).transpose();
+        let learning = learning.map_err(|(field, why)| invalid(MAP, format!("learning.{field}"), why))?;
         let Self { preset, distance, site, building, floor, .. } = self;
-        Ok((MapPipeline { preset, distance }, MapLocation { site, building, floor, link }))
+        Ok((MapPipeline { preset, distance }, learning, MapLocation { site, building, floor, link }))
     }
 }
 

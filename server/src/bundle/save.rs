@@ -77,7 +77,7 @@ fn write(
     });
     record(&mut out, LANDMARKS_GEOJSON, &landmark_points(points))?;
     record(&mut out, LANDMARKS, &landmarks)?;
-    record(&mut out, MAP, &MapRecord::of(&map.settings))?;
+    record(&mut out, MAP, &MapRecord::of(&map.settings).map_err(damaged("the map"))?)?;
     let modalities = ModalitiesRecord::of(&map.settings, &map.reference_runs);
     record(&mut out, MODALITIES, &modalities.map_err(damaged("modalities"))?)?;
     for (number, model) in &models {

@@ -186,6 +186,7 @@ async fn a_sealed_bundle_with_a_wrong_file_is_refused_by_its_name() {
         (renamed("map.json", "other.json"), (Fault::Missing, "map.json")),
         (renamed("landmarks.geojson", "extra.geojson"), (Fault::BadPath, "extra.geojson")),
         (text("map.json", "\"correlation\"", "\"other\""), (Fault::InvalidValue, "map.json: distance")),
+        (text("map.json", "hung by us", ""), (Fault::InvalidValue, "map.json: learning.reason")),
         (text("landmarks.json", "\"p1\"", "\"P 1\""), (Fault::InvalidValue, "landmarks.json: [0].name")),
         (
             text("landmarks.json", "\"number\": 2", "\"number\": 3"),

@@ -81,7 +81,7 @@ struct Opened<'a> {
 
 impl Opened<'_> {
     fn contents(&mut self) -> Result<MapContents, BundleError> {
-        let (pipeline, location) = self.record::<MapRecord>(MAP)?.checked()?;
+        let (pipeline, learning, location) = self.record::<MapRecord>(MAP)?.checked()?;
         let (fusion_mode, areas, reference_runs) = self.record::<ModalitiesRecord>(MODALITIES)?.checked()?;
         let visibility = visibility_text(self.record::<Option<VisibilitySettings>>(VISIBILITY)?)?;
         let walls = self.record::<WallsRecord>(WALLS)?.checked()?;
@@ -90,7 +90,7 @@ impl Opened<'_> {
             Some(record) => Some(record.checked(|file, size_px| self.picture(file, size_px))?),
         };
         Ok(MapContents {
-            settings: MapSettings { pipeline, location, fusion_mode, areas, visibility },
+            settings: MapSettings { pipeline, learning, location, fusion_mode, areas, visibility },
             landmarks: self.landmarks()?,
             distractors: self.distractors()?,
             walls,

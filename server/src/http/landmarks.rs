@@ -331,7 +331,7 @@ async fn patch(
 }
 
 /// Weights and gates as they are stored, and their reason. Errors: `out_of_range`, `invalid_value`.
-fn learning_text(own: LearningSettings) -> Result<(String, String), ApiError> {
+pub(super) fn learning_text(own: LearningSettings) -> Result<(String, String), ApiError> {
     let text = learning_rules::text(&own).map_err(|(field, why)| {
         let code = if field == "reason" { "invalid_value" } else { "out_of_range" };
         ApiError::invalid(code, format!("learning.{field}"), why)

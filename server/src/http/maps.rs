@@ -6,10 +6,12 @@ use super::{
     authorise::check_map,
     error::{ApiError, out_of_range},
     extract::{Body, PathParams, QueryParams, label, name},
+    landmarks::learning_text,
     revision::{IfMatch, Revised},
 };
 use crate::{
     identity::Principal,
+    learning_rules,
     store::{
         contents::{self, Written},
         drafts::MAX_DRAFTS,
@@ -77,6 +79,7 @@ pub(super) fn map_shown(row: MapRow, found: MapLocation, principal: &Principal) 
         has_underlay: row.has_underlay,
         preset: row.pipeline.preset.map(Into::into),
         distance: row.pipeline.distance.into(),
+        learning: learning_rules::shown(row.learning.as_deref()),
         draft_of: row.draft_of,
         parent: link.as_ref().map(parent_shown),
         site: found.site,
@@ -185,7 +188,7 @@ async fn get(
     Ok(Revised(row.revision.clone(), map_shown(row, found, &principal)))
 }
 
-/// Changes a map's name, preset, distance, site, building, floor or position.
+/// Changes a map's name, preset, distance, weights and gates, site, building, floor or position.
 #[utoipa::path(patch, path = "/maps/{map}", operation_id = "updateMap",
     tag = "maps", params(("map" = String, Path)), request_body = MapPatch,
     responses((status = 200, body = Map), (status = 404, body = Problem),
@@ -204,6 +207,7 @@ async fn patch(
     let (site, building) = (changed("site", changes.site)?, changed("building", changes.building)?);
     let floor = changed("floor", changes.floor)?;
     let parent = changes.parent.map(|parent| parent.map(link).transpose()).transpose()?;
+    let learning = changes.learning.map(|own| own.map(learning_text).transpose()).transpose()?;
     maps::get(app.store.reads(), &map).await?;
     let server = app.config.preset;
     let repiped = move |old: MapPipeline| match (changes.preset, changes.distance) {
@@ -225,6 +229,10 @@ async fn patch(
             })
             .await?;
             maps::set_pipeline(tx, &map, repiped).await?;
+            if let Some(own) = learning {
+                let (text, reason) = own.unzip();
+                maps::set_learning(tx, &map, text.as_deref(), reason).await?;
+            }
             let now = new_name.as_ref().map_or(map.as_str(), protos::Name::as_str);
             maps::rename(tx, &map, now).await?;
             Ok((maps::of(tx, now).await?, found))

@@ -47,7 +47,8 @@ pub(super) async fn snapshot(
     #[cfg(test)]
     tests::planted(&head.name);
     let MapPipeline { preset, distance } = head.pipeline;
-    let params = preset.map_or_else(|| params.clone(), |preset| Arc::new(preset.over(params)));
+    let params = preset.map_or_else(|| (**params).clone(), |preset| preset.over(params));
+    let params = Arc::new(learning_rules::rules(head.learning.as_deref()).over(&params));
     let (learnt, unusable_models) = models(conn, (id, &landmarks), before, &params, panics).await?;
     for (id, reason) in &unusable_models {
         let landmark = landmarks.get(id).map_or("", |l: &LandmarkInfo| l.name.as_str());
@@ -206,8 +207,8 @@ fn visibility(
 
 type Models = (BTreeMap<LandmarkId, StoredModel>, BTreeMap<LandmarkId, String>);
 
-/// Models of a map, read only where the digest is not that of the previous snapshot; and those that
-/// must not be used.
+/// Models of a map, read only where the previous snapshot has not the same by the same rules; and
+/// those that must not be used.
 async fn models(
     conn: &mut SqliteConnection,
     (map_id, landmarks): (i64, &BTreeMap<LandmarkId, LandmarkInfo>),
@@ -216,6 +217,7 @@ async fn models(
     panics: &Panics,
 ) -> Result<Models, StoreError> {
     let (mut learnt, mut unusable) = Models::default();
+    let before = before.filter(|map| *map.params == *params);
     for (id, digest) in models::digests(&mut *conn, map_id).await? {
         let rules = landmarks.get(&id).map(|l| l.rules).unwrap_or_default();
         let same = before.and_then(|map| map.learnt.get(&id));

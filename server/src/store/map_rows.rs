@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 use vision::model::LandmarkId;
 
 statements! {
-    MAP = "SELECT name, version, draft_of IS NOT NULL AS is_draft, preset, distance, sight, walls_version FROM maps WHERE id = ?1";
+    MAP = "SELECT name, version, draft_of IS NOT NULL AS is_draft, preset, distance, learning, sight, walls_version FROM maps WHERE id = ?1";
     NAME = "SELECT name FROM maps WHERE id = ?1";
     MAP_IDS = "SELECT id FROM maps ORDER BY id";
     ROWS = "SELECT coalesce(group_concat(id || ' ' || revision || ' ' || changed_ms || ' ' || health, ';'), '') \
@@ -29,6 +29,8 @@ pub(crate) struct MapHead {
     pub(crate) version: u64,
     pub(crate) is_draft: bool,
     pub(crate) pipeline: MapPipeline,
+    /// JSON of its own weights and gates.
+    pub(crate) learning: Option<String>,
     /// Camera and limits of its visibility areas.
     pub(crate) visibility_settings: VisibilitySettings,
     /// Counts up whenever the walls are replaced.
@@ -78,6 +80,7 @@ pub(crate) async fn head(conn: &mut SqliteConnection, id: i64) -> Result<Option<
         version: row.try_get::<i64, _>("version").map_err(at())? as u64,
         is_draft: row.try_get("is_draft").map_err(at())?,
         pipeline: MapPipeline::read(&row).map_err(at())?,
+        learning: row.try_get("learning").map_err(at())?,
         visibility_settings: visibility_settings::read(
             &name,
             row.try_get::<Option<&str>, _>("sight").map_err(at())?,

@@ -8,12 +8,13 @@ statements! {
     // Drafts are no further maps.
     COUNT = "SELECT count(*) FROM maps WHERE draft_of IS NULL";
     INSERT = "INSERT INTO maps (name, preset, distance, created_ms) VALUES (?1, ?2, ?3, ?4) RETURNING id";
+    SET_LEARNING = "UPDATE maps SET learning = ?2 WHERE id = ?1";
     SET_PIPELINE = "UPDATE maps SET preset = ?2, distance = ?3, version = version + 1 WHERE id = ?1";
-    GET = "SELECT id, name, version, id || '.' || revision AS revision, changed_ms, preset, distance, \
+    GET = "SELECT id, name, version, id || '.' || revision AS revision, changed_ms, preset, distance, learning, \
            (SELECT o.name FROM maps o WHERE o.id = maps.draft_of) AS draft_of, (SELECT count(*) FROM landmarks WHERE map_id = maps.id) AS landmarks, \
            EXISTS (SELECT 1 FROM underlays WHERE map_id = maps.id) AS has_underlay \
            FROM maps WHERE name = ?1";
-    PAGE = "SELECT id, name, version, id || '.' || revision AS revision, changed_ms, preset, distance, \
+    PAGE = "SELECT id, name, version, id || '.' || revision AS revision, changed_ms, preset, distance, learning, \
            (SELECT o.name FROM maps o WHERE o.id = maps.draft_of) AS draft_of, (SELECT count(*) FROM landmarks WHERE map_id = maps.id) AS landmarks, \
            EXISTS (SELECT 1 FROM underlays WHERE map_id = maps.id) AS has_underlay \
             FROM maps WHERE name > ?1 ORDER BY name LIMIT ?2";
@@ -41,6 +42,8 @@ pub(crate) struct MapRow {
     /// When the revision changed last.
     pub(crate) changed_ms: i64,
     pub(crate) pipeline: MapPipeline,
+    /// JSON of its own weights and gates.
+    pub(crate) learning: Option<String>,
     /// The map that it is a draft of.
     pub(crate) draft_of: Option<String>,
     /// How many landmarks it has.
@@ -85,6 +88,7 @@ fn map_row(row: &SqliteRow) -> Result<MapRow, sqlx::Error> {
         revision: row.try_get("revision")?,
         changed_ms: row.try_get("changed_ms")?,
         pipeline: MapPipeline::read(row)?,
+        learning: row.try_get("learning")?,
         draft_of: row.try_get("draft_of")?,
         landmarks: row.try_get::<i64, _>("landmarks")? as u64,
         has_underlay: row.try_get("has_underlay")?,
@@ -194,6 +198,21 @@ pub(crate) async fn set_pipeline(
         .map_err(StoreError::during("set the pipeline of a map"))?;
     tx.changed(CommittedChange::Map(map.id));
     Ok(())
+}
+
+/// Sets weights and gates of the landmarks that have none of their own, for the reason that the
+/// history names unless the request gives another one; `None` forgets them.
+pub(crate) async fn set_learning(
+    tx: &mut Tx,
+    name: &str,
+    learning: Option<&str>,
+    reason: Option<String>,
+) -> Result<(), StoreError> {
+    tx.author.why = tx.author.why.take().or(reason);
+    let map = get(&mut tx.conn, name).await?;
+    let done = sqlx::query(SET_LEARNING).bind(map.id).bind(learning).execute(&mut tx.conn).await;
+    done.map_err(StoreError::during("set weights and gates of a map"))?;
+    bump(tx, map.id).await
 }
 
 /// Gives a map another name. Errors: `Exists`; `InUse` while a robot, an open job or an open

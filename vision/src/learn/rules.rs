@@ -1,4 +1,5 @@
-//! Weights and gates of one landmark, where a person wants others than the parameters have.
+//! Weights and gates of a map or of one landmark, where a person wants others than the parameters
+//! have.
 
 use crate::params::Params;
 
@@ -17,8 +18,8 @@ pub struct LearnRules {
     pub min_v_c: Option<f64>,
     /// Whether a smaller visibility confidence refuses the landmark.
     pub refuse_one_side: Option<bool>,
-    /// No measured gate refuses the landmark.
-    pub use_despite_gates: bool,
+    /// Whether no measured gate refuses the landmark.
+    pub use_despite_gates: Option<bool>,
 }
 
 impl LearnRules {
@@ -34,7 +35,7 @@ impl LearnRules {
         gates.min_views = self.min_views.unwrap_or(gates.min_views);
         gates.min_stable_points = self.min_stable_points.unwrap_or(gates.min_stable_points);
         gates.refuse_one_side = self.refuse_one_side.unwrap_or(gates.refuse_one_side);
-        gates.refuse_nothing |= self.use_despite_gates;
+        gates.refuse_nothing = self.use_despite_gates.unwrap_or(gates.refuse_nothing);
         made
     }
 }

@@ -94,6 +94,36 @@ async fn a_failed_gate_is_overruled_for_a_reason_that_the_history_keeps() {
 }
 
 #[tokio::test]
+async fn a_landmark_without_own_gates_has_those_of_its_map() {
+    let service = Service::with_poster().await;
+    let map = async |learning: Value| {
+        let body = json!({ "learning": learning }).to_string();
+        read(service.ask(request("PATCH", "/api/v1/maps/hall", body)).await).await
+    };
+    let strict = json!({ "reason": "only rich pictures here", "min_saliency_f": 900.0 });
+    let (status, shown) = map(strict.clone()).await;
+    assert_eq!((status, &shown["learning"]), (200, &strict), "{shown}");
+    assert_eq!(service.gates().await.0, "inactive");
+    let (_, landmark) = service.landmark("poster").await;
+    assert!(landmark.get("learning").is_none(), "{landmark}");
+    let (_, commits) = service.get("/api/v1/maps/hall/commits").await;
+    let newest = &commits["items"][0];
+    assert_eq!(newest["why"], "only rich pictures here", "{newest}");
+    assert_eq!(newest["summary"]["settings"], json!(["learning"]), "{newest}");
+
+    let own = json!({ "reason": "rich enough", "min_saliency_f": 0.0 });
+    assert_eq!(service.patch("poster", json!({ "learning": own })).await.0, 200);
+    assert_eq!(service.gates().await.0, "active");
+    assert_eq!(service.patch("poster", json!({ "learning": null })).await.0, 200);
+    let (status, problem) = map(json!({ "reason": "x", "min_views": 0 })).await;
+    assert_eq!((status, &problem["field"]), (422, &json!("learning.min_views")), "{problem}");
+    assert_eq!(service.gates().await.0, "inactive");
+    let undo = format!("/api/v1/maps/hall/commits/{}/undo", newest["id"]);
+    assert_eq!(service.ask(request("POST", &undo, "{}")).await.status(), StatusCode::OK);
+    assert_eq!(service.gates().await.0, "active");
+}
+
+#[tokio::test]
 async fn a_model_shows_its_pictures_and_harris_sets_whatever_is_learnt_after_it() {
     let service = Service::with_poster().await;
     let picture = async |which: &str| {

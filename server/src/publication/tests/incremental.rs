@@ -1,10 +1,26 @@
 //! A version that is made from the one before equals one that is made from nothing.
 
 use super::*;
-use crate::{publication::build, store::history};
-use engine::snapshot::{MapSnapshot, Snapshots};
+use crate::{
+    publication::build,
+    store::{history, landmark_learning},
+};
+use engine::snapshot::{MapSnapshot, Snapshots, StoredModel};
 use map::landmark_health::LandmarkHealth;
-use vision::{params::preset::Preset, pose::LandmarkSize};
+use vision::{
+    model::{
+        landmark_model::{Gate, GateFailure, ModelStatus},
+        threshold::Threshold,
+    },
+    params::preset::Preset,
+    pose::LandmarkSize,
+};
+
+/// Thresholds and gates of every model.
+fn models(map: &MapSnapshot) -> Vec<(ModelStatus, Vec<GateFailure>, Threshold)> {
+    let of = |l: &StoredModel| (l.model.status.clone(), l.model.waived.clone(), l.model.hausdorff);
+    map.learnt.values().map(of).collect()
+}
 
 /// The map as it is built without a version before it.
 async fn from_nothing(store: &Catalogue, config: &Config, map: &MapSnapshot) -> MapSnapshot {
@@ -76,10 +92,42 @@ async fn a_maps_preset_goes_over_the_servers_settings() {
     assert_eq!((&*own.params, own.distance), (&Preset::Paper.over(&config.params), paper.distance));
     assert_eq!((own.version, own.learnt.len()), (before.version + 1, before.learnt.len()));
     assert!(own.params.detect.edges == before.params.detect.edges && own.unusable_models.is_empty());
+    assert_eq!(models(&own), models(&from_nothing(&store, &config, &own).await));
+    assert_ne!(models(&own), models(&before), "the preset refuses what is seen from one side");
     // Nothing changes, so there is no new version.
     store.write(move |tx| Box::pin(maps::set_pipeline(tx, "a", move |_| paper))).await.unwrap();
     assert_eq!(of(&store).version, own.version);
     task.close().await;
     let (store, _task) = Catalogue::open(&config).await.unwrap();
     assert_eq!(of(&store).params, own.params);
+}
+
+#[tokio::test]
+async fn a_maps_weights_and_gates_judge_its_models_and_a_landmarks_own_go_before() {
+    let dir = tempfile::tempdir().unwrap();
+    let config = config(dir.path());
+    let (store, _task) = Catalogue::open(&config).await.unwrap();
+    store.write(|tx| Box::pin(maps::create(tx, "a", DistanceKind::Both, 2))).await.unwrap();
+    let none = landmarks::LandmarkGeometry::default();
+    for name in ["own", "other"] {
+        let made = store.write(move |tx| Box::pin(landmarks::create(tx, "a", name, none, 5))).await.unwrap();
+        store_model(&store, made.id, &config.params).await;
+    }
+    let own = "{\"reason\":\"r\",\"min_views\":1}";
+    store.write(move |tx| Box::pin(landmark_learning::set(tx, ("a", "own"), Some(own), None))).await.unwrap();
+    // Whether the number of views, 2, fails in each.
+    let few = async |learning: Option<&'static str>| {
+        store.write(move |tx| Box::pin(maps::set_learning(tx, "a", learning, None))).await.unwrap();
+        let map = store.snapshots().get("a").unwrap();
+        assert_eq!(models(&map), models(&from_nothing(&store, &config, &map).await), "{learning:?}");
+        let fails = |l: &StoredModel| match &l.model.status {
+            ModelStatus::Candidate(failures) => failures.iter().any(|f| f.gate == Gate::Views),
+            ModelStatus::Active => false,
+        };
+        map.learnt.values().map(fails).collect::<Vec<_>>()
+    };
+    assert_eq!(few(None).await, [false, true]);
+    assert_eq!(few(Some("{\"reason\":\"r\",\"min_views\":2}")).await, [false, false]);
+    assert_eq!(few(Some("{\"reason\":\"r\",\"min_views\":3}")).await, [false, true]);
+    assert_eq!(few(None).await, [false, true]);
 }

@@ -51,6 +51,8 @@ pub(crate) struct MapContents {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct MapSettings {
     pub(crate) pipeline: MapPipeline,
+    /// JSON of its own weights and gates.
+    pub(crate) learning: Option<String>,
     pub(crate) location: MapLocation,
     pub(crate) fusion_mode: FusionMode,
     /// JSON list of `map::modality_stats::NamedArea`.

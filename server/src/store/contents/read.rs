@@ -71,6 +71,7 @@ async fn settings(conn: &mut SqliteConnection, map: &MapRow) -> Result<MapSettin
     let row = sqlx::query(SETTINGS).bind(map.id).fetch_one(conn).await.map_err(at())?;
     Ok(MapSettings {
         pipeline: map.pipeline,
+        learning: map.learning.clone(),
         location,
         fusion_mode: modality_stats::mode_of(row.try_get("fusion").map_err(at())?),
         areas: row.try_get("areas").map_err(at())?,

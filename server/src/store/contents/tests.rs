@@ -136,6 +136,7 @@ pub(crate) async fn filled(store: &Catalogue) {
             landmarks::set_health(tx, "a", "p1", LandmarkHealth::Flagged, Some("{\"x\":1}")).await?;
             let learning = "{\"reason\":\"hung by us\",\"use_despite_gates\":true}";
             landmark_learning::set(tx, ("a", "p1"), Some(learning), None).await?;
+            maps::set_learning(tx, "a", Some(learning), None).await?;
             for (landmark, seed) in [(1, 0), (2, 5)] {
                 models::put(tx, 1, &model_of(landmark, seed)).await?;
             }

@@ -21,7 +21,7 @@ use crate::{
 use vision::model::LandmarkId;
 
 statements! {
-    SETTINGS = "UPDATE maps SET fusion = ?2, areas = ?3, sight = ?4, preset = ?5, distance = ?6 WHERE id = ?1";
+    SETTINGS = "UPDATE maps SET fusion = ?2, areas = ?3, sight = ?4, preset = ?5, distance = ?6, learning = ?7 WHERE id = ?1";
     LANDMARK = "INSERT INTO landmarks (map_id, name, created_ms, health, finding, learning) \
                 VALUES (?1, ?2, ?3, ?4, ?5, ?6) RETURNING id";
     VIEW = "INSERT INTO views (landmark_id, image_sha256, image_kind, width_px, height_px, corners_px, created_ms, icon_side, \
@@ -112,6 +112,7 @@ pub(in crate::store) async fn settings(
         .bind(&settings.visibility)
         .bind(preset)
         .bind(distance)
+        .bind(&settings.learning)
         .execute(&mut tx.conn)
         .await;
     done.map_err(StoreError::during("store the settings of a map")).map(drop)

@@ -8,7 +8,7 @@ use super::{
 use crate::store::{
     Store, StoreError,
     contents::LandmarkContents,
-    history::{Difference, LandmarkChange, walls_difference},
+    history::{Difference, LandmarkChange, SETTINGS_OF_MAP, walls_difference},
     teaching::computed,
 };
 use std::collections::{BTreeMap, BTreeSet};
@@ -48,6 +48,8 @@ pub(super) fn difference(both: &Both, changes: &BTreeSet<RowKey>) -> Difference 
         both.draft.1.landmarks.iter().map(|l| (both.owner(l.number), l)).collect();
     let there = super::rows::rows(&both.map.1, Owner::Of);
     let mut made = Difference::default();
+    let is_changed = |word: &&'static str| changes.contains(&RowKey::Setting(word));
+    made.settings = SETTINGS_OF_MAP.into_iter().filter(is_changed).collect();
     for key in changes {
         if let Some(owner) = key.owner() {
             let change = made.landmarks.entry(number(owner)).or_default();
@@ -55,11 +57,14 @@ pub(super) fn difference(both: &Both, changes: &BTreeSet<RowKey>) -> Difference 
             landmark_change(change, key, (old, new), there.contains_key(key));
         }
         match key {
-            RowKey::Setting(word) => made.settings.push(word),
             RowKey::Walls => made.walls = walls_difference(&both.map.1.walls, &both.draft.1.walls),
             RowKey::Underlay => made.underlay = true,
             RowKey::Run(_) => made.runs[usize::from(there.contains_key(key))] += 1,
-            RowKey::Landmark(_) | RowKey::View(..) | RowKey::Model(_) | RowKey::Distractor(_) => {}
+            RowKey::Setting(_)
+            | RowKey::Landmark(_)
+            | RowKey::View(..)
+            | RowKey::Model(_)
+            | RowKey::Distractor(_) => {}
         }
     }
     made

@@ -300,6 +300,9 @@ impl<'a> Publication<'a> {
         if is("pipeline") {
             after.pipeline = new.pipeline;
         }
+        if is("learning") {
+            after.learning.clone_from(&new.learning);
+        }
         if is("fusion_mode") {
             after.fusion_mode = new.fusion_mode;
         }

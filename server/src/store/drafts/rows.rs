@@ -122,6 +122,7 @@ pub(super) fn rows(contents: &MapContents, owner: impl Fn(LandmarkId) -> Owner) 
         ("floor", digest_of(&location.floor)),
         ("parent", digest_of(&location.link)),
         ("pipeline", digest_of(&settings.pipeline)),
+        ("learning", digest_of(&settings.learning)),
         ("fusion_mode", digest_of(&settings.fusion_mode)),
         ("areas", digest_of(&settings.areas)),
         ("visibility_settings", digest_of(&settings.visibility)),

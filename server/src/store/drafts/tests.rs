@@ -110,6 +110,7 @@ async fn edit(store: &Catalogue, draft: i64) {
             walls::replace(tx, "d", &[[0.0, 0.0, 0.7, 0.0]]).await?;
             underlays::delete(tx, "d").await?;
             crate::store::modality_stats::add(tx, "d", "r9", 2.5, &BTreeMap::new()).await?;
+            maps::set_learning(tx, "d", None, None).await?;
             map_locations::set(tx, "d", |old| MapLocation { site: None, ..old }).await.map(drop)
         })
     });
@@ -147,6 +148,7 @@ async fn a_published_draft_changes_what_it_has_changed_by_one_commit_that_can_be
     // The map is as the draft was, under its own numbers.
     let map = store.snapshots().get("a").unwrap();
     assert_eq!(map.unusable_models, BTreeMap::new());
+    assert_eq!(maps::get(store.reads(), "a").await.unwrap().learning, None);
     let places = |of: &engine::snapshot::MapSnapshot| {
         let each = of.landmarks.iter().map(|(id, l)| {
             let model = of.learnt.get(id).map(|stored| stored.model.exemplars.clone());

@@ -86,10 +86,10 @@ statements! {
                OR f.metres_per_pixel IS NOT n.metres_per_pixel OR f.x_m IS NOT n.x_m OR f.y_m IS NOT n.y_m \
                OR f.theta_rad IS NOT n.theta_rad");
     SETTINGS = concat!(with_later!("maps", "id", "name, site, building, floor, parent_id, parent_from_map, \
-               preset, distance, fusion, areas, sight"),
+               preset, distance, learning, fusion, areas, sight"),
                "SELECT f.name IS NOT n.name AS name, f.site IS NOT n.site AS site, f.building IS NOT n.building AS building, \
                f.floor IS NOT n.floor AS floor, f.parent_id IS NOT n.parent_id OR f.parent_from_map IS NOT \
-               n.parent_from_map AS parent, f.preset IS NOT n.preset OR f.distance IS NOT n.distance AS pipeline, f.fusion IS NOT n.fusion AS fusion_mode, f.areas IS NOT n.areas AS areas, \
+               n.parent_from_map AS parent, f.preset IS NOT n.preset OR f.distance IS NOT n.distance AS pipeline, f.learning IS NOT n.learning AS learning, f.fusion IS NOT n.fusion AS fusion_mode, f.areas IS NOT n.areas AS areas, \
                f.sight IS NOT n.sight AS visibility_settings FROM f JOIN n ON n.id = f.id");
     WALLS_BEFORE = "SELECT min(id) FROM commits WHERE map_id = ?1 AND walls = 1 AND id > ?2 AND id <= ?3";
     WALLS_AFTER = "SELECT min(id) FROM commits WHERE map_id = ?1 AND walls = 1 AND id > ?2";
@@ -101,13 +101,14 @@ statements! {
 }
 
 /// Words for settings; also the columns of `SETTINGS`.
-const SETTINGS_OF_MAP: [&str; 9] = [
+pub(in crate::store) const SETTINGS_OF_MAP: [&str; 10] = [
     "name",
     "site",
     "building",
     "floor",
     "parent",
     "pipeline",
+    "learning",
     "fusion_mode",
     "areas",
     "visibility_settings",

@@ -15,8 +15,8 @@ pub(in crate::store) use apply::no_job_on;
 pub(crate) use apply::{roll_back, undo};
 pub(crate) use close::HistoryLimits;
 pub(super) use close::{close, close_outside};
-pub(in crate::store) use difference::walls_difference;
 pub(crate) use difference::{Difference, LandmarkChange, between, fill_unchanged, summary};
+pub(in crate::store) use difference::{SETTINGS_OF_MAP, walls_difference};
 pub(in crate::store) use kept_tables::{CONTENTS, KeptColumn, KeptTable, MAPS, PARTS};
 
 use super::{StoreError, actor::Actor, kind::Kind, statements::statements};

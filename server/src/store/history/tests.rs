@@ -170,6 +170,7 @@ fn steps() -> Vec<Write> {
             preset: Some(Preset::Paper),
             distance: DistanceKind::Hausdorff,
         })),
+        write!(|tx| maps::set_learning(tx, "a", Some("{\"reason\":\"doors look alike\"}"), None)),
         write!(|tx| map_locations::set(tx, "a", |_| place)),
         write!(|tx| modality_stats::add(tx, "a", "r1", 12.5, &BTreeMap::new())),
         write!(|tx| modality_stats::add(tx, "a", "r1", 2.5, &BTreeMap::new())),

@@ -216,8 +216,8 @@ fn rules_of_a_landmark_change_weights_and_gates_and_excuse_no_missing_threshold(
     let blank = GrayImage::from_fn(300, 400, |u, _| 120 + (u / 60) as u8);
     let views = synthesis::views(&blank, &whole(), 20, &p, 1);
     let model = learn(LandmarkId(1), &views, &[], &p).unwrap();
-    let rules = LearnRules { use_despite_gates: true, ..LearnRules::default() };
-    let used = add_negatives(&model, &[], &rules.over(&p));
+    let rules = |used| LearnRules { use_despite_gates: Some(used), ..LearnRules::default() };
+    let used = add_negatives(&model, &[], &rules(true).over(&p));
     let gates = |failures: &[GateFailure]| failures.iter().map(|f| f.gate).collect::<Vec<_>>();
     let ModelStatus::Candidate(failures) = &used.status else { panic!("nothing tells it apart") };
     assert_eq!(gates(failures), [Gate::LikenessThreshold(ThresholdError::Overlap)]);
@@ -228,8 +228,9 @@ fn rules_of_a_landmark_change_weights_and_gates_and_excuse_no_missing_threshold(
     let refused = add_negatives(&poster, &[], &strict);
     let ModelStatus::Candidate(failures) = &refused.status else { panic!("F is below 900") };
     assert_eq!((failures[0].gate, failures[0].limit), (Gate::Saliency, 900.0));
-    let again = LearnRules { use_despite_gates: true, ..LearnRules::default() }.over(&strict);
+    let again = rules(true).over(&strict);
     assert!(add_negatives(&poster, &[], &again).is_active());
+    assert!(!add_negatives(&poster, &[], &rules(false).over(&again)).is_active(), "the last rules hold");
     assert_eq!(LearnRules::default().over(&p), p);
     let cheap = LearnRules { false_positive_weight: Some(0.5), ..LearnRules::default() };
     assert!((cheap.over(&p).learn.threshold.false_positive_weight - 0.5).abs() < 1e-12);
