@@ -4,6 +4,7 @@
 //! `map::slam` on a thread of its own; frames wait for `survey`. A journal stores both, so that a
 //! mapping resumes after a restart of the server.
 
+mod record;
 mod journal;
 mod session;
 mod tap;

@@ -3,21 +3,11 @@
 //! first record that is not whole.
 //!
 //! A record is its length (4 bytes, little-endian), the first 8 bytes of its SHA-256, and its
-//! bytes. The first record is the header as JSON; the others are one byte of their kind and a scan
-//! or frame as on the wire, which is checked again when it is read.
+//! bytes. The first record is the header as JSON; the others are those of `record`.
 
-use crate::scan_job::ScanJob;
+use super::record::Record;
 use map::pose2::Pose2;
-use protos::{
-    CheckedFrame, Name,
-    convert::{
-        CheckedScan,
-        frame::{Encoding, MAX_FRAME_IMAGE_BYTES, Pixels},
-        geometry::{intrinsics_wire, pose2_wire, pose3_wire},
-    },
-    prost::{Message, bytes::Bytes},
-    v1,
-};
+use protos::{Name, convert::frame::MAX_FRAME_IMAGE_BYTES};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 use std::{
@@ -30,9 +20,6 @@ use std::{
 pub(super) const MAX_BYTES: u64 = 2 << 30;
 /// Largest record: a frame with the largest image.
 const MAX_RECORD: u32 = (MAX_FRAME_IMAGE_BYTES + crate::limits::MAX_SCAN_BYTES) as u32;
-/// First byte of a record.
-const SCAN: u8 = 1;
-const FRAME: u8 = 2;
 /// Scans after which the file is synced, in case of a power cut.
 const SYNC_EVERY: u32 = 50;
 /// Bytes of the length and the digest.
@@ -53,23 +40,6 @@ pub(super) struct JournalHeader {
     pub origin: [f64; 3],
     /// Whether frames are taken.
     pub landmarks: bool,
-}
-
-/// What a robot sends while it makes a map.
-#[derive(Debug, Clone)]
-pub(super) enum Record {
-    Scan(ScanJob),
-    Frame(Box<CheckedFrame>),
-}
-
-impl Record {
-    /// Epoch of a scan.
-    pub(super) fn epoch(&self) -> Option<u64> {
-        match self {
-            Self::Scan(job) => Some(job.epoch),
-            Self::Frame(_) => None,
-        }
-    }
 }
 
 impl JournalHeader {
@@ -126,11 +96,7 @@ impl Journal {
 
     /// Adds a scan or a frame.
     pub(super) fn put_record(&mut self, record: &Record) -> io::Result<()> {
-        let (kind, bytes) = match record {
-            Record::Scan(job) => (SCAN, scan_wire(job).encode_to_vec()),
-            Record::Frame(frame) => (FRAME, frame_wire(frame).encode_to_vec()),
-        };
-        self.put(&[&[kind], &bytes[..]].concat())?;
+        self.put(&record.bytes())?;
         self.unsynced += 1;
         if self.unsynced >= SYNC_EVERY {
             self.unsynced = 0;
@@ -148,52 +114,6 @@ impl Journal {
         self.file.write_all(&framed)?;
         self.bytes = bytes;
         Ok(())
-    }
-}
-
-fn scan_wire(job: &ScanJob) -> v1::Scan {
-    let scan = &job.scan;
-    v1::Scan {
-        epoch: job.epoch,
-        captured_ns: job.captured_ns,
-        odom_from_robot: Some(pose2_wire(&job.odom_from_robot)),
-        robot_from_laser: Some(pose2_wire(scan.robot_from_laser())),
-        first_bearing_rad: scan.bearing_rad(0),
-        bearing_step_rad: scan.bearing_step_rad(),
-        max_range_m: scan.max_range_m(),
-        ranges_m: scan.ranges_m().to_vec(),
-        ..v1::Scan::default()
-    }
-}
-
-fn encoding_wire(encoding: Encoding) -> v1::ImageEncoding {
-    match encoding {
-        Encoding::Jpeg => v1::ImageEncoding::Jpeg,
-        Encoding::Png => v1::ImageEncoding::Png,
-        Encoding::Gray8 => v1::ImageEncoding::Gray8,
-        Encoding::Rgb8 => v1::ImageEncoding::Rgb8,
-        Encoding::Bgr8 => v1::ImageEncoding::Bgr8,
-    }
-}
-
-/// What a survey needs of a frame.
-fn frame_wire(frame: &CheckedFrame) -> v1::Frame {
-    let (encoding, image) = match &frame.pixels {
-        Pixels::Image(image) => (encoding_wire(image.encoding), image.bytes.clone()),
-        Pixels::Quads(_) => (v1::ImageEncoding::Unspecified, Bytes::new()),
-    };
-    v1::Frame {
-        epoch: frame.epoch,
-        seq: frame.seq,
-        captured_ns: frame.captured_ns,
-        width_px: frame.width_px,
-        height_px: frame.height_px,
-        encoding: encoding.into(),
-        image,
-        intrinsics: frame.intrinsics.as_ref().map(intrinsics_wire),
-        robot_from_camera: frame.mounting.as_ref().map(|m| pose3_wire(&m.robot_from_camera)),
-        odometry: frame.odometry.as_ref().map(pose2_wire),
-        ..v1::Frame::default()
     }
 }
 
@@ -246,28 +166,11 @@ impl JournalReader {
     pub(super) fn next(&mut self) -> Option<Record> {
         let before = self.whole;
         let read = record(&mut self.from, &mut self.whole);
-        let next = read.and_then(|bytes| self.parsed(&bytes));
+        let next = read.and_then(|bytes| Record::parsed(&bytes, &self.head.map));
         if next.is_none() {
             self.whole = before;
         }
         next
-    }
-
-    fn parsed(&self, bytes: &[u8]) -> Option<Record> {
-        let (kind, wire) = bytes.split_first()?;
-        match *kind {
-            SCAN => {
-                let checked = CheckedScan::try_from(v1::Scan::decode(wire).ok()?).ok()?;
-                let CheckedScan { epoch, captured_ns, odom_from_robot, scan, .. } = checked;
-                let map = self.head.map.to_string();
-                Some(Record::Scan(ScanJob { map, epoch, captured_ns, odom_from_robot, scan }))
-            }
-            FRAME => {
-                let frame = CheckedFrame::try_from(v1::Frame::decode(wire).ok()?).ok()?;
-                Some(Record::Frame(Box::new(frame)))
-            }
-            _ => None,
-        }
     }
 
     /// The journal for appending after the last whole record.
@@ -299,6 +202,7 @@ fn record(from: &mut impl Read, whole: &mut u64) -> Option<Vec<u8>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scan_job::ScanJob;
     use map::laser::Scan;
 
     fn name(text: &str) -> Name {

@@ -2,7 +2,8 @@
 
 use super::{
     MadeMap, MadeSurvey, MappingProgress, MappingStage, Shared, Walls,
-    journal::{Journal, JournalHeader, JournalReader, Record},
+    journal::{Journal, JournalHeader, JournalReader},
+    record::Record,
 };
 use crate::{
     scan_job::ScanJob,
@@ -192,7 +193,7 @@ impl Session {
         let mut progress = lock(&self.progress);
         match gathering {
             Ok(gathering) => progress.gathering = gathering,
-            Err(reason) => progress.reason = Some(format!("no landmarks are proposed: {reason}")),
+            Err(reason) => progress.reason = Some(no_landmarks(&reason)),
         }
     }
 
@@ -280,19 +281,23 @@ impl Mapper {
         let slam = std::mem::replace(&mut self.slam, Slam::new(SlamParams::default()));
         let map = slam.finish().map_err(|error| error.to_string())?;
         lock(&self.progress).loop_closures = Some(map.loops.len());
-        let Some((drive, _)) = self.drive.take().map(DriveReading::finished) else {
-            return Ok(MadeMap { walls: walls(&map, &self.origin), survey: None });
-        };
-        if drive.frames.is_empty() {
-            return Ok(MadeMap { walls: walls(&map, &self.origin), survey: None });
-        }
+        let alone = MadeMap { walls: walls(&map, &self.origin), survey: None };
+        let drive = self.drive.take().map(|reading| reading.finished().0);
+        let Some(drive) = drive.filter(|drive| !drive.frames.is_empty()) else { return Ok(alone) };
         let effort = Effort { threads: NonZeroUsize::MIN, told: &|_, _, _| {} };
-        let made = surveyed(&drive, map, &self.origin, (&Params::default(), effort));
-        let building = made.map_err(|error| error.to_string())?;
-        let proposed = building.objects.iter().filter(|object| object.refused.is_none()).count();
-        lock(&self.progress).landmarks = Some(proposed);
-        let walls = building.walls.clone();
-        Ok(MadeMap { walls, survey: Some(Arc::new(MadeSurvey { drive, building })) })
+        match surveyed(&drive, map, &self.origin, (&Params::default(), effort)) {
+            Ok(building) => {
+                let proposed = building.objects.iter().filter(|object| object.refused.is_none()).count();
+                lock(&self.progress).landmarks = Some(proposed);
+                let walls = building.walls.clone();
+                Ok(MadeMap { walls, survey: Some(Arc::new(MadeSurvey { drive, building })) })
+            }
+            // The walls of the scans alone are none the worse.
+            Err(error) => {
+                lock(&self.progress).reason = Some(no_landmarks(&error.to_string()));
+                Ok(alone)
+            }
+        }
     }
 
     fn write(&mut self, record: &Record) {
@@ -349,6 +354,10 @@ impl Mapper {
         progress.pose = Some([on_map.x_m, on_map.y_m, on_map.theta_rad]);
         Ok(())
     }
+}
+
+fn no_landmarks(reason: &str) -> String {
+    format!("no landmarks are proposed: {reason}")
 }
 
 /// The walls in the map frame, for a map whose first pose is `origin`.

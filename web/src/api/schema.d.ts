@@ -252,7 +252,7 @@ export interface components {
             /** The picture under the map, or where it lies, differs. */ underlay_changed: boolean;
             /** Reference runs that are new. */ reference_runs_added: number;
             /** Reference runs that are gone. */ reference_runs_removed: number;
-            /** Which settings differ: `name`, `site`, `building`, `floor`, `parent`, `pipeline` (detector or decision), `fusion_mode`, `areas`, `visibility_settings`. */
+            /** Which settings differ: `name`, `site`, `building`, `floor`, `parent`, `pipeline` (detector or decision), `learning`, `fusion_mode`, `areas`, `visibility_settings`. */
             settings: string[];
             /** Names of the first landmarks that differ, at most 8. */ landmarks: string[];
         };
@@ -748,7 +748,7 @@ export interface components {
             reprojection_rms_px: number;
         };
         /** How far a landmark has come. */ LandmarkStatus: "not_learnt" | "learning" | "active" | "inactive";
-        /** Weights and gates of one landmark, where a person wants others than the server has. What is absent is as there. */
+        /** Weights and gates of a map or of one landmark, where a person wants others than the server has. What is absent of a landmark is as the map has it, and of a map as the server has it. */
         LearningSettings: {
             /** Why: one line of 1 to 200 characters. The history of the map has it, too. */ reason: string;
             /** Cost of a wrong acceptance, 0.1 to 1000, where a refused own view costs 1 (lambda : mu). */
@@ -829,6 +829,7 @@ export interface components {
             /** A picture is shown under it: `GET /maps/{map}/underlay`. */ has_underlay?: boolean;
             preset?: components["schemas"]["PipelinePreset"] | null;
             /** Which distance decides. */ distance: components["schemas"]["Distance"];
+            learning?: components["schemas"]["LearningSettings"] | null;
             /** The map that it is a draft of. */ draft_of?: string | null;
             /** The site it belongs to, in words. */ site?: string | null;
             /** The building it belongs to, in words. */ building?: string | null;
@@ -852,6 +853,7 @@ export interface components {
             name?: string | null;
             preset?: components["schemas"]["PipelinePreset"] | null;
             distance?: components["schemas"]["Distance"] | null;
+            learning?: components["schemas"]["LearningSettings"] | null;
             /** The site it belongs to, in words: 1 to 64 characters. */ site?: string | null;
             /** The building it belongs to, in words: 1 to 64 characters. */ building?: string | null;
             /** The floor it belongs to, in words: 1 to 64 characters. */ floor?: string | null;
@@ -865,11 +867,15 @@ export interface components {
             /** Scans that were taken. */ scans: number;
             /** Scans that were not: the queue was full, the robot's software was started again, or there were too many. */
             dropped: number;
+            /** Frames that were taken; absent where no landmarks are looked for. */ frames?: number | null;
+            /** What of the frames cannot be used: how often, and why. */ frames_refused?: string | null;
+            /** Number of landmarks that are proposed, once they are found. */ landmarks?: number | null;
+            /** The gathering whose tracks these are, once the walls are stored. */ gathering?: number | null;
             /** Way driven, metres. */ distance_m: number;
             pose?: components["schemas"]["Triple"] | null;
             /** Number of walls, once they are found. */ segments?: number | null;
             /** Loop closures, once fitted. */ loop_closures?: number | null;
-            /** Why it failed. */ reason?: string | null;
+            /** Why it failed, or why a finished one proposes no landmarks. */ reason?: string | null;
             /** Why further scans are not kept on disk: a restart of the server would lose them. Absent while they are. */
             journal_error?: string | null;
             /** The walls that are held: what would replace those of the map. Absent at every other stage. */
@@ -967,6 +973,8 @@ export interface components {
             /** A robot that stands on this map; its scans must come with odometry. */ robot: string;
             /** Where on the map its first pose is: x, y in metres, heading in radians. The origin, if absent. */
             origin?: components["schemas"]["Triple"];
+            /** Look for landmarks, too: its frames, with intrinsics and mounting, are kept until the end, and objects on walls become tracks of a gathering. */
+            landmarks?: boolean;
         };
         /** A token to be made. */
         NewToken: {
@@ -2007,7 +2015,7 @@ export interface Operations {
   "GET /maps/{map}/mapping": { answer: Schemas["MappingProgressBody"] };
   "POST /maps/{map}/mapping": { body: Schemas["NewMapping"]; answer: Schemas["MappingProgressBody"] };
   "DELETE /maps/{map}/mapping": { answer: undefined };
-  "POST /maps/{map}/mapping/finish": { query: { hold?: boolean }; answer: Schemas["MappingProgressBody"] };
+  "POST /maps/{map}/mapping/finish": { query: { hold?: boolean; accept?: boolean }; answer: Schemas["MappingProgressBody"] };
   "GET /maps/{map}/modalities": { answer: Schemas["ModalityMapBody"] };
   "PUT /maps/{map}/modalities": { body: Schemas["ModalityMapPatch"]; answer: Schemas["ModalityMapBody"] };
   "GET /maps/{map}/modalities/at": { query: { x_m: number; y_m: number; theta_rad?: number }; answer: Schemas["AreaStatsBody"] };

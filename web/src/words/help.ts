@@ -49,6 +49,7 @@ export const GUIDES: readonly { title: string; guides: readonly Guide[] }[] = [
     guides: [
       { name: "first-pose", title: "First pose", what: "From nothing to the first position of a robot." },
       { name: "administrator", title: "The pages for administrators", what: "What every page is for." },
+      { name: "survey-a-building", title: "Survey a building", what: "Walls and landmarks of one drive." },
       { name: "teach-a-map", title: "Teach a map", what: "Landmarks and walls of a whole floor." },
       { name: "import-a-map", title: "Import a map", what: "Walls of a ROS grid, a vector map, or a plan." },
     ],

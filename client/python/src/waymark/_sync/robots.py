@@ -189,10 +189,11 @@ class Robots(Base):
         return self._send(AreaStatsBody, "modalities_at", map, params=query)
 
     def start_mapping(
-        self, map: str, robot: str, origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+        self, map: str, robot: str, origin: tuple[float, float, float] = (0.0, 0.0, 0.0), *, landmarks: bool = False
     ) -> MappingProgressBody:
-        """Begins to make the walls of a map from the scans of a robot; `origin` is its first pose on the map."""
-        body = {"robot": robot, "origin": list(origin)}
+        """Begins to make the walls of a map from the scans of a robot; `origin` is its first pose on the map. With
+        `landmarks` it looks for them in the robot's frames, too."""
+        body = {"robot": robot, "origin": list(origin), "landmarks": landmarks}
         return self._send(MappingProgressBody, "start_mapping", map, json=body)
 
     def mapping(self, map: str) -> MappingProgressBody:
@@ -203,10 +204,11 @@ class Robots(Base):
         """Cancels a mapping, or deletes one that failed; the map does not change."""
         self._done("cancel_mapping", map)
 
-    def finish_mapping(self, map: str, *, hold: bool = False) -> MappingProgressBody:
+    def finish_mapping(self, map: str, *, hold: bool = False, accept: bool = False) -> MappingProgressBody:
         """Ends the drive: the walls are fitted once more and stored. `mapping` says when they are. With `hold` they are
-        held instead: `mapping` has them, a further call without it stores them, `cancel_mapping` gives them up."""
-        params = {"hold": "true"} if hold else {}
+        held instead: `mapping` has them, a further call without it stores them, `cancel_mapping` gives them up. With
+        `accept` the landmarks that pass every gate are accepted and learnt."""
+        params = {name: "true" for name, wanted in (("hold", hold), ("accept", accept)) if wanted}
         return self._send(MappingProgressBody, "finish_mapping", map, params=params)
 
     def start_gathering(self, map: str, robot: str, *, landmark: str | None = None, known: bool = False) -> Gathering:

@@ -676,7 +676,7 @@ class ChangeSummary:
     """Reference runs that are gone."""
     settings: tuple[str, ...] = ()
     """Which settings differ: `name`, `site`, `building`, `floor`, `parent`, `pipeline` (detector or decision),
-    `fusion_mode`, `areas`, `visibility_settings`."""
+    `learning`, `fusion_mode`, `areas`, `visibility_settings`."""
     landmarks: tuple[str, ...] = ()
     """Names of the first landmarks that differ, at most 8."""
 
@@ -1479,8 +1479,8 @@ class LandmarkPoint:
 
 @dataclass(frozen=True, slots=True)
 class LearningSettings:
-    """Weights and gates of one landmark, where a person wants others than the server has. What is absent is as
-    there."""
+    """Weights and gates of a map or of one landmark, where a person wants others than the server has. What is
+    absent of a landmark is as the map has it, and of a map as the server has it."""
 
     reason: str
     """Why: one line of 1 to 200 characters. The history of the map has it, too."""
@@ -1620,6 +1620,8 @@ class Map:
     """A picture is shown under it: `GET /maps/{map}/underlay`."""
     preset: PipelinePreset | None = None
     """Detector and decision; absent: those of the server's settings."""
+    learning: LearningSettings | None = None
+    """Weights and gates of its landmarks, if a person has set some."""
     draft_of: str | None = None
     """The map that it is a draft of."""
     site: str | None = None
@@ -1662,6 +1664,8 @@ class MapPatch:
     """Detector and decision, from the next version on; null: those of the server's settings."""
     distance: Distance | None = None
     """Which distance decides; absent where `preset` changes: that of the preset."""
+    learning: LearningSettings | None = None
+    """Weights and gates of its landmarks; what a landmark sets of its own goes before."""
     site: str | None = None
     """The site it belongs to, in words: 1 to 64 characters."""
     building: str | None = None
@@ -1688,6 +1692,14 @@ class MappingProgressBody:
     """Scans that were not: the queue was full, the robot's software was started again, or there were too many."""
     distance_m: float
     """Way driven, metres."""
+    frames: int | None = None
+    """Frames that were taken; absent where no landmarks are looked for."""
+    frames_refused: str | None = None
+    """What of the frames cannot be used: how often, and why."""
+    landmarks: int | None = None
+    """Number of landmarks that are proposed, once they are found."""
+    gathering: int | None = None
+    """The gathering whose tracks these are, once the walls are stored."""
     pose: Triple | None = None
     """Where the robot is in the map so far: x, y, theta; absent before the first scan."""
     segments: int | None = None
@@ -1695,7 +1707,7 @@ class MappingProgressBody:
     loop_closures: int | None = None
     """Loop closures, once fitted."""
     reason: str | None = None
-    """Why it failed."""
+    """Why it failed, or why a finished one proposes no landmarks."""
     journal_error: str | None = None
     """Why further scans are not kept on disk: a restart of the server would lose them. Absent while they are."""
     walls: tuple[WallBody, ...] | None = None
@@ -1866,6 +1878,9 @@ class NewMapping:
     """A robot that stands on this map; its scans must come with odometry."""
     origin: Triple | None = None
     """Where on the map its first pose is: x, y in metres, heading in radians. The origin, if absent."""
+    landmarks: bool = False
+    """Look for landmarks, too: its frames, with intrinsics and mounting, are kept until the end, and objects on
+    walls become tracks of a gathering."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,1 +1,0 @@
-import{o as i}from"./index-client-pRWCzs4N.js";import{C as c}from"./index-kjmN_8S_.js";import{S as p}from"./stream-CLqgbJBc.js";const f=250;function u(t,s,r){let e;const o=()=>e??=setTimeout(()=>{e=void 0,s()},f),n=Object.fromEntries([...t,"reset"].map(a=>[a,o])),m=new p(c("/events",{map:r}),{on:n,onopen:o});i(()=>{m.close(),clearTimeout(e)})}export{u as w};
