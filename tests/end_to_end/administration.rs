@@ -186,6 +186,9 @@ fn a_map_or_a_photograph_is_compared_by_the_papers_pipeline() {
     };
     assert!(points_decide("") && !points_decide("--preset paper"));
     assert!(desk.done("map pipeline office --preset paper").contains("paper, distance hausdorff"));
+    // The paper refuses what was photographed from one side, until a person wants it all the same.
+    assert!(desk.done("landmark show poster --map office").contains("not in use"));
+    desk.done("landmark learning poster --map office --use-despite-gates true --why compared");
     assert!(!points_decide("") && points_decide("--preset default"));
     let both = desk.done("map pipeline office --distance correlation");
     assert!(both.contains("paper, distance correlation"), "{both}");

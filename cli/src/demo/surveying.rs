@@ -1,5 +1,5 @@
-//! The demo's first part with `--survey`: a robot that knows neither walls nor landmarks drives once
-//! there and back, and the server gets what it found.
+//! The demo's first part with `--survey`: a robot that knows neither walls nor landmarks drives
+//! once there and back, and the server gets what it found.
 
 use super::{MAP, teaching::Taught};
 use crate::{

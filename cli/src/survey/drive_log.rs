@@ -1,5 +1,5 @@
-//! The drive of a file. In: a recording of ours or a bag of ROS 2. Out: its scans, the drive with the
-//! frames of one camera, and what of it was not used.
+//! The drive of a file. In: a recording of ours or a bag of ROS 2. Out: its scans, the drive with
+//! the frames of one camera, and what of it was not used.
 
 use crate::{
     failure::{Class, Failure},

@@ -30,8 +30,8 @@ pub(crate) struct Args {
     /// frames with intrinsics and the camera's mounting.
     #[arg(value_name = "RECORDING")]
     recording: PathBuf,
-    /// Make this map on the server, with walls and landmarks, and learn them. Without it, nothing is
-    /// sent.
+    /// Make this map on the server, with walls and landmarks, and learn them. Without it, nothing
+    /// is sent.
     #[arg(long, value_name = "MAP")]
     into: Option<Name>,
     /// Where the drive begins in the frame of the map: x and y in metres, heading in radians.

@@ -344,10 +344,11 @@ def test_drives_are_recorded_mapped_and_gathered(server: Server) -> None:
             assert maps.modalities_at("drives", Pose2(4.5, 2.0)).statistics[0].steps > 0
             maps.delete_reference_run("drives", run.id)
 
-            assert maps.start_mapping("drives", "driver", (1.0, 2.0, 0.0)).stage == "mapping"
+            begun = maps.start_mapping("drives", "driver", (1.0, 2.0, 0.0), landmarks=True)
+            assert (begun.stage, begun.frames) == ("mapping", 0)
             maps.cancel_mapping("drives")
-            maps.start_mapping("drives", "driver")
-            maps.finish_mapping("drives")
+            assert maps.start_mapping("drives", "driver").frames is None
+            maps.finish_mapping("drives", accept=True)
             until = time.monotonic() + SOON_S
             while maps.mapping("drives").stage != "failed" and time.monotonic() < until:
                 time.sleep(0.1)

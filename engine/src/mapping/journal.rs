@@ -1,6 +1,6 @@
 //! The journal of a mapping: its scans and frames on disk, so that a restart of the server loses no
-//! drive. One append-only file a map. In: what is mapped. Out: the same at the next start, up to the
-//! first record that is not whole.
+//! drive. One append-only file a map. In: what is mapped. Out: the same at the next start, up to
+//! the first record that is not whole.
 //!
 //! A record is its length (4 bytes, little-endian), the first 8 bytes of its SHA-256, and its
 //! bytes. The first record is the header as JSON; the others are those of `record`.

@@ -44,9 +44,9 @@ fn total(v: &WallRectangle) -> Matrix4<f64> {
     v.covariance + mounting + v.by_camera * v.by_camera.transpose()
 }
 
-/// Fusion in information form with the wall fixed. The errors of extrinsics, intrinsics and wall are
-/// common to all views and added once; so are those of the robot's pose: a robot that goes by laser
-/// and odometry errs alike for metres.
+/// Fusion in information form with the wall fixed. The errors of extrinsics, intrinsics and wall
+/// are common to all views and added once; so are those of the robot's pose: a robot that goes by
+/// laser and odometry errs alike for metres.
 fn fused(views: &[&WallRectangle], wall: &LaserSegment, p: &PlacementParams) -> Option<LandmarkPlace> {
     let mut information = Matrix4::zeros();
     for v in views {

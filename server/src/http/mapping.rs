@@ -70,9 +70,10 @@ fn shown(progress: MappingProgress) -> MappingProgressBody {
 }
 
 /// Begins to make the walls of a map from the scans of a robot, and with `landmarks` to look for
-/// landmarks in its frames. While it lasts, scans are mapped and localise nothing. The map stays as it is until the mapping is finished. The scans are kept on
-/// disk until then: after a restart of the server the mapping goes on by itself (`resuming`), with
-/// a robot whose software went on; `journal_error` says if they cannot be.
+/// landmarks in its frames. While it lasts, scans are mapped and localise nothing. The map stays as
+/// it is until the mapping is finished. The scans are kept on disk until then: after a restart of
+/// the server the mapping goes on by itself (`resuming`), with a robot whose software went on;
+/// `journal_error` says if they cannot be.
 #[utoipa::path(post, path = "/maps/{map}/mapping", operation_id = "startMapping",
     tag = "maps", params(("map" = String, Path)),
     request_body = NewMapping, responses((status = 201, body = MappingProgressBody),
