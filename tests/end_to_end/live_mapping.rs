@@ -140,7 +140,7 @@ async fn one_drive_over_zenoh_gives_walls_and_landmarks_in_use() {
     maps.create_map(&NewMap::new(MAP)).await.expect("map");
     maps.put_robot("r1", MAP).await.expect("robot");
     let drive = DriveParams { legs: 2, rate_hz: 2.0, ..DriveParams::default() };
-    let mut robot = Robot::new(building.clone(), &RobotParams { drive, ..RobotParams::default() });
+    let robot = Robot::new(building.clone(), &RobotParams { drive, ..RobotParams::default() });
     let camera = *robot.camera().intrinsics();
     let options = RobotOptions::new(&inside.server.zenoh_endpoint, "default", "r1");
     let client = RobotClient::connect(&options).await.expect("connected");
@@ -148,11 +148,9 @@ async fn one_drive_over_zenoh_gives_walls_and_landmarks_in_use() {
     let origin = [first.x_m, first.y_m, first.theta_rad];
     let new = NewMapping { robot: "r1".into(), origin, landmarks: true };
     maps.start_mapping(MAP, &new).await.expect("begun");
-    let mut sent = 0_u64;
-    while let Some(readings) = robot.next() {
+    for (sent, readings) in (1_u64..).zip(robot) {
         let step = &readings.step;
         client.publish_scan(scan_of(&readings.scan, &step.odom_from_robot, sent as i64)).await.expect("sent");
-        sent += 1;
         let mapped = || async { (maps.mapping(MAP).await.ok()?.scans >= sent).then_some(()) };
         eventually("mapped", mapped).await;
         let image = jpeg(&readings.frame.image);

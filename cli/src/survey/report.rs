@@ -119,14 +119,15 @@ impl SurveyReport {
                 values.iter().zip(sigmas).map(|(v, s)| format!("{:+.2} ± {:.2}", v * scale, s * scale));
             each.collect::<Vec<_>>().join(", ")
         };
-        let _ = writeln!(
+        writeln!(
             text,
             "camera against its stated mounting: turned by {} deg, moved by {} cm, focal length {:+.2} ± {:.2} %",
             with(&c.turned_deg, &c.turned_sigma_deg, 1.0),
             with(&c.moved_m, &c.moved_sigma_m, 100.0),
             c.focal_percent,
             c.focal_sigma_percent
-        );
+        )
+        .ok();
         let rows: Vec<&LandmarkLine> = self.landmarks.iter().collect();
         let table = Table::of(
             ["landmark", "x, y, z in m", "±", "size in m", "views", ""],
@@ -144,14 +145,15 @@ impl SurveyReport {
         );
         text += &table.text();
         for (count, first) in self.problems.values() {
-            let _ = write!(text, "\nnot used: {count} times {first}");
+            write!(text, "\nnot used: {count} times {first}").ok();
         }
         if let (Some(map), Some(in_use)) = (&self.map, self.in_use) {
-            let _ = write!(
+            write!(
                 text,
                 "\n{map}: {} in use. `waymark open` shows the map.",
                 counted(in_use as u64, "landmark")
-            );
+            )
+            .ok();
         }
         text
     }

@@ -35,7 +35,7 @@ pub fn simulated_drive(
     mut sensed: impl FnMut(&SensorReadings),
 ) -> anyhow::Result<SimulatedDrive> {
     let seed = drive.seed;
-    let mut robot = Robot::new(building.clone(), &RobotParams { drive, ..RobotParams::default() });
+    let robot = Robot::new(building.clone(), &RobotParams { drive, ..RobotParams::default() });
     let stated = SimulatedRobotErrors::drawn(robot.camera().intrinsics(), seed ^ 1).camera;
     let mut random = Random::new(seed ^ 2);
     let [turn, shift] = MOUNTING;
@@ -43,7 +43,7 @@ pub fn simulated_drive(
     let (turn, shift): (Vector3<f64>, Vector3<f64>) =
         (error.fixed_rows::<3>(0).into(), error.fixed_rows::<3>(3).into());
     let (mut drive, mut scans, mut first) = (Drive::default(), Vec::new(), None);
-    while let Some(readings) = robot.next() {
+    for readings in robot {
         sensed(&readings);
         let step = &readings.step;
         first = first.or(Some((step.map_from_robot, step.robot_from_camera)));

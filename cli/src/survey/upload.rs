@@ -21,7 +21,7 @@ use std::time::Duration;
 /// Most views of a landmark that are sent.
 const MAX_VIEWS: usize = 12;
 /// Longest wait for the lesson.
-const LESSON_TIMEOUT: Duration = Duration::from_mins(60);
+const LESSON_TIMEOUT: Duration = Duration::from_hours(1);
 
 /// Makes the map, which must be new or empty, and fills it; the landmarks as the server has them.
 pub(crate) async fn upload(

@@ -228,15 +228,14 @@ async fn frames_of_a_drive_give_landmarks_also_after_a_restart() {
     let (building, dir) = (Arc::new(Building::corridor(7)), tempfile::tempdir().unwrap());
     let journals = || dir.path().join("mapping");
     let drive = DriveParams { rate_hz: 2.0, ..DriveParams::default() };
-    let mut robot = Robot::new(building.clone(), &RobotParams { drive, ..RobotParams::default() });
+    let robot = Robot::new(building.clone(), &RobotParams { drive, ..RobotParams::default() });
     let camera = *robot.camera().intrinsics();
     let origin = robot.clone().next().unwrap().step.map_from_robot;
     let mut mappings = MappingSessions::default();
     mappings.resume_in(journals(), |_, _| true);
     mappings.begin(&name("hall"), &name("r1"), (origin, true)).unwrap();
-    let mut scans = 0;
-    while let Some(readings) = robot.next() {
-        if scans == 30 {
+    for (scans, readings) in (1_u64..).zip(robot) {
+        if scans == 31 {
             mappings = MappingSessions::default();
             mappings.resume_in(journals(), |_, _| true);
             wait(|| mappings.progress("hall").unwrap().stage == MappingStage::Mapping);
@@ -254,7 +253,6 @@ async fn frames_of_a_drive_give_landmarks_also_after_a_restart() {
             sent.epoch = 5;
             mappings.offer_frame(&name("r1"), "hall", &sent);
         }
-        scans += 1;
         wait(|| mappings.progress("hall").unwrap().scans == scans);
     }
     let progress = mappings.progress("hall").unwrap();

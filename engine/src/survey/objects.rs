@@ -80,7 +80,7 @@ pub(super) fn objects(
         ViewTracker::new(GatherParams { min_sightings: MIN_SIGHTINGS, ..GatherParams::default() });
     let mut kept: BTreeMap<u32, Kept> = BTreeMap::new();
     for (frame, sightings) in seen.iter().enumerate() {
-        let placed: Vec<(QuadObservation, [Matrix2<f64>; 4], (usize, f64))> =
+        let placed: Vec<Observed> =
             sightings.iter().filter_map(|sighting| observed(frame, sighting, known, &walls)).collect();
         let quads: Vec<QuadObservation> = placed.iter().map(|(quad, ..)| quad.clone()).collect();
         let at = (drive.frames[frame].frame.captured_ns, CAMERA);
@@ -99,6 +99,9 @@ pub(super) fn objects(
     along_first_border(drive, objects, (params, effort))
 }
 
+/// A sighting as the tracker takes it, its covariances, and its wall with the way along it.
+type Observed = (QuadObservation, [Matrix2<f64>; 4], (usize, f64));
+
 /// A followed object.
 struct Kept {
     /// What its first view shows.
@@ -107,14 +110,8 @@ struct Kept {
     on_wall: (usize, f64),
 }
 
-/// A sighting as the tracker takes it, with its covariances and its wall. `None` where it lies on
-/// no wall.
-fn observed(
-    frame: usize,
-    sighting: &Sighting,
-    known: &Known,
-    walls: &[LaserSegment],
-) -> Option<(QuadObservation, [Matrix2<f64>; 4], (usize, f64))> {
+/// `None` where a sighting lies on no wall.
+fn observed(frame: usize, sighting: &Sighting, known: &Known, walls: &[LaserSegment]) -> Option<Observed> {
     let sigmas = Vector3::from(NEAR_SIGMA);
     let covariance = Matrix3::from_diagonal(&sigmas.component_mul(&sigmas));
     let view = PosedView {

@@ -246,10 +246,8 @@ fn aligned(pairs: &[(Vector2<f64>, Vector2<f64>)]) -> Vec<f64> {
         return Vec::new();
     }
     let n = pairs.len() as f64;
-    let mean = |of: fn(&(Vector2<f64>, Vector2<f64>)) -> Vector2<f64>| {
-        pairs.iter().map(of).sum::<Vector2<f64>>() / n
-    };
-    let (found, truth) = (mean(|p| p.0), mean(|p| p.1));
+    let found = pairs.iter().map(|p| p.0).sum::<Vector2<f64>>() / n;
+    let truth = pairs.iter().map(|p| p.1).sum::<Vector2<f64>>() / n;
     let (mut dot, mut cross) = (0.0, 0.0);
     for (a, b) in pairs {
         let (a, b) = (a - found, b - truth);

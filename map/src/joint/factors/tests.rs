@@ -92,8 +92,7 @@ fn factors() -> Vec<Factor> {
         landmark,
         camera: 0,
         mounting_from_camera: head(),
-        corners_px: [(600.0, 400.0), (700.0, 410.0), (690.0, 500.0), (610.0, 505.0)]
-            .map(|(x, y)| Point2::new(x, y)),
+        corners_px: [[600.0, 400.0], [700.0, 410.0], [690.0, 500.0], [610.0, 505.0]].map(Point2::from),
         sqrt_information: [corner; 4],
     };
     let line = |wall| LineFit {
