@@ -25,7 +25,7 @@ impl std::fmt::Debug for Effort<'_> {
 
 impl Effort<'_> {
     /// The results of all items, in their order.
-    pub(super) fn of_each<T: Sync, R: Send>(
+    pub fn of_each<T: Sync, R: Send>(
         self,
         items: &[T],
         what: &'static str,

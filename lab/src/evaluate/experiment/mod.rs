@@ -17,15 +17,13 @@ pub(crate) mod answers;
 pub(crate) mod confidence;
 
 use cli::screen;
+use engine::survey::Effort;
 use lesson::Taught;
 use pictures::Part;
 use serde::Serialize;
 use std::{
+    num::NonZeroUsize,
     path::{Path, PathBuf},
-    sync::{
-        Mutex, PoisonError,
-        atomic::{AtomicUsize, Ordering},
-    },
 };
 use vision::params::{Params, preset::Preset};
 
@@ -177,24 +175,9 @@ pub(crate) fn of_each<T: Sync, R: Send>(
     work: impl Fn(usize, &T) -> R + Sync,
 ) -> Vec<R> {
     let progress = screen::progress(items.len(), what);
-    let threads = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
-    let next = AtomicUsize::new(0);
-    let results = Mutex::new(Vec::with_capacity(items.len()));
-    std::thread::scope(|scope| {
-        for _ in 0..threads.min(items.len()) {
-            scope.spawn(|| {
-                loop {
-                    let index = next.fetch_add(1, Ordering::Relaxed);
-                    let Some(item) = items.get(index) else { return };
-                    let result = work(index, item);
-                    results.lock().unwrap_or_else(PoisonError::into_inner).push((index, result));
-                    progress.inc(1);
-                }
-            });
-        }
-    });
+    let threads = std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
+    let told = |_: &'static str, _: usize, _: usize| progress.inc(1);
+    let results = Effort { threads, told: &told }.of_each(items, what, work);
     progress.finish_and_clear();
-    let mut results = results.into_inner().unwrap_or_else(PoisonError::into_inner);
-    results.sort_unstable_by_key(|(index, _)| *index);
-    results.into_iter().map(|(_, result)| result).collect()
+    results
 }
