@@ -17,8 +17,8 @@ pub use frame::{
     relocalise, slots, workers,
 };
 pub use observers::{
-    Observers, answer_records, cameras, findings, frame_tap, frame_times, kept_frames, live, prior_check,
-    robot_activity, unknown_robots,
+    Observers, answer_records, cameras, findings, frame_tap, frame_times, kept_frames, live, mapping_tap,
+    prior_check, robot_activity, unknown_robots,
 };
 pub use supervision::{heartbeats, panics, threads, vitals};
 

@@ -7,10 +7,8 @@
 mod record;
 mod journal;
 mod session;
-mod tap;
 
-pub use session::{MAX_SCANS, QUEUE};
-pub use tap::MappingTap;
+pub use session::{FRAMES_WAITING, MAX_SCANS, QUEUE};
 
 use crate::scan_job::ScanJob;
 use crate::supervision::panics::Panics;
@@ -90,6 +88,8 @@ pub struct MappingProgress {
     pub frames: Option<usize>,
     /// Frames that cannot be used: how many of the most frequent kind, and why.
     pub frames_refused: Option<(u64, String)>,
+    /// Frames that were dropped: [`FRAMES_WAITING`] waited.
+    pub frames_dropped: u64,
     /// Landmarks that are proposed, once they are found.
     pub landmarks: Option<usize>,
     /// Number of the gathering that has them, once they are stored.
@@ -219,11 +219,11 @@ impl MappingSessions {
     }
 
     /// Takes a frame of a robot with an open mapping that looks for landmarks.
-    pub fn offer_frame(&self, robot: &Name, map: &str, frame: &CheckedFrame) {
+    pub fn offer_frame(&self, (robot, camera): (&Name, &Name), map: &str, frame: &CheckedFrame) {
         // A worker does not wait while a mapping begins: a frame may be missed.
         let Ok(mut all) = self.all.try_lock() else { return };
         if let Some(session) = all.get_mut(map).filter(|s| s.takes() && s.robot == *robot) {
-            session.offer_frame(frame);
+            session.offer_frame(camera, frame);
         }
     }
 

@@ -33,7 +33,7 @@ use engine::{
     findings::{LandmarkFinding, findings},
     intake::Intake,
     live::LiveHub,
-    mapping::MappingTap,
+    mapping_tap::MappingTap,
     motion::MotionTracker,
     panics::Panics,
     quotas::{Quotas, Rates},

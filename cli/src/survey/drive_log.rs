@@ -62,9 +62,9 @@ pub(super) fn read(path: &Path, drives: &DriveArgs, camera: Option<&Name>) -> an
             }
             (Key::Frame(of, name), Body::Frame(frame)) if of == robot => {
                 let is_wanted = camera.is_none_or(|camera| *camera == name);
-                cameras.insert(name);
+                cameras.insert(name.clone());
                 match CheckedFrame::try_from(frame) {
-                    Ok(frame) if is_wanted => drop(reading.frame(frame)),
+                    Ok(frame) if is_wanted => drop(reading.frame(&name, frame)),
                     Ok(_) => {}
                     Err(why) => reading.refused(&why),
                 }

@@ -20,17 +20,21 @@ const FRAME: u8 = 2;
 #[derive(Debug, Clone)]
 pub(super) enum Record {
     Scan(ScanJob),
-    Frame(Box<CheckedFrame>),
+    /// Of this camera.
+    Frame(Name, Box<CheckedFrame>),
 }
 
 impl Record {
-    /// One byte of its kind, and the message of the wire.
+    /// One byte of its kind, and the message of the wire; of a frame, between the two, the length
+    /// and the name of its camera.
     pub(super) fn bytes(&self) -> Vec<u8> {
-        let (kind, bytes) = match self {
-            Self::Scan(job) => (SCAN, scan_wire(job).encode_to_vec()),
-            Self::Frame(frame) => (FRAME, frame_wire(frame).encode_to_vec()),
-        };
-        [&[kind], &bytes[..]].concat()
+        match self {
+            Self::Scan(job) => [&[SCAN], &scan_wire(job).encode_to_vec()[..]].concat(),
+            Self::Frame(camera, frame) => {
+                let name = camera.as_str().as_bytes();
+                [&[FRAME, name.len() as u8], name, &frame_wire(frame).encode_to_vec()].concat()
+            }
+        }
     }
 
     /// A record of a map's journal; checked again.
@@ -42,7 +46,13 @@ impl Record {
                 let CheckedScan { epoch, captured_ns, odom_from_robot, scan, .. } = checked;
                 Some(Self::Scan(ScanJob { map: map.to_string(), epoch, captured_ns, odom_from_robot, scan }))
             }
-            FRAME => Some(Self::Frame(Box::new(CheckedFrame::try_from(v1::Frame::decode(wire).ok()?).ok()?))),
+            FRAME => {
+                let (length, rest) = wire.split_first()?;
+                let (name, wire) = rest.split_at_checked(usize::from(*length))?;
+                let camera = Name::new(str::from_utf8(name).ok()?).ok()?;
+                let frame = CheckedFrame::try_from(v1::Frame::decode(wire).ok()?).ok()?;
+                Some(Self::Frame(camera, Box::new(frame)))
+            }
             _ => None,
         }
     }
@@ -51,7 +61,7 @@ impl Record {
     pub(super) fn epoch(&self) -> Option<u64> {
         match self {
             Self::Scan(job) => Some(job.epoch),
-            Self::Frame(_) => None,
+            Self::Frame(..) => None,
         }
     }
 }

@@ -24,15 +24,17 @@ use std::{
     num::NonZeroUsize,
     sync::{
         Arc, Mutex, MutexGuard, PoisonError,
-        atomic::{AtomicBool, Ordering},
+        atomic::{AtomicBool, AtomicUsize, Ordering},
         mpsc::{Receiver, SyncSender, sync_channel},
     },
 };
 use tokio::sync::oneshot;
 use vision::params::Params;
 
-/// Scans and frames that wait to be mapped; more are dropped, and scans are counted.
+/// Scans and frames that wait to be mapped; more are dropped and counted.
 pub const QUEUE: usize = 64;
+/// Frames among them: one may take some megabytes.
+pub const FRAMES_WAITING: usize = 4;
 /// Most scans of one mapping.
 pub const MAX_SCANS: u64 = 100_000;
 
@@ -63,8 +65,9 @@ pub(super) struct Session {
     commands: Option<SyncSender<Command>>,
     /// What waits to be accepted.
     pub(super) held: Option<MadeMap>,
-    /// Whether frames are taken.
+    /// Whether frames are taken, and how many wait.
     landmarks: bool,
+    waiting: Arc<AtomicUsize>,
     progress: Shared,
 }
 
@@ -92,6 +95,7 @@ impl Session {
             dropped: 0,
             frames: landmarks.then_some(0),
             frames_refused: None,
+            frames_dropped: 0,
             landmarks: None,
             gathering: None,
             distance_m: 0.0,
@@ -102,18 +106,20 @@ impl Session {
             journal_error: None,
         }));
         let (commands, received) = sync_channel(QUEUE);
-        let shared = progress.clone();
+        let (shared, waiting) = (progress.clone(), Arc::new(AtomicUsize::new(0)));
+        let waits = waiting.clone();
         let work = move || {
             // A panic leaves nothing shared half changed: the map so far belongs to this thread.
             let mapper = Mapper::new(shared.clone(), (origin, landmarks), no_room);
-            let run = || mapper.run(start, first, &received);
+            let run = || mapper.run(start, first, (&received, &waits));
             if panics.catch(Edge::Mapping, "a mapping", "this mapping has failed", run).is_none() {
                 fail(&shared, "the server failed on these scans; see its log");
             }
         };
         let thread = threads::spawn(Class::Background, "mapping", work);
         thread.inspect_err(|error| tracing::error!(%error, "mapping_thread_failed")).ok()?;
-        Some(Self { robot: head.robot, epoch, commands: Some(commands), held: None, landmarks, progress })
+        let (robot, commands) = (head.robot, Some(commands));
+        Some(Self { robot, epoch, commands, held: None, landmarks, waiting, progress })
     }
 
     /// Whether it is open: resuming, mapping, or waiting to be accepted or stored.
@@ -156,10 +162,19 @@ impl Session {
     }
 
     /// Queues a frame, or drops it; never waits. One of another epoch has another odometry.
-    pub(super) fn offer_frame(&mut self, frame: &CheckedFrame) {
-        if let (true, Some(commands)) = (self.landmarks && self.epoch == Some(frame.epoch), &self.commands) {
-            drop(commands.try_send(Command::Record(Box::new(Record::Frame(Box::new(frame.clone()))))));
+    pub(super) fn offer_frame(&mut self, camera: &Name, frame: &CheckedFrame) {
+        let is_ours = self.landmarks && self.epoch == Some(frame.epoch);
+        let Some(commands) = self.commands.as_ref().filter(|_| is_ours) else { return };
+        // Only the thread takes from them meanwhile.
+        if self.waiting.load(Ordering::Relaxed) < FRAMES_WAITING {
+            self.waiting.fetch_add(1, Ordering::Relaxed);
+            let record = Record::Frame(camera.clone(), Box::new(frame.clone()));
+            if commands.try_send(Command::Record(Box::new(record))).is_ok() {
+                return;
+            }
+            self.waiting.fetch_sub(1, Ordering::Relaxed);
         }
+        lock(&self.progress).frames_dropped += 1;
     }
 
     /// Asks for what was made: what is held, or that of all scans, after those that wait. `None` if
@@ -227,7 +242,12 @@ impl Mapper {
     }
 
     /// Maps the journal, then scans until the mapping finishes or is cancelled.
-    fn run(mut self, start: Start, first: Option<Record>, commands: &Receiver<Command>) {
+    fn run(
+        mut self,
+        start: Start,
+        first: Option<Record>,
+        (commands, waiting): (&Receiver<Command>, &AtomicUsize),
+    ) {
         let ready = match start {
             Start::New(_, journal) => {
                 self.write_to(journal);
@@ -235,7 +255,7 @@ impl Mapper {
             }
             Start::Resumed(journal) => self.resume(journal, first),
         };
-        if let Err(reason) = ready.and_then(|()| self.obey(commands)) {
+        if let Err(reason) = ready.and_then(|()| self.obey(commands, waiting)) {
             fail(&self.progress, &reason);
         }
     }
@@ -258,10 +278,13 @@ impl Mapper {
         Ok(())
     }
 
-    fn obey(&mut self, commands: &Receiver<Command>) -> Result<(), String> {
+    fn obey(&mut self, commands: &Receiver<Command>, waiting: &AtomicUsize) -> Result<(), String> {
         while let Ok(command) = commands.recv() {
             match command {
                 Command::Record(record) => {
+                    if matches!(*record, Record::Frame(..)) {
+                        waiting.fetch_sub(1, Ordering::Relaxed);
+                    }
                     if self.add(&record)? {
                         self.write(&record);
                     }
@@ -330,9 +353,9 @@ impl Mapper {
     fn add(&mut self, record: &Record) -> Result<bool, String> {
         match record {
             Record::Scan(job) => self.add_scan(job).map(|()| true),
-            Record::Frame(frame) => {
+            Record::Frame(camera, frame) => {
                 let Some(drive) = &mut self.drive else { return Ok(false) };
-                let kept = drive.frame((**frame).clone());
+                let kept = drive.frame(camera, (**frame).clone());
                 let mut progress = lock(&self.progress);
                 progress.frames = Some(drive.frames());
                 progress.frames_refused = drive.problems().values().max_by_key(|(count, _)| *count).cloned();

@@ -203,6 +203,34 @@ fn a_journal_error_is_reported_and_a_cancelled_journal_is_removed() {
     assert!(again.progress("house").is_none() && files() == 0, "its robot is on another map");
 }
 
+/// Offers a frame of the robot's camera.
+fn offer_frame(mappings: &MappingSessions, frame: &CheckedFrame) {
+    mappings.offer_frame((&name("r1"), &name("front")), "hall", frame);
+}
+
+#[test]
+fn frames_that_wait_are_bounded_and_what_is_dropped_is_counted() {
+    let (mappings, building) = (MappingSessions::default(), Arc::new(Building::corridor(7)));
+    mappings.begin(&name("hall"), &name("r1"), (Pose2::default(), true)).unwrap();
+    let mut robot = Robot::new(building.clone(), &RobotParams::default());
+    let camera = *robot.camera().intrinsics();
+    let sent = CheckedFrame { mounting: None, ..frame(&robot.next().unwrap(), &camera) };
+    // Scans keep the thread at work while frames come.
+    for i in 0..QUEUE / 2 {
+        let at = Pose2::new(2.0 + 0.02 * i as f64, 0.0, 0.0);
+        mappings.offer(&name("r1"), job("hall", 5, at, scan(&building, &at, 1)));
+    }
+    let count = 20 * FRAMES_WAITING as u64;
+    (0..count).for_each(|_| offer_frame(&mappings, &sent));
+    let told = || {
+        let progress = mappings.progress("hall").unwrap();
+        (progress.frames_refused.map_or(0, |(count, _)| count), progress.frames_dropped)
+    };
+    wait(|| told().0 + told().1 == count);
+    // Without a bound of their own the queue would hold half of them.
+    assert!(told().1 >= count - 3 * FRAMES_WAITING as u64, "{:?}", told());
+}
+
 /// What a robot sends of its frames.
 fn frame(readings: &sim::robot::SensorReadings, camera: &vision::frame::Intrinsics) -> CheckedFrame {
     let image = &readings.frame.image;
@@ -246,12 +274,12 @@ async fn frames_of_a_drive_give_landmarks_also_after_a_restart() {
         let job = ScanJob { captured_ns, ..job("hall", 5, step.odom_from_robot, readings.scan.clone()) };
         assert!(mappings.offer(&name("r1"), job).is_none());
         let mut sent = frame(&readings, &camera);
-        mappings.offer_frame(&name("r1"), "hall", &sent);
+        offer_frame(&mappings, &sent);
         (sent.epoch, sent.mounting) = (6, None);
-        mappings.offer_frame(&name("r1"), "hall", &sent);
+        offer_frame(&mappings, &sent);
         if step.index == 3 {
             sent.epoch = 5;
-            mappings.offer_frame(&name("r1"), "hall", &sent);
+            offer_frame(&mappings, &sent);
         }
         wait(|| mappings.progress("hall").unwrap().scans == scans);
     }

@@ -25,7 +25,8 @@ impl FrameObserver for MappingTap {
     fn answered(&self, answered: &AnsweredFrame<'_>) {
         // A frame whose capture time cannot be right has no odometry.
         if let Some(found) = answered.analysed.filter(|found| matches!(found.effect, Effect::Full)) {
-            self.0.mappings().offer_frame(&answered.key.robot, &found.map.name, answered.frame);
+            let of = (&answered.key.robot, &answered.key.camera);
+            self.0.mappings().offer_frame(of, &found.map.name, answered.frame);
         }
     }
 }

@@ -7,6 +7,7 @@ pub mod frame_tap;
 pub mod frame_times;
 pub mod kept_frames;
 pub mod live;
+pub mod mapping_tap;
 pub mod prior_check;
 pub mod robot_activity;
 pub mod unknown_robots;

@@ -81,6 +81,11 @@ impl SurveyedBuilding {
     pub fn mounting(&self, stated: &Isometry3<f64>) -> Isometry3<f64> {
         self.camera.0.robot_from_camera * self.stated.robot_from_camera.inverse() * stated
     }
+
+    /// Intrinsics with the focal length as found; their lens stays.
+    pub fn intrinsics(&self, stated: &Intrinsics) -> Intrinsics {
+        with_focal(stated, self.camera.0.focal_px)
+    }
 }
 
 /// Why a drive gives no building.
@@ -89,6 +94,12 @@ pub enum SurveyError {
     /// There is nothing to look at.
     #[error("no frame with intrinsics and the camera's mounting")]
     NoFrame,
+    /// The laser map is not that of the drive's scans.
+    #[error("{0} scans were driven, {1} are in the laser map")]
+    Scans(usize, usize),
+    /// Frames cannot be put between scans.
+    #[error("the capture time of scan {0} is not after that of the scan before")]
+    Times(usize),
     /// The estimate cannot be computed.
     #[error(transparent)]
     Joint(#[from] JointError),
@@ -104,6 +115,12 @@ pub fn surveyed(
     origin: &Pose2,
     (params, effort): (&Params, Effort<'_>),
 ) -> Result<SurveyedBuilding, SurveyError> {
+    if drive.scans.is_empty() || drive.scans.len() != slam.path.len() {
+        return Err(SurveyError::Scans(drive.scans.len(), slam.path.len()));
+    }
+    if let Some(i) = drive.scans.windows(2).position(|pair| pair[1].captured_ns <= pair[0].captured_ns) {
+        return Err(SurveyError::Times(i + 1));
+    }
     let slam = &beginning_at(slam, origin);
     let (seen, undecodable) = sightings(drive, params, effort);
     let camera = drive.frames.first().and_then(|first| first.frame.intrinsics).ok_or(SurveyError::NoFrame)?;
@@ -113,9 +130,10 @@ pub fn surveyed(
         return Err(SurveyError::NoFrame);
     }
     let stated = state_of(&camera, &mountings[0].robot_from_camera);
+    let laser_frames = by_laser(drive, slam);
     let mut known = Known {
         walls: slam.walls.iter().enumerate().map(|(of, wall)| whole(of, wall)).collect(),
-        frames: by_laser(drive, slam),
+        frames: laser_frames.clone(),
         mountings,
         camera,
     };
@@ -125,7 +143,13 @@ pub fn surveyed(
         let found = objects(drive, &seen, &known, (params, effort));
         let map = solved(drive, slam, &found, &camera, &stated)?;
         if round == ROUNDS {
-            return Ok(made(drive, slam, found, map, stated, undecodable));
+            return Ok(SurveyedBuilding {
+                laser_walls: slam.walls.clone(),
+                laser_frames,
+                loops: slam.loops.len(),
+                undecodable,
+                ..made(found, map, stated)
+            });
         }
         known = corrected(drive, &map, &camera, &stated)?;
     }
@@ -226,25 +250,12 @@ fn corrected(
     })
 }
 
-impl SurveyedBuilding {
-    /// Intrinsics with the focal length as found; their lens stays.
-    pub fn intrinsics(&self, stated: &Intrinsics) -> Intrinsics {
-        with_focal(stated, self.camera.0.focal_px)
-    }
-}
-
 fn with_focal(camera: &Intrinsics, focal_px: f64) -> Intrinsics {
     Intrinsics { fx_px: focal_px, fy_px: focal_px * camera.fy_px / camera.fx_px, ..*camera }
 }
 
-fn made(
-    drive: &Drive,
-    slam: &SlamMap,
-    found: Vec<SeenObject>,
-    map: JointLaserMap,
-    stated: CameraState,
-    undecodable: usize,
-) -> SurveyedBuilding {
+/// The solution, without what is of the laser map and the frames.
+fn made(found: Vec<SeenObject>, map: JointLaserMap, stated: CameraState) -> SurveyedBuilding {
     let mut objects = Vec::new();
     for (seen, mapped) in found.into_iter().zip(&map.objects) {
         let Some(mapped) = mapped else { continue };
@@ -253,18 +264,17 @@ fn made(
         objects.push(SurveyedObject { place: mapped.place, views: seen.views, refused });
     }
     refuse_twins(&mut objects);
-    debug_assert_eq!(map.frames.len(), drive.frames.len());
     SurveyedBuilding {
         walls: map.walls.into_iter().map(|wall| wall.segment).collect(),
-        laser_walls: slam.walls.clone(),
-        laser_frames: by_laser(drive, slam),
+        laser_walls: Vec::new(),
+        laser_frames: Vec::new(),
         objects,
         frames: map.frames,
         camera: (map.camera, map.camera_sigmas),
         stated,
         odometry_scale: map.odometry.scale,
-        loops: slam.loops.len(),
-        undecodable,
+        loops: 0,
+        undecodable: 0,
     }
 }
 
@@ -310,7 +320,7 @@ fn refuse_twins(objects: &mut [SurveyedObject]) {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{super::drive::ScanStamp, *};
     use map::place::PlaceSigmas;
     use nalgebra::Vector3;
     use vision::{geometry::Corners, pose::LandmarkSize};
@@ -343,6 +353,23 @@ mod tests {
         vague.covariance[(0, 0)] = 0.09;
         let why = refusal(&vague, 0.9, &poses(&[-0.5, 0.0, 0.5, 1.0])).unwrap();
         assert_eq!(why, "its place is known to 0.30 m only");
+    }
+
+    #[test]
+    fn a_drive_whose_scans_go_back_in_time_is_refused() {
+        let (told, params) = (|_: &'static str, _: usize, _: usize| {}, Params::default());
+        let effort = Effort { threads: std::num::NonZeroUsize::MIN, told: &told };
+        let surveyed_at = |times: &[i64]| {
+            let stamp = |captured_ns: &i64| ScanStamp { captured_ns: *captured_ns, odom: Pose2::default() };
+            let drive = Drive { scans: times.iter().map(stamp).collect(), frames: Vec::new() };
+            let path = vec![Pose2::default(); times.len()];
+            let slam = SlamMap { path, keys: Vec::new(), loops: Vec::new(), refused: 0, walls: Vec::new() };
+            surveyed(&drive, slam, &Pose2::default(), (&params, effort)).unwrap_err()
+        };
+        assert_eq!(surveyed_at(&[]), SurveyError::Scans(0, 0));
+        assert_eq!(surveyed_at(&[5, 9, 8]), SurveyError::Times(2));
+        assert_eq!(surveyed_at(&[0, 0]), SurveyError::Times(1));
+        assert_eq!(surveyed_at(&[5, 9]), SurveyError::NoFrame);
     }
 
     #[test]

@@ -3,13 +3,14 @@
 //! was not used.
 
 use map::pose2::{Pose2, wrap_rad};
-use protos::{CheckedFrame, Rejection, convert::frame::Pixels};
+use protos::{CheckedFrame, Name, Rejection, convert::frame::Pixels};
 use std::collections::BTreeMap;
+use vision::frame::Intrinsics;
 
 /// Most frames of a survey, and most bytes of their images.
 pub const OF_FILE: DriveBounds = DriveBounds { frames: 20_000, image_bytes: 1 << 30 };
-/// The same of a survey while it drives: some 130 m with pictures of 50 kB.
-pub const WHILE_DRIVING: DriveBounds = DriveBounds { frames: 4096, image_bytes: 64 << 20 };
+/// The same of a survey while it drives: some 110 m with pictures of 50 kB.
+pub const WHILE_DRIVING: DriveBounds = DriveBounds { frames: 4096, image_bytes: 56 << 20 };
 /// A frame counts after this motion of the camera: metres and radians.
 const MOVED_M: f64 = 0.1;
 const TURNED_RAD: f64 = 0.05;
@@ -56,6 +57,8 @@ pub struct DriveBounds {
 #[derive(Debug)]
 pub struct DriveReading {
     most: DriveBounds,
+    /// Of the first frame.
+    camera: Option<(Name, Intrinsics)>,
     scans: Vec<ScanStamp>,
     frames: Vec<CheckedFrame>,
     image_bytes: usize,
@@ -67,8 +70,8 @@ pub struct DriveReading {
 impl DriveReading {
     /// Nothing is read yet.
     pub fn new(most: DriveBounds) -> Self {
-        let (scans, frames, odometry, problems) = Default::default();
-        Self { most, scans, frames, image_bytes: 0, odometry, problems }
+        let (camera, scans, frames, odometry, problems) = Default::default();
+        Self { most, camera, scans, frames, image_bytes: 0, odometry, problems }
     }
 
     /// A message that is not used.
@@ -91,17 +94,26 @@ impl DriveReading {
         self.odometry.insert(captured_ns, odom);
     }
 
-    /// A frame of the camera. It is left out if the camera has not moved; and counted besides if it
-    /// has no intrinsics or mounting, is no whole image, or beyond a bound. Whether it is kept.
-    pub fn frame(&mut self, frame: CheckedFrame) -> bool {
+    /// A frame. It is left out if its camera has not moved; and counted besides if it has no
+    /// intrinsics or mounting, is no whole image, of another camera or calibration than the first,
+    /// or beyond a bound. Whether it is kept.
+    pub fn frame(&mut self, camera: &Name, frame: CheckedFrame) -> bool {
         let Pixels::Image(image) = &frame.pixels else {
             self.problem("no_image", || "quads without their image".into());
             return false;
         };
-        if frame.intrinsics.is_none() || frame.mounting.is_none() {
+        // How well they are known may be stated later.
+        let stated = frame.intrinsics.map(|camera| Intrinsics { sigmas: None, ..camera });
+        let Some(intrinsics) = stated.filter(|_| frame.mounting.is_some()) else {
             self.problem("no_camera", || {
                 "a frame without intrinsics or without the camera's mounting".into()
             });
+            return false;
+        };
+        if let Some((first, known)) = self.camera.clone().filter(|of| *of != (camera.clone(), intrinsics)) {
+            let other = known != intrinsics && first == *camera;
+            let what = if other { "with other intrinsics than the first" } else { "of another camera" };
+            self.problem("another_camera", || format!("a frame {what}; only `{first}` is used, as it began"));
             return false;
         }
         if !self.has_moved(&frame) {
@@ -115,6 +127,7 @@ impl DriveReading {
             return false;
         }
         self.image_bytes = bytes;
+        self.camera = Some((camera.clone(), intrinsics));
         self.frames.push(frame);
         true
     }
@@ -178,7 +191,11 @@ mod tests {
     use map::extrinsics::CameraExtrinsics;
     use nalgebra::Isometry3;
     use protos::convert::frame::{EncodedImage, Encoding};
-    use vision::frame::{Distortion, Intrinsics};
+    use vision::frame::Distortion;
+
+    fn front() -> Name {
+        Name::new("front").unwrap()
+    }
 
     fn frame(captured_ns: i64) -> CheckedFrame {
         CheckedFrame {
@@ -206,14 +223,14 @@ mod tests {
             .map(|(i, x_m)| {
                 let at_ns = i as i64 * 100_000_000;
                 reading.odometry(at_ns, Pose2::new(x_m, 0.0, 0.0));
-                reading.frame(frame(at_ns))
+                reading.frame(&front(), frame(at_ns))
             })
             .collect();
         assert_eq!(taken, [true, false, true, false, true]);
-        assert!(!reading.frame(CheckedFrame { mounting: None, ..frame(500_000_000) }));
+        assert!(!reading.frame(&front(), CheckedFrame { mounting: None, ..frame(500_000_000) }));
         // Two seconds after the last odometry.
         reading.odometry(2_000_000_000, Pose2::new(9.0, 0.0, 0.0));
-        assert!(reading.frame(frame(4_000_000_000)));
+        assert!(reading.frame(&front(), frame(4_000_000_000)));
         let (drive, problems) = reading.finished();
         assert_eq!(drive.frames.len(), 3);
         assert!((drive.frames[1].odom.x_m - 0.11).abs() < 1e-9);
@@ -221,10 +238,22 @@ mod tests {
     }
 
     #[test]
+    fn only_the_first_camera_counts_as_it_began() {
+        let mut reading = DriveReading::new(OF_FILE);
+        assert!(reading.frame(&front(), frame(0)));
+        assert!(!reading.frame(&Name::new("back").unwrap(), frame(1)));
+        let zoomed = Intrinsics { fx_px: 700.0, ..frame(2).intrinsics.unwrap() };
+        assert!(!reading.frame(&front(), CheckedFrame { intrinsics: Some(zoomed), ..frame(2) }));
+        assert!(reading.frame(&front(), frame(3)), "without odometry each frame counts");
+        let (count, first) = &reading.problems()["another_camera"];
+        assert!(*count == 2 && first.contains("of another camera; only `front`"), "{first}");
+    }
+
+    #[test]
     fn a_drive_is_bounded() {
         for most in [DriveBounds { frames: 9, image_bytes: 20 }, DriveBounds { frames: 2, image_bytes: 99 }] {
             let mut reading = DriveReading::new(most);
-            let taken = [0, 1, 2].map(|at_ns| reading.frame(frame(at_ns)));
+            let taken = [0, 1, 2].map(|at_ns| reading.frame(&front(), frame(at_ns)));
             assert_eq!((taken, reading.problems()["too_many"].0), ([true, true, false], 1));
         }
     }

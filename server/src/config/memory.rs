@@ -3,7 +3,12 @@
 //! under load (`waymark-lab bench load`).
 
 use super::Config;
-use engine::{decode::PICTURE_BYTES_PER_PX, live, mapping::MAX_MAPPINGS, survey::WHILE_DRIVING};
+use engine::{
+    decode::PICTURE_BYTES_PER_PX,
+    live,
+    mapping::{FRAMES_WAITING, MAX_MAPPINGS},
+    survey::WHILE_DRIVING,
+};
 
 /// The program itself: code, runtime, router, caches of the database.
 const PROGRAM_BYTES: usize = 96 << 20;
@@ -50,7 +55,10 @@ impl Config {
                 limits.connections * CONNECTION_BYTES + limits.streams * STREAM_BYTES,
             ),
             share("robots", limits.robots * ROBOT_BYTES),
-            share("frames of drives that make maps", MAX_MAPPINGS * WHILE_DRIVING.image_bytes),
+            share(
+                "frames of drives that make maps",
+                MAX_MAPPINGS * (WHILE_DRIVING.image_bytes + FRAMES_WAITING * limits.frame_bytes),
+            ),
         ]
     }
 
@@ -85,7 +93,7 @@ mod tests {
         let usual = of(|_| ());
         let changes: [(Change, usize); 7] = [
             (|l| l.waiting_frame_bytes += 10 << 20, 10),
-            (|l| l.frame_bytes += 1 << 20, live::MAX_CAMERAS),
+            (|l| l.frame_bytes += 1 << 20, live::MAX_CAMERAS + MAX_MAPPINGS * FRAMES_WAITING),
             (|l| l.replay_bytes += 7 << 20, 7),
             (|l| l.uploads += 1, 16),
             (|l| l.upload_bytes += 1 << 20, 16),

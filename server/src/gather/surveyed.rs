@@ -3,7 +3,6 @@
 
 use super::{Gatherer, new_view};
 use crate::store::{
-    StoreError,
     gatherings::{self, GatheringLimits, NewGathering},
     landmark_placement::StoredCapture,
     views::{NewView, QuadCrop},
@@ -28,17 +27,18 @@ type Proposal = (StoredTrack, Vec<NewView>);
 impl Gatherer {
     /// Stores the objects that a survey takes for landmarks; `None` where there are none. Beyond
     /// [`GatheringLimits::tracks`] those with fewest views are left out. Durable when this returns.
+    /// Errors: why, in words.
     pub(crate) async fn propose(
         self: &Arc<Self>,
         map: &str,
         robot: &str,
         made: Arc<MadeSurvey>,
-    ) -> Result<Option<i64>, StoreError> {
+    ) -> Result<Option<i64>, String> {
         let params = self.params.clone();
         let made = threads::run(Class::Background, move || proposals(&made, &params)).await;
         let (panics, what) = (self.store.vitals().panics(), "the views of a survey");
         let Ok(proposals) = panics.ended(Edge::Gathering, what, "it proposes nothing", made) else {
-            return Ok(None);
+            return Err("the server failed on the views; see its log".to_owned());
         };
         if proposals.is_empty() {
             return Ok(None);
@@ -59,7 +59,8 @@ impl Gatherer {
                 gatherings::end(tx, &map, row.id, "{}").await
             })
         });
-        Ok(Some(write.await?.id))
+        let stored = write.await.map_err(|error| error.to_string())?;
+        Ok(Some(stored.id))
     }
 }
 

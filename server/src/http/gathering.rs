@@ -203,10 +203,14 @@ pub(super) async fn accept_passing(app: &AppState, map: &str, id: i64) -> Result
     let known = app.store.snapshots().get(map);
     let taken: BTreeSet<String> =
         known.iter().flat_map(|map| map.landmarks.values().map(|landmark| landmark.name.clone())).collect();
-    let mut free = (1..).map(|number| format!("{map}-{number:02}")).filter(|name| !taken.contains(name));
+    let free = (1..).map(|number| format!("{map}-{number:02}")).filter(|name| !taken.contains(name));
     let passing = summaries(app, map, id).await?.into_iter().filter(|track| track.passes);
-    let picks: Vec<TrackAcceptance> =
-        passing.map(|track| TrackAcceptance { number: track.number, name: free.next() }).collect();
+    let pick = |(track, free): (TrackSummary, String)| {
+        // That of a map may be as long as a name can be.
+        let name = name("map", free)?;
+        Ok(TrackAcceptance { number: track.number, name: Some(name.to_string()) })
+    };
+    let picks: Vec<TrackAcceptance> = passing.zip(free).map(pick).collect::<Result<_, ApiError>>()?;
     if picks.is_empty() {
         return Ok(());
     }

@@ -17,7 +17,7 @@ use crate::{
 };
 use axum::{Extension, Json, extract::State, http::StatusCode};
 use engine::{
-    mapping::{MadeMap, MadeSurvey, MappingError, MappingProgress, MappingStage},
+    mapping::{FRAMES_WAITING, MadeMap, MadeSurvey, MappingError, MappingProgress, MappingStage},
     panics::Edge,
 };
 use futures::FutureExt;
@@ -41,7 +41,16 @@ fn refused(error: MappingError) -> ApiError {
     ApiError::new(status, code, error.to_string()).field("map")
 }
 
+fn frames_refused(progress: &MappingProgress) -> Option<String> {
+    let refused = progress.frames_refused.as_ref().map(|(count, first)| format!("{count} times {first}"));
+    let dropped = progress.frames_dropped;
+    let dropped = (dropped > 0).then(|| format!("{dropped} dropped: {FRAMES_WAITING} others waited"));
+    let told: Vec<String> = refused.into_iter().chain(dropped).collect();
+    (!told.is_empty()).then(|| told.join("; "))
+}
+
 fn shown(progress: MappingProgress) -> MappingProgressBody {
+    let frames_refused = frames_refused(&progress);
     MappingProgressBody {
         map: progress.map,
         robot: progress.robot,
@@ -56,7 +65,7 @@ fn shown(progress: MappingProgress) -> MappingProgressBody {
         scans: progress.scans,
         dropped: progress.dropped,
         frames: progress.frames,
-        frames_refused: progress.frames_refused.map(|(count, first)| format!("{count} times {first}")),
+        frames_refused,
         landmarks: progress.landmarks,
         gathering: progress.gathering,
         distance_m: progress.distance_m,
@@ -218,7 +227,7 @@ async fn propose(
     survey: Arc<MadeSurvey>,
     accept: bool,
 ) -> Result<Option<i64>, String> {
-    let gathering = app.gatherer.propose(map, robot, survey).await.map_err(|error| error.to_string())?;
+    let gathering = app.gatherer.propose(map, robot, survey).await?;
     if let (true, Some(id)) = (accept, gathering) {
         accept_passing(app, map, id).await.map_err(|error| error.told().to_owned())?;
     }
