@@ -33,7 +33,7 @@ async fn filled_with_pictures(store: &Catalogue) {
             for (table, picture) in [("views", photograph), ("underlays", floor)] {
                 let sha256 = pictures::digest(&picture);
                 pictures::put(tx, &sha256, &picture).await?;
-                let sql = format!("UPDATE {table} SET image_sha256 = ?1");
+                let sql = format!("UPDATE {table} SET image_sha256 = $1");
                 let done = sqlx::query(sqlx::AssertSqlSafe(sql)).bind(&sha256[..]).execute(tx.conn()).await;
                 done.map_err(StoreError::during("give a picture"))?;
             }

@@ -5,7 +5,7 @@ use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
 use vision::learn::aspect::AspectView;
 
 statements! {
-    ASPECTS = "SELECT width_px, height_px, corners_px, capture FROM views WHERE landmark_id = ?1 ORDER BY id DESC LIMIT 64";
+    ASPECTS = "SELECT width_px, height_px, corners_px, capture FROM views WHERE landmark_id = $1 ORDER BY id DESC LIMIT 64";
 }
 
 /// Corners, sizes and cameras of the newest views of a landmark.

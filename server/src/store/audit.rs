@@ -18,16 +18,17 @@ statements! {
             UNION ALL SELECT seq, sha256 FROM audit_start ORDER BY seq DESC LIMIT 1";
     START = "SELECT seq, sha256 FROM audit_start";
     INSERT = "INSERT INTO audit (seq, time_ms, actor, token, action, target, request, why, sha256) \
-              VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)";
+              VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9)";
     NEW_START = "UPDATE audit_start SET (seq, sha256) = (SELECT seq, sha256 FROM audit ORDER BY seq LIMIT 1)";
     FORGET = "DELETE FROM audit WHERE seq = (SELECT seq FROM audit_start)";
     ALL_ENTRIES = "SELECT seq, time_ms, actor, token, action, target, request, why, sha256 FROM audit ORDER BY seq";
-    PAGE = "SELECT seq, time_ms, actor, token, action, target, request, why, sha256 FROM audit WHERE seq < ?1 \
-            AND (?2 IS NULL OR actor = ?2) AND (?3 IS NULL OR substr(target, 1, length(?3)) = ?3) \
-            AND (?4 IS NULL OR time_ms >= ?4) AND (?5 IS NULL OR time_ms < ?5) ORDER BY seq DESC LIMIT ?6";
-    COUNT = "SELECT count(*) FROM audit WHERE (?1 IS NULL OR actor = ?1) \
-             AND (?2 IS NULL OR substr(target, 1, length(?2)) = ?2) \
-             AND (?3 IS NULL OR time_ms >= ?3) AND (?4 IS NULL OR time_ms < ?4)";
+    PAGE = "SELECT seq, time_ms, actor, token, action, target, request, why, sha256 FROM audit WHERE seq < $1 \
+            AND (CAST($2 AS TEXT) IS NULL OR actor = $2) \
+            AND (CAST($3 AS TEXT) IS NULL OR substr(target, 1, length($3)) = $3) \
+            AND (CAST($4 AS BIGINT) IS NULL OR time_ms >= $4) AND (CAST($5 AS BIGINT) IS NULL OR time_ms < $5) ORDER BY seq DESC LIMIT $6";
+    COUNT = "SELECT count(*) FROM audit WHERE (CAST($1 AS TEXT) IS NULL OR actor = $1) \
+             AND (CAST($2 AS TEXT) IS NULL OR substr(target, 1, length($2)) = $2) \
+             AND (CAST($3 AS BIGINT) IS NULL OR time_ms >= $3) AND (CAST($4 AS BIGINT) IS NULL OR time_ms < $4)";
 }
 
 /// Most entries that one transaction forgets: after `limits.audit_entries` was lowered, there may

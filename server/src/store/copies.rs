@@ -25,17 +25,17 @@ statements! {
     INTEGRITY = "PRAGMA integrity_check(20)";
     REFERENCES = "SELECT count(*) FROM pragma_foreign_key_check";
     MAPS = "SELECT id, name, version FROM maps ORDER BY name";
-    MAP = "SELECT * FROM maps WHERE id = ?1";
-    LANDMARKS = "SELECT * FROM landmarks WHERE map_id = ?1 ORDER BY id";
-    VIEWS = "SELECT v.* FROM views v JOIN landmarks l ON l.id = v.landmark_id WHERE l.map_id = ?1 ORDER BY v.id";
-    MODELS = "SELECT m.* FROM models m JOIN landmarks l ON l.id = m.landmark_id WHERE l.map_id = ?1 ORDER BY m.landmark_id";
-    WALLS = "SELECT * FROM laser_segments WHERE map_id = ?1 ORDER BY ordinal";
+    MAP = "SELECT * FROM maps WHERE id = $1";
+    LANDMARKS = "SELECT * FROM landmarks WHERE map_id = $1 ORDER BY id";
+    VIEWS = "SELECT v.* FROM views v JOIN landmarks l ON l.id = v.landmark_id WHERE l.map_id = $1 ORDER BY v.id";
+    MODELS = "SELECT m.* FROM models m JOIN landmarks l ON l.id = m.landmark_id WHERE l.map_id = $1 ORDER BY m.landmark_id";
+    WALLS = "SELECT * FROM laser_segments WHERE map_id = $1 ORDER BY ordinal";
     MODEL_BYTES = "SELECT c.bytes AS model, m.sha256, l.name AS landmark, p.name AS map FROM models m \
                    JOIN model_contents c ON c.sha256 = m.sha256 \
                    JOIN landmarks l ON l.id = m.landmark_id JOIN maps p ON p.id = l.map_id ORDER BY m.landmark_id";
-    QUARANTINED = "SELECT count(*) FROM damaged_pictures WHERE sha256 = ?1";
+    QUARANTINED = "SELECT count(*) FROM damaged_pictures WHERE sha256 = $1";
     SHOWN_BY = "SELECT 'view ' || v.id || ' of landmark ' || l.name || ', map ' || m.name FROM views v \
-                JOIN landmarks l ON l.id = v.landmark_id JOIN maps m ON m.id = l.map_id WHERE v.image_sha256 = ?1 LIMIT 1";
+                JOIN landmarks l ON l.id = v.landmark_id JOIN maps m ON m.id = l.map_id WHERE v.image_sha256 = $1 LIMIT 1";
 }
 
 /// Most faults that are listed.
@@ -80,7 +80,7 @@ pub(crate) async fn copy(data: &Path, to: &Path) -> Result<(), StoreError> {
     drop(private_file::create(to));
     let mut conn = open_live(&data.join(FILE)).await?;
     let copied =
-        sqlx::query("VACUUM INTO ?1").bind(to.to_string_lossy().into_owned()).execute(&mut conn).await;
+        sqlx::query("VACUUM INTO $1").bind(to.to_string_lossy().into_owned()).execute(&mut conn).await;
     conn.close().await.map_err(at())?;
     copied.map_err(at()).map(drop)
 }

@@ -14,10 +14,10 @@ use super::{
 use sqlx::{AssertSqlSafe, Connection as _, SqliteConnection};
 
 statements! {
-    TRIGGER = "SELECT sql FROM sqlite_schema WHERE type = 'trigger' AND name = ?1";
-    NAMES = "SELECT name FROM pragma_table_info(?1) ORDER BY cid";
+    TRIGGER = "SELECT sql FROM sqlite_schema WHERE type = 'trigger' AND name = $1";
+    NAMES = "SELECT name FROM pragma_table_info($1) ORDER BY cid";
     REFERENCES = "SELECT m.name, k.\"from\" FROM sqlite_schema m JOIN pragma_foreign_key_list(m.name) k \
-                  WHERE m.type = 'table' AND k.\"table\" = ?1 ORDER BY m.name";
+                  WHERE m.type = 'table' AND k.\"table\" = $1 ORDER BY m.name";
 }
 
 /// A trigger: its name, and what follows the name in its definition.
@@ -222,7 +222,7 @@ mod tests {
         let paint = |colour: &'static str| {
             store.write(move |tx| {
                 Box::pin(async move {
-                    let sql = "UPDATE landmarks SET colour = ?1";
+                    let sql = "UPDATE landmarks SET colour = $1";
                     let done = sqlx::query(sql).bind(colour).execute(tx.conn()).await;
                     done.map(drop).map_err(crate::store::StoreError::during("paint"))
                 })

@@ -24,33 +24,33 @@ macro_rules! select {
 }
 
 statements! {
-    COUNT = "SELECT count(*) FROM gatherings WHERE map_id = ?1";
+    COUNT = "SELECT count(*) FROM gatherings WHERE map_id = $1";
     COUNT_OPEN = "SELECT count(*) FROM gatherings WHERE open = 1";
     INSERT = "INSERT INTO gatherings (map_id, robot, landmark_id, known, open, created_ms) \
-              VALUES (?1, ?2, ?3, ?4, 1, ?5) RETURNING id";
-    GET = select!("WHERE m.name = ?1 AND g.id = ?2");
-    PAGE = select!("WHERE g.map_id = ?1 AND g.id > ?2 ORDER BY g.id LIMIT ?3");
+              VALUES ($1, $2, $3, $4, 1, $5) RETURNING id";
+    GET = select!("WHERE m.name = $1 AND g.id = $2");
+    PAGE = select!("WHERE g.map_id = $1 AND g.id > $2 ORDER BY g.id LIMIT $3");
     OPEN = select!("WHERE g.open = 1 ORDER BY g.id");
-    IS_OPEN = "SELECT open FROM gatherings WHERE id = ?1";
-    END = "UPDATE gatherings SET open = 0, counts = ?2, ended_ms = ?3 WHERE id = ?1";
-    DELETE = "DELETE FROM gatherings WHERE id = ?1";
-    PUT_TRACK = "INSERT INTO tracks (gathering_id, number, landmark_id, sightings, known) VALUES (?1, ?2, ?3, ?4, ?5) \
+    IS_OPEN = "SELECT open FROM gatherings WHERE id = $1";
+    END = "UPDATE gatherings SET open = 0, counts = $2, ended_ms = $3 WHERE id = $1";
+    DELETE = "DELETE FROM gatherings WHERE id = $1";
+    PUT_TRACK = "INSERT INTO tracks (gathering_id, number, landmark_id, sightings, known) VALUES ($1, $2, $3, $4, $5) \
                  ON CONFLICT (gathering_id, number) DO UPDATE SET sightings = excluded.sightings, known = excluded.known \
                  RETURNING state";
-    COUNT_TRACKS = "SELECT count(*) FROM tracks WHERE gathering_id = ?1 AND state = 'open'";
+    COUNT_TRACKS = "SELECT count(*) FROM tracks WHERE gathering_id = $1 AND state = 'open'";
     TRACKS = "SELECT t.number, t.landmark_id, l.name AS landmark, t.state, t.sightings, t.known, \
               (SELECT count(*) FROM track_views v WHERE v.gathering_id = t.gathering_id AND v.track = t.number) AS views \
-              FROM tracks t LEFT JOIN landmarks l ON l.id = t.landmark_id WHERE t.gathering_id = ?1 ORDER BY t.number";
+              FROM tracks t LEFT JOIN landmarks l ON l.id = t.landmark_id WHERE t.gathering_id = $1 ORDER BY t.number";
     INSERT_VIEW = "INSERT INTO track_views (gathering_id, track, image_sha256, image_kind, width_px, height_px, \
                    corners_px, icon_side, icon, icon_scale, created_ms, capture) \
-                   VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12) ON CONFLICT DO NOTHING";
-    COUNT_VIEWS = "SELECT count(*) FROM track_views WHERE gathering_id = ?1 AND track = ?2";
+                   VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12) ON CONFLICT DO NOTHING";
+    COUNT_VIEWS = "SELECT count(*) FROM track_views WHERE gathering_id = $1 AND track = $2";
     BYTES = "SELECT coalesce(sum(length(bytes)), 0) FROM pictures WHERE sha256 IN \
-             (SELECT image_sha256 FROM track_views WHERE gathering_id = ?1)";
+             (SELECT image_sha256 FROM track_views WHERE gathering_id = $1)";
     VIEWS = "SELECT id, image_sha256, width_px, height_px, corners_px, icon_side, icon, icon_scale, capture FROM track_views \
-             WHERE gathering_id = ?1 AND track = ?2 ORDER BY id";
-    DISCARD = "UPDATE tracks SET state = 'discarded' WHERE gathering_id = ?1 AND number = ?2 AND state = 'open'";
-    DROP_VIEWS = "DELETE FROM track_views WHERE gathering_id = ?1 AND track = ?2";
+             WHERE gathering_id = $1 AND track = $2 ORDER BY id";
+    DISCARD = "UPDATE tracks SET state = 'discarded' WHERE gathering_id = $1 AND number = $2 AND state = 'open'";
+    DROP_VIEWS = "DELETE FROM track_views WHERE gathering_id = $1 AND track = $2";
 }
 
 /// Bounds of gatherings.

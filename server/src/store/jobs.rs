@@ -1,28 +1,28 @@
 //! Jobs as rows: an accepted job survives a crash and is run again.
 
 use super::{CommittedChange, StoreError, Tx, kind::Kind, maps, now_ms, statements::statements, within};
+use serde_json::Value;
 use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
 
 statements! {
     COUNT_OPEN = "SELECT count(*) FROM jobs WHERE state IN ('queued', 'running')";
     INSERT = "INSERT INTO jobs (kind, map, request, state, created_ms, author, why) \
-              VALUES (?1, ?2, ?3, 'queued', ?4, ?5, ?6) RETURNING id";
-    GET = "SELECT id, kind, map, request, state, message, result, attempts, author, why, created_ms, started_ms, ended_ms FROM jobs WHERE id = ?1";
-    LIST = "SELECT id, kind, map, request, state, message, result, attempts, author, why, created_ms, started_ms, ended_ms FROM jobs WHERE id < ?1 \
-            AND (?2 IS NULL OR state = ?2) AND (?3 IS NULL OR map IN (SELECT value FROM json_each(?3))) ORDER BY id DESC LIMIT ?4";
-    COUNT = "SELECT count(*) FROM jobs WHERE (?1 IS NULL OR state = ?1) AND (?2 IS NULL OR map IN (SELECT value FROM json_each(?2)))";
+              VALUES ($1, $2, $3, 'queued', $4, $5, $6) RETURNING id";
+    GET = "SELECT id, kind, map, request, state, message, result, attempts, author, why, created_ms, started_ms, ended_ms FROM jobs WHERE id = $1";
+    LIST = "SELECT id, kind, map, request, state, message, result, attempts, author, why, created_ms, started_ms, ended_ms FROM jobs WHERE id < $1 \
+            AND ($2 IS NULL OR state = $2) AND ($3 IS NULL OR map IN (SELECT value FROM json_each($3))) ORDER BY id DESC LIMIT $4";
+    COUNT = "SELECT count(*) FROM jobs WHERE ($1 IS NULL OR state = $1) AND ($2 IS NULL OR map IN (SELECT value FROM json_each($2)))";
     OPEN = "SELECT id, kind, map, request, state, message, result, attempts, author, why, created_ms, started_ms, ended_ms FROM jobs \
             WHERE state IN ('queued', 'running') ORDER BY id";
-    BEGIN = "UPDATE jobs SET state = 'running', attempts = attempts + 1, started_ms = ?2 \
-             WHERE id = ?1 AND state IN ('queued', 'running')";
-    PUT_BACK = "UPDATE jobs SET state = 'queued', attempts = attempts - 1, started_ms = NULL WHERE id = ?1 AND state = 'running'";
-    END = "UPDATE jobs SET state = ?2, message = ?3, result = ?4, ended_ms = ?5 \
-           WHERE id = ?1 AND state IN ('queued', 'running')";
-    RENAME_LANDMARK = "UPDATE jobs SET request = json_set(request, '$.landmarks', json((SELECT \
-              json_group_array(CASE value WHEN ?2 THEN ?3 ELSE value END) FROM json_each(jobs.request, '$.landmarks')))) \
-              WHERE map = ?1 AND state IN ('queued', 'running') AND json_type(request, '$.landmarks') = 'array'";
+    BEGIN = "UPDATE jobs SET state = 'running', attempts = attempts + 1, started_ms = $2 \
+             WHERE id = $1 AND state IN ('queued', 'running')";
+    PUT_BACK = "UPDATE jobs SET state = 'queued', attempts = attempts - 1, started_ms = NULL WHERE id = $1 AND state = 'running'";
+    END = "UPDATE jobs SET state = $2, message = $3, result = $4, ended_ms = $5 \
+           WHERE id = $1 AND state IN ('queued', 'running')";
+    OPEN_REQUESTS = "SELECT id, request FROM jobs WHERE map = $1 AND state IN ('queued', 'running') ORDER BY id";
+    SET_REQUEST = "UPDATE jobs SET request = $2 WHERE id = $1";
     DELETE_OLD = "DELETE FROM jobs WHERE ended_ms IS NOT NULL AND id NOT IN \
-              (SELECT id FROM jobs WHERE ended_ms IS NOT NULL ORDER BY id DESC LIMIT ?1)";
+              (SELECT id FROM jobs WHERE ended_ms IS NOT NULL ORDER BY id DESC LIMIT $1)";
 }
 
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -80,8 +80,20 @@ fn job_row(row: &SqliteRow) -> Result<JobRow, sqlx::Error> {
 
 /// Gives a landmark its new name in what open jobs are asked for.
 pub(super) async fn rename_landmark(tx: &mut Tx, map: &str, name: &str, new: &str) -> Result<(), StoreError> {
-    let renamed = sqlx::query(RENAME_LANDMARK).bind(map).bind(name).bind(new).execute(&mut tx.conn).await;
-    renamed.map_err(StoreError::during("rename landmark in jobs")).map(drop)
+    let at = || StoreError::during("rename landmark in jobs");
+    let open = sqlx::query_as::<_, (i64, String)>(OPEN_REQUESTS).bind(map).fetch_all(&mut tx.conn).await;
+    for (id, request) in open.map_err(at())? {
+        let damaged =
+            |e: serde_json::Error| StoreError::Damaged { what: format!("job {id}"), reason: e.to_string() };
+        let mut request: Value = serde_json::from_str(&request).map_err(damaged)?;
+        let Some(Value::Array(landmarks)) = request.get_mut("landmarks") else { continue };
+        for landmark in landmarks.iter_mut().filter(|landmark| **landmark == name) {
+            *landmark = new.into();
+        }
+        let set = sqlx::query(SET_REQUEST).bind(id).bind(request.to_string());
+        set.execute(&mut tx.conn).await.map_err(at())?;
+    }
+    Ok(())
 }
 
 /// Queues a job and deletes the oldest finished ones beyond `retained`. Errors: more than `max`

@@ -16,10 +16,12 @@ use std::{
 };
 
 statements! {
-    FIND = "SELECT request_sha256, status, body FROM kept_answers WHERE key = ?1 AND created_ms > ?2";
-    KEEP = "INSERT OR REPLACE INTO kept_answers (key, request_sha256, status, body, created_ms) \
-            VALUES (?1, ?2, ?3, ?4, ?5)";
-    FORGET = "DELETE FROM kept_answers WHERE created_ms <= ?1 OR id <= (SELECT max(id) FROM kept_answers) - ?2";
+    FIND = "SELECT request_sha256, status, body FROM kept_answers WHERE key = $1 AND created_ms > $2";
+    KEEP = "INSERT INTO kept_answers (key, request_sha256, status, body, created_ms) \
+            VALUES ($1, $2, $3, $4, $5)";
+    // One under the same key is older than a day. There is room for one more after it.
+    FORGET = "DELETE FROM kept_answers WHERE key = $1 OR created_ms <= $2 \
+              OR id <= (SELECT max(id) FROM kept_answers) + 1 - $3";
 }
 
 /// How long an answer is kept, ms.
@@ -128,6 +130,8 @@ impl IdempotencyRecord {
     ) -> Result<(), StoreError> {
         let Some(answer) = answer else { return Ok(()) };
         let (Answer { status, body }, now) = (answer?, now_ms());
+        let oldest = sqlx::query(FORGET).bind(&self.key.key).bind(now - KEPT_MS).bind(self.key.max as i64);
+        oldest.execute(&mut tx.conn).await.map_err(StoreError::during("forget answers"))?;
         let kept = sqlx::query(KEEP)
             .bind(&self.key.key)
             .bind(&self.key.request[..])
@@ -136,9 +140,7 @@ impl IdempotencyRecord {
             .bind(now)
             .execute(&mut tx.conn)
             .await;
-        kept.map_err(StoreError::during("keep an answer"))?;
-        let oldest = sqlx::query(FORGET).bind(now - KEPT_MS).bind(self.key.max as i64);
-        oldest.execute(&mut tx.conn).await.map_err(StoreError::during("forget answers")).map(drop)
+        kept.map_err(StoreError::during("keep an answer")).map(drop)
     }
 
     /// The answer to what a write has made; `None` if that is something else than was announced.

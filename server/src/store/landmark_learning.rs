@@ -8,7 +8,7 @@ use super::{
 };
 
 statements! {
-    SET = "UPDATE landmarks SET learning = ?2 WHERE id = ?1";
+    SET = "UPDATE landmarks SET learning = $2 WHERE id = $1";
 }
 
 /// Sets weights and gates of a landmark's own, for the reason that the history names unless the

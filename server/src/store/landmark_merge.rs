@@ -18,11 +18,11 @@ statements! {
     // Numbers of views are not used again: each gets a new one. The same quad of the same picture
     // counts once.
     COPY_VIEWS = "INSERT INTO views (landmark_id, image_sha256, image_kind, width_px, height_px, corners_px, created_ms, \
-                  icon_side, icon_scale, capture, icon) SELECT ?2, v.image_sha256, v.image_kind, v.width_px, v.height_px, \
+                  icon_side, icon_scale, capture, icon) SELECT $2, v.image_sha256, v.image_kind, v.width_px, v.height_px, \
                   v.corners_px, v.created_ms, v.icon_side, v.icon_scale, v.capture, v.icon FROM views v \
-                  WHERE v.landmark_id = ?1 AND NOT EXISTS (SELECT 1 FROM views k WHERE k.landmark_id = ?2 \
+                  WHERE v.landmark_id = $1 AND NOT EXISTS (SELECT 1 FROM views k WHERE k.landmark_id = $2 \
                   AND k.image_sha256 = v.image_sha256 AND k.corners_px = v.corners_px) ORDER BY v.id";
-    COUNT = "SELECT count(*) FROM views WHERE landmark_id = ?1";
+    COUNT = "SELECT count(*) FROM views WHERE landmark_id = $1";
 }
 
 /// Two landmarks of a map to be made one.

@@ -31,7 +31,7 @@ use vision::{
 };
 
 statements! {
-    CAPTURES = "SELECT corners_px, capture FROM views WHERE landmark_id = ?1 AND capture IS NOT NULL \
+    CAPTURES = "SELECT corners_px, capture FROM views WHERE landmark_id = $1 AND capture IS NOT NULL \
                 ORDER BY id DESC LIMIT 256";
 }
 

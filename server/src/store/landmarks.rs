@@ -38,16 +38,16 @@ macro_rules! select {
 }
 
 statements! {
-    COUNT = "SELECT count(*) FROM landmarks WHERE map_id = ?1";
-    INSERT = "INSERT INTO landmarks (map_id, name, created_ms) VALUES (?1, ?2, ?3) RETURNING id";
-    GET = select!("JOIN maps ON maps.id = l.map_id WHERE maps.name = ?1 AND l.name = ?2");
-    PAGE = select!("WHERE l.map_id = ?1 AND l.name > ?2 ORDER BY l.name LIMIT ?3");
-    SET_HEALTH = "UPDATE landmarks SET health = ?2, finding = ?3 WHERE id = ?1";
-    UPDATE = "UPDATE landmarks SET width_m = ?2, height_m = ?3, x_m = ?4, y_m = ?5, z_m = ?6, theta_rad = ?7, \
-              roll_rad = ?8, tilt_rad = ?9, place_covariance = ?10, size_from_views = ?11 WHERE id = ?1";
-    DELETE = "DELETE FROM landmarks WHERE id = ?1";
-    RENAME = "UPDATE landmarks SET name = ?2 WHERE id = ?1";
-    NAME = "SELECT l.name FROM landmarks l JOIN maps m ON m.id = l.map_id WHERE m.name = ?1 AND l.id = ?2";
+    COUNT = "SELECT count(*) FROM landmarks WHERE map_id = $1";
+    INSERT = "INSERT INTO landmarks (map_id, name, created_ms) VALUES ($1, $2, $3) RETURNING id";
+    GET = select!("JOIN maps ON maps.id = l.map_id WHERE maps.name = $1 AND l.name = $2");
+    PAGE = select!("WHERE l.map_id = $1 AND l.name > $2 ORDER BY l.name LIMIT $3");
+    SET_HEALTH = "UPDATE landmarks SET health = $2, finding = $3 WHERE id = $1";
+    UPDATE = "UPDATE landmarks SET width_m = $2, height_m = $3, x_m = $4, y_m = $5, z_m = $6, theta_rad = $7, \
+              roll_rad = $8, tilt_rad = $9, place_covariance = $10, size_from_views = $11 WHERE id = $1";
+    DELETE = "DELETE FROM landmarks WHERE id = $1";
+    RENAME = "UPDATE landmarks SET name = $2 WHERE id = $1";
+    NAME = "SELECT l.name FROM landmarks l JOIN maps m ON m.id = l.map_id WHERE m.name = $1 AND l.id = $2";
 }
 
 /// The place of a landmark, as it is stored: centre (map frame, m) and direction of the outward

@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 statements! {
     EACH = "SELECT m.name, m.site, m.building, m.floor, p.name AS parent, m.parent_from_map FROM maps m \
             LEFT JOIN maps p ON p.id = m.parent_id ORDER BY m.name";
-    SET = "UPDATE maps SET site = ?2, building = ?3, floor = ?4, parent_id = ?5, parent_from_map = ?6 WHERE id = ?1";
+    SET = "UPDATE maps SET site = $2, building = $3, floor = $4, parent_id = $5, parent_from_map = $6 WHERE id = $1";
 }
 
 #[derive(Debug, Clone, PartialEq, Default)]

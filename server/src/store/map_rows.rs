@@ -13,13 +13,13 @@ use std::collections::BTreeMap;
 use vision::model::LandmarkId;
 
 statements! {
-    MAP = "SELECT name, version, draft_of IS NOT NULL AS is_draft, preset, distance, learning, sight, walls_version FROM maps WHERE id = ?1";
-    NAME = "SELECT name FROM maps WHERE id = ?1";
+    MAP = "SELECT name, version, draft_of IS NOT NULL AS is_draft, preset, distance, learning, sight, walls_version FROM maps WHERE id = $1";
+    NAME = "SELECT name FROM maps WHERE id = $1";
     MAP_IDS = "SELECT id FROM maps ORDER BY id";
-    ROWS = "SELECT coalesce(group_concat(id || ' ' || revision || ' ' || changed_ms || ' ' || health, ';'), '') \
-            FROM landmarks WHERE map_id = ?1";
-    LANDMARKS = concat!("SELECT id, name, learning, ", geometry_columns!(""), " FROM landmarks WHERE map_id = ?1 \
-                AND id IN (SELECT value FROM json_each(?2))");
+    ROWS = "SELECT coalesce(string_agg(id || ' ' || revision || ' ' || changed_ms || ' ' || health, ';'), '') \
+            FROM landmarks WHERE map_id = $1";
+    LANDMARKS = concat!("SELECT id, name, learning, ", geometry_columns!(""), " FROM landmarks WHERE map_id = $1 \
+                AND id IN (SELECT value FROM json_each($2))");
 }
 
 /// A map without what belongs to it.

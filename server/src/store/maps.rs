@@ -7,28 +7,28 @@ use vision::{params::preset::Preset, recognise::DistanceKind};
 statements! {
     // Drafts are no further maps.
     COUNT = "SELECT count(*) FROM maps WHERE draft_of IS NULL";
-    INSERT = "INSERT INTO maps (name, preset, distance, created_ms) VALUES (?1, ?2, ?3, ?4) RETURNING id";
-    SET_LEARNING = "UPDATE maps SET learning = ?2 WHERE id = ?1";
-    SET_PIPELINE = "UPDATE maps SET preset = ?2, distance = ?3, version = version + 1 WHERE id = ?1";
+    INSERT = "INSERT INTO maps (name, preset, distance, created_ms) VALUES ($1, $2, $3, $4) RETURNING id";
+    SET_LEARNING = "UPDATE maps SET learning = $2 WHERE id = $1";
+    SET_PIPELINE = "UPDATE maps SET preset = $2, distance = $3, version = version + 1 WHERE id = $1";
     GET = "SELECT id, name, version, id || '.' || revision AS revision, changed_ms, preset, distance, learning, \
            (SELECT o.name FROM maps o WHERE o.id = maps.draft_of) AS draft_of, (SELECT count(*) FROM landmarks WHERE map_id = maps.id) AS landmarks, \
            EXISTS (SELECT 1 FROM underlays WHERE map_id = maps.id) AS has_underlay \
-           FROM maps WHERE name = ?1";
+           FROM maps WHERE name = $1";
     PAGE = "SELECT id, name, version, id || '.' || revision AS revision, changed_ms, preset, distance, learning, \
            (SELECT o.name FROM maps o WHERE o.id = maps.draft_of) AS draft_of, (SELECT count(*) FROM landmarks WHERE map_id = maps.id) AS landmarks, \
            EXISTS (SELECT 1 FROM underlays WHERE map_id = maps.id) AS has_underlay \
-            FROM maps WHERE name > ?1 ORDER BY name LIMIT ?2";
-    BUMP = "UPDATE maps SET version = version + 1 WHERE id = ?1";
-    DELETE = "DELETE FROM maps WHERE id = ?1";
-    RENAME = "UPDATE maps SET name = ?2, version = version + 1 WHERE id = ?1";
-    RENAME_IN_JOBS = "UPDATE jobs SET map = ?2 WHERE map = ?1";
-    OPEN_JOB = "SELECT id FROM jobs WHERE map = ?1 AND state IN ('queued', 'running') LIMIT 1";
-    OPEN_GATHERING = "SELECT id FROM gatherings WHERE map_id = ?1 AND open = 1 LIMIT 1";
-    LIES_IN = "SELECT name FROM maps WHERE parent_id = ?1 ORDER BY name LIMIT 1";
-    DRAFT_OF = "SELECT name FROM maps WHERE draft_of = ?1 ORDER BY name LIMIT 1";
-    ROBOT_ON = "SELECT name FROM robots WHERE map_id = ?1 ORDER BY name LIMIT 1";
+            FROM maps WHERE name > $1 ORDER BY name LIMIT $2";
+    BUMP = "UPDATE maps SET version = version + 1 WHERE id = $1";
+    DELETE = "DELETE FROM maps WHERE id = $1";
+    RENAME = "UPDATE maps SET name = $2, version = version + 1 WHERE id = $1";
+    RENAME_IN_JOBS = "UPDATE jobs SET map = $2 WHERE map = $1";
+    OPEN_JOB = "SELECT id FROM jobs WHERE map = $1 AND state IN ('queued', 'running') LIMIT 1";
+    OPEN_GATHERING = "SELECT id FROM gatherings WHERE map_id = $1 AND open = 1 LIMIT 1";
+    LIES_IN = "SELECT name FROM maps WHERE parent_id = $1 ORDER BY name LIMIT 1";
+    DRAFT_OF = "SELECT name FROM maps WHERE draft_of = $1 ORDER BY name LIMIT 1";
+    ROBOT_ON = "SELECT name FROM robots WHERE map_id = $1 ORDER BY name LIMIT 1";
     FORGET_IN_TOKENS = "UPDATE tokens SET maps = (SELECT json_group_array(value) FROM json_each(tokens.maps) \
-                        WHERE value <> ?1) WHERE maps IS NOT NULL";
+                        WHERE value <> $1) WHERE maps IS NOT NULL";
 }
 
 /// A map without its content.

@@ -10,13 +10,13 @@ use std::collections::BTreeMap;
 pub(crate) const MAX_RUNS: usize = 200;
 
 statements! {
-    SETTINGS = "SELECT fusion, areas FROM maps WHERE id = ?1";
-    SET = "UPDATE maps SET fusion = ?2, areas = ?3 WHERE id = ?1";
-    RUNS = "SELECT id, robot, created_ms, way_m, cells FROM runs WHERE map_id = ?1 ORDER BY id";
-    COUNT = "SELECT count(*) FROM runs WHERE map_id = ?1";
-    NUMBERS = "SELECT id FROM runs WHERE map_id = ?1 ORDER BY id";
-    INSERT = "INSERT INTO runs (map_id, robot, created_ms, way_m, cells) VALUES (?1, ?2, ?3, ?4, ?5) RETURNING id";
-    DELETE = "DELETE FROM runs WHERE map_id = ?1 AND id = ?2";
+    SETTINGS = "SELECT fusion, areas FROM maps WHERE id = $1";
+    SET = "UPDATE maps SET fusion = $2, areas = $3 WHERE id = $1";
+    RUNS = "SELECT id, robot, created_ms, way_m, cells FROM runs WHERE map_id = $1 ORDER BY id";
+    COUNT = "SELECT count(*) FROM runs WHERE map_id = $1";
+    NUMBERS = "SELECT id FROM runs WHERE map_id = $1 ORDER BY id";
+    INSERT = "INSERT INTO runs (map_id, robot, created_ms, way_m, cells) VALUES ($1, $2, $3, $4, $5) RETURNING id";
+    DELETE = "DELETE FROM runs WHERE map_id = $1 AND id = $2";
 }
 
 /// A reference run with its modality statistics by pose cell.

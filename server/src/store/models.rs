@@ -9,21 +9,21 @@ use vision::model::LandmarkId;
 
 statements! {
     // The bytes of a digest are known: stored again, they mend what is damaged.
-    PUT_BYTES = "INSERT INTO model_contents (sha256, bytes) SELECT ?1, ?2 \
-                 WHERE EXISTS (SELECT 1 FROM landmarks WHERE id = ?3 AND map_id = ?4) \
+    PUT_BYTES = "INSERT INTO model_contents (sha256, bytes) SELECT $1, $2 \
+                 WHERE EXISTS (SELECT 1 FROM landmarks WHERE id = $3 AND map_id = $4) \
                  ON CONFLICT (sha256) DO UPDATE SET bytes = excluded.bytes";
     PUT = "INSERT INTO models (landmark_id, sha256, params_hash, active, reasons, facts, views, generated_views, \
-           learnt_ms, looks_like) SELECT ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?11 \
-           WHERE EXISTS (SELECT 1 FROM landmarks WHERE id = ?1 AND map_id = ?10) \
+           learnt_ms, looks_like) SELECT $1, $2, $3, $4, $5, $6, $7, $8, $9, $11 \
+           WHERE EXISTS (SELECT 1 FROM landmarks WHERE id = $1 AND map_id = $10) \
            ON CONFLICT (landmark_id) DO UPDATE SET sha256 = excluded.sha256, \
            params_hash = excluded.params_hash, active = excluded.active, reasons = excluded.reasons, \
            facts = excluded.facts, views = excluded.views, generated_views = excluded.generated_views, \
            learnt_ms = excluded.learnt_ms, looks_like = excluded.looks_like";
     DIGESTS = "SELECT coalesce(group_concat(m.landmark_id || ' ' || hex(m.sha256), ';'), '') FROM models m \
-               JOIN landmarks l ON l.id = m.landmark_id WHERE l.map_id = ?1 AND m.looks_like IS NULL";
+               JOIN landmarks l ON l.id = m.landmark_id WHERE l.map_id = $1 AND m.looks_like IS NULL";
     REFUSED = "SELECT m.landmark_id FROM models m JOIN landmarks l ON l.id = m.landmark_id \
-               WHERE l.map_id = ?1 AND m.looks_like IS NOT NULL";
-    GET = "SELECT c.bytes FROM models m JOIN model_contents c ON c.sha256 = m.sha256 WHERE m.landmark_id = ?1";
+               WHERE l.map_id = $1 AND m.looks_like IS NOT NULL";
+    GET = "SELECT c.bytes FROM models m JOIN model_contents c ON c.sha256 = m.sha256 WHERE m.landmark_id = $1";
 }
 
 /// Digest of a stored model.

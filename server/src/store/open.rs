@@ -292,7 +292,7 @@ async fn check_integrity(conn: &mut SqliteConnection) -> Result<(), OpenError> {
     let tables: Vec<String> =
         sqlx::query_scalar(tables).fetch_all(&mut *conn).await.map_err(OpenError::Open)?;
     for table in std::iter::once("sqlite_schema").chain(tables.iter().map(String::as_str)) {
-        let said: String = sqlx::query_scalar("SELECT quick_check FROM pragma_quick_check(?1)")
+        let said: String = sqlx::query_scalar("SELECT quick_check FROM pragma_quick_check($1)")
             .bind(table)
             .fetch_one(&mut *conn)
             .await

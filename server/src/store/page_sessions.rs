@@ -8,11 +8,13 @@ use crate::identity::{MAX_SESSIONS, TokenId};
 use sqlx::{Row, SqliteExecutor};
 
 statements! {
-    INSERT = "INSERT OR REPLACE INTO page_sessions (sha256, token_id, ends_ms) VALUES (?1, ?2, ?3)";
-    FORGET = "DELETE FROM page_sessions WHERE ends_ms <= ?1 OR sha256 IN \
-              (SELECT sha256 FROM page_sessions ORDER BY ends_ms DESC, sha256 LIMIT -1 OFFSET ?2)";
-    DELETE = "DELETE FROM page_sessions WHERE sha256 = ?1";
-    OPEN = "SELECT sha256, token_id, ends_ms FROM page_sessions WHERE ends_ms > ?1 ORDER BY ends_ms, sha256";
+    INSERT = "INSERT INTO page_sessions (sha256, token_id, ends_ms) VALUES ($1, $2, $3) \
+              ON CONFLICT (sha256) DO UPDATE SET token_id = excluded.token_id, ends_ms = excluded.ends_ms";
+    FORGET = "DELETE FROM page_sessions WHERE ends_ms <= $1 OR sha256 IN \
+              (SELECT sha256 FROM (SELECT sha256, row_number() OVER (ORDER BY ends_ms DESC, sha256) AS n \
+              FROM page_sessions) AS s WHERE n > $2)";
+    DELETE = "DELETE FROM page_sessions WHERE sha256 = $1";
+    OPEN = "SELECT sha256, token_id, ends_ms FROM page_sessions WHERE ends_ms > $1 ORDER BY ends_ms, sha256";
 }
 
 /// A session as it is stored.

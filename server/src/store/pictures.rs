@@ -10,14 +10,14 @@ use std::time::Duration;
 use tokio::sync::watch;
 
 statements! {
-    PUT = "INSERT INTO pictures (sha256, bytes) VALUES (?1, ?2) ON CONFLICT DO NOTHING";
-    MEND = "UPDATE pictures SET bytes = ?2 WHERE sha256 = ?1";
-    MENDED = "DELETE FROM damaged_pictures WHERE sha256 = ?1";
-    IS_DAMAGED = "SELECT count(*) FROM damaged_pictures WHERE sha256 = ?1";
-    READ = "SELECT bytes FROM pictures WHERE sha256 = ?1";
-    NEXT = "SELECT sha256 FROM pictures WHERE sha256 > ?1 ORDER BY sha256 LIMIT 1";
-    NOTE = "INSERT INTO damaged_pictures (sha256, reason, found_ms) SELECT ?1, ?2, ?3 \
-            WHERE EXISTS (SELECT 1 FROM pictures WHERE sha256 = ?1) ON CONFLICT DO NOTHING";
+    PUT = "INSERT INTO pictures (sha256, bytes) VALUES ($1, $2) ON CONFLICT DO NOTHING";
+    MEND = "UPDATE pictures SET bytes = $2 WHERE sha256 = $1";
+    MENDED = "DELETE FROM damaged_pictures WHERE sha256 = $1";
+    IS_DAMAGED = "SELECT count(*) FROM damaged_pictures WHERE sha256 = $1";
+    READ = "SELECT bytes FROM pictures WHERE sha256 = $1";
+    NEXT = "SELECT sha256 FROM pictures WHERE sha256 > $1 ORDER BY sha256 LIMIT 1";
+    NOTE = "INSERT INTO damaged_pictures (sha256, reason, found_ms) SELECT $1, $2, $3 \
+            WHERE EXISTS (SELECT 1 FROM pictures WHERE sha256 = $1) ON CONFLICT DO NOTHING";
     DAMAGED = "WITH shown (map, what) AS (\
                SELECT m.name, 'view ' || v.id || ' of landmark ' || l.name || ', map ' || m.name FROM damaged_pictures d \
                JOIN views v ON v.image_sha256 = d.sha256 JOIN landmarks l ON l.id = v.landmark_id \
@@ -28,7 +28,7 @@ statements! {
                UNION ALL SELECT m.name, 'underlay of map ' || m.name FROM damaged_pictures d \
                JOIN underlays u ON u.image_sha256 = d.sha256 JOIN maps m ON m.id = u.map_id) \
                SELECT (SELECT count(*) FROM shown), (SELECT json_group_array(what) FROM (SELECT what FROM shown \
-               WHERE ?2 IS NULL OR map IN (SELECT value FROM json_each(?2)) ORDER BY what LIMIT ?1))";
+               WHERE $2 IS NULL OR map IN (SELECT value FROM json_each($2)) ORDER BY what LIMIT $1))";
 }
 
 /// SHA-256 of a picture.

@@ -7,18 +7,18 @@ use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
 
 statements! {
     INSERT = "INSERT INTO refused_views (landmark_id, refused_ms, refused_by, reason, view_id, width_px, height_px, grey) \
-              SELECT l.id, ?3, 'upload', ?4, ?5, ?6, ?7, ?8 FROM landmarks l JOIN maps m ON m.id = l.map_id \
-              WHERE m.name = ?1 AND l.name = ?2 RETURNING landmark_id";
+              SELECT l.id, $3, 'upload', $4, $5, $6, $7, $8 FROM landmarks l JOIN maps m ON m.id = l.map_id \
+              WHERE m.name = $1 AND l.name = $2 RETURNING landmark_id";
     INSERT_OF_LESSON = "INSERT INTO refused_views (landmark_id, refused_ms, refused_by, reason, view_id) \
-                        SELECT landmark_id, ?2, 'lesson', ?3, id FROM views WHERE id = ?1 AND landmark_id = ?4";
-    FORGET = "DELETE FROM refused_views WHERE landmark_id = ?1 AND id NOT IN \
-              (SELECT id FROM refused_views WHERE landmark_id = ?1 ORDER BY id DESC LIMIT ?2)";
-    FORGET_LESSON = "DELETE FROM refused_views WHERE landmark_id = ?1 AND refused_by = 'lesson'";
+                        SELECT landmark_id, $2, 'lesson', $3, id FROM views WHERE id = $1 AND landmark_id = $4";
+    FORGET = "DELETE FROM refused_views WHERE landmark_id = $1 AND id NOT IN \
+              (SELECT id FROM refused_views WHERE landmark_id = $1 ORDER BY id DESC LIMIT $2)";
+    FORGET_LESSON = "DELETE FROM refused_views WHERE landmark_id = $1 AND refused_by = 'lesson'";
     LIST = "SELECT r.id, r.refused_ms, r.refused_by = 'lesson' AS of_lesson, r.reason, v.id AS view_id, \
             r.grey IS NOT NULL AS has_picture FROM refused_views r LEFT JOIN views v ON v.id = r.view_id \
-            WHERE r.landmark_id = ?1 AND (r.refused_by = 'upload' OR v.id IS NOT NULL) ORDER BY r.id DESC";
+            WHERE r.landmark_id = $1 AND (r.refused_by = 'upload' OR v.id IS NOT NULL) ORDER BY r.id DESC";
     PICTURE = "SELECT r.width_px, r.height_px, r.grey FROM refused_views r JOIN landmarks l ON l.id = r.landmark_id \
-               JOIN maps m ON m.id = l.map_id WHERE m.name = ?1 AND l.name = ?2 AND r.id = ?3 AND r.grey IS NOT NULL";
+               JOIN maps m ON m.id = l.map_id WHERE m.name = $1 AND l.name = $2 AND r.id = $3 AND r.grey IS NOT NULL";
 }
 
 /// Refused photographs of one landmark that stay.

@@ -7,7 +7,7 @@ use sqlx::{Row, SqliteConnection};
 
 statements! {
     OF_MAP = "SELECT id || '.' || walls_version AS walls, id || '.' || underlay_revision AS underlay, sight \
-              FROM maps WHERE name = ?1";
+              FROM maps WHERE name = $1";
 }
 
 /// What has a revision.

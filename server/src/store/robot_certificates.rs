@@ -9,17 +9,17 @@ use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
 
 statements! {
     COUNT = "SELECT count(*) FROM robot_certificates";
-    INSERT = "INSERT INTO robot_certificates (serial, robot, sha256, issued_ms, expires_ms) VALUES (?1, ?2, ?3, ?4, ?5)";
+    INSERT = "INSERT INTO robot_certificates (serial, robot, sha256, issued_ms, expires_ms) VALUES ($1, $2, $3, $4, $5)";
     GET = "SELECT serial, robot, sha256, issued_ms, expires_ms, revoked_ms FROM robot_certificates \
-           WHERE robot = ?1 AND serial = ?2";
+           WHERE robot = $1 AND serial = $2";
     OF_ROBOT = "SELECT serial, robot, sha256, issued_ms, expires_ms, revoked_ms FROM robot_certificates \
-                WHERE robot = ?1 ORDER BY issued_ms, serial";
+                WHERE robot = $1 ORDER BY issued_ms, serial";
     EVERY = "SELECT serial, robot, sha256, issued_ms, expires_ms, revoked_ms FROM robot_certificates \
-           ORDER BY robot, issued_ms, serial LIMIT ?1";
-    REVOKE = "UPDATE robot_certificates SET revoked_ms = ?3 WHERE robot = ?1 AND serial = ?2 AND revoked_ms IS NULL";
-    REVOKE_ALL = "UPDATE robot_certificates SET revoked_ms = ?2 WHERE robot = ?1 AND revoked_ms IS NULL";
+           ORDER BY robot, issued_ms, serial LIMIT $1";
+    REVOKE = "UPDATE robot_certificates SET revoked_ms = $3 WHERE robot = $1 AND serial = $2 AND revoked_ms IS NULL";
+    REVOKE_ALL = "UPDATE robot_certificates SET revoked_ms = $2 WHERE robot = $1 AND revoked_ms IS NULL";
     FORGET_ENDED = "DELETE FROM robot_certificates WHERE serial = (SELECT serial FROM robot_certificates \
-                    WHERE revoked_ms IS NOT NULL OR expires_ms <= ?1 ORDER BY issued_ms LIMIT 1)";
+                    WHERE revoked_ms IS NOT NULL OR expires_ms <= $1 ORDER BY issued_ms LIMIT 1)";
 }
 
 /// Most certificates stored, with those that were revoked or have expired; of these the oldest make

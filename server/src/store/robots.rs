@@ -5,13 +5,13 @@ use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
 
 statements! {
     COUNT = "SELECT count(*) FROM robots";
-    PUT = "INSERT INTO robots (name, map_id, created_ms) VALUES (?1, ?2, ?3) \
+    PUT = "INSERT INTO robots (name, map_id, created_ms) VALUES ($1, $2, $3) \
            ON CONFLICT (name) DO UPDATE SET map_id = excluded.map_id";
-    GET = "SELECT r.name, m.name AS map FROM robots r JOIN maps m ON m.id = r.map_id WHERE r.name = ?1";
+    GET = "SELECT r.name, m.name AS map FROM robots r JOIN maps m ON m.id = r.map_id WHERE r.name = $1";
     PAGE = "SELECT r.name, m.name AS map FROM robots r JOIN maps m ON m.id = r.map_id \
-            WHERE r.name > ?1 ORDER BY r.name LIMIT ?2";
-    TOUCH = "UPDATE robots SET map_id = map_id WHERE name = ?1";
-    DELETE = "DELETE FROM robots WHERE name = ?1";
+            WHERE r.name > $1 ORDER BY r.name LIMIT $2";
+    TOUCH = "UPDATE robots SET map_id = map_id WHERE name = $1";
+    DELETE = "DELETE FROM robots WHERE name = $1";
 }
 
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -19,32 +19,32 @@ use vision::points::shown_matches::ShownMatch;
 
 statements! {
     INSERT = "INSERT INTO stored_answers (map_id, robot, camera, stored_ms, status, has_pose, refusal, landmarks, candidates, \
-              answer, prior_check) SELECT id, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11 FROM maps WHERE name = ?1 \
+              answer, prior_check) SELECT id, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11 FROM maps WHERE name = $1 \
               RETURNING id";
     INSERT_ICON = "INSERT INTO stored_answer_icons (answer_id, quad, icon_side, icon, matched, matches) \
-                   VALUES (?1, ?2, ?3, ?4, ?5, ?6)";
-    FORGET = "DELETE FROM stored_answers WHERE id <= (SELECT max(id) FROM stored_answers) - ?1";
+                   VALUES ($1, $2, $3, $4, $5, $6)";
+    FORGET = "DELETE FROM stored_answers WHERE id <= (SELECT max(id) FROM stored_answers) - $1";
     GET = "SELECT a.id, m.name AS map, a.robot, a.camera, a.stored_ms, a.status, a.has_pose, a.refusal, a.landmarks, \
-           a.candidates, a.answer, a.prior_check FROM stored_answers a JOIN maps m ON m.id = a.map_id WHERE a.id = ?1";
-    MAP_OF = "SELECT m.name FROM stored_answers a JOIN maps m ON m.id = a.map_id WHERE a.id = ?1";
-    ICONS = "SELECT quad, matched, matches FROM stored_answer_icons WHERE answer_id = ?1 ORDER BY quad";
-    ICON = "SELECT icon_side, icon FROM stored_answer_icons WHERE answer_id = ?1 AND quad = ?2";
+           a.candidates, a.answer, a.prior_check FROM stored_answers a JOIN maps m ON m.id = a.map_id WHERE a.id = $1";
+    MAP_OF = "SELECT m.name FROM stored_answers a JOIN maps m ON m.id = a.map_id WHERE a.id = $1";
+    ICONS = "SELECT quad, matched, matches FROM stored_answer_icons WHERE answer_id = $1 ORDER BY quad";
+    ICON = "SELECT icon_side, icon FROM stored_answer_icons WHERE answer_id = $1 AND quad = $2";
     LIST = "SELECT a.id, m.name AS map, a.robot, a.camera, a.stored_ms, a.status, a.has_pose, a.refusal, a.landmarks, \
-            a.candidates FROM stored_answers a JOIN maps m ON m.id = a.map_id WHERE a.id < ?9 \
-            AND (?1 IS NULL OR m.name IN (SELECT value FROM json_each(?1))) AND (?2 IS NULL OR a.robot = ?2) \
-            AND (?3 IS NULL OR a.camera = ?3) AND (?4 IS NULL OR a.status = ?4) AND (?5 IS NULL OR a.refusal = ?5) \
-            AND (?6 IS NULL OR ?6 IN (SELECT value FROM json_each(a.landmarks)) \
-                 OR ?6 IN (SELECT value FROM json_each(a.candidates))) \
-            AND (?7 IS NULL OR a.stored_ms >= ?7) AND (?8 IS NULL OR a.stored_ms < ?8) ORDER BY a.id DESC LIMIT ?10";
-    ABOUT = "SELECT a.answer FROM stored_answers a JOIN maps m ON m.id = a.map_id WHERE m.name = ?1 \
-             AND (?2 IN (SELECT value FROM json_each(a.landmarks)) OR ?2 IN (SELECT value FROM json_each(a.candidates))) \
-             ORDER BY a.id DESC LIMIT ?3";
+            a.candidates FROM stored_answers a JOIN maps m ON m.id = a.map_id WHERE a.id < $9 \
+            AND ($1 IS NULL OR m.name IN (SELECT value FROM json_each($1))) AND ($2 IS NULL OR a.robot = $2) \
+            AND ($3 IS NULL OR a.camera = $3) AND ($4 IS NULL OR a.status = $4) AND ($5 IS NULL OR a.refusal = $5) \
+            AND ($6 IS NULL OR $6 IN (SELECT value FROM json_each(a.landmarks)) \
+                 OR $6 IN (SELECT value FROM json_each(a.candidates))) \
+            AND ($7 IS NULL OR a.stored_ms >= $7) AND ($8 IS NULL OR a.stored_ms < $8) ORDER BY a.id DESC LIMIT $10";
+    ABOUT = "SELECT a.answer FROM stored_answers a JOIN maps m ON m.id = a.map_id WHERE m.name = $1 \
+             AND ($2 IN (SELECT value FROM json_each(a.landmarks)) OR $2 IN (SELECT value FROM json_each(a.candidates))) \
+             ORDER BY a.id DESC LIMIT $3";
     COUNT = "SELECT count(*) FROM stored_answers a JOIN maps m ON m.id = a.map_id \
-             WHERE (?1 IS NULL OR m.name IN (SELECT value FROM json_each(?1))) AND (?2 IS NULL OR a.robot = ?2) \
-             AND (?3 IS NULL OR a.camera = ?3) AND (?4 IS NULL OR a.status = ?4) AND (?5 IS NULL OR a.refusal = ?5) \
-             AND (?6 IS NULL OR ?6 IN (SELECT value FROM json_each(a.landmarks)) \
-                  OR ?6 IN (SELECT value FROM json_each(a.candidates))) \
-             AND (?7 IS NULL OR a.stored_ms >= ?7) AND (?8 IS NULL OR a.stored_ms < ?8)";
+             WHERE ($1 IS NULL OR m.name IN (SELECT value FROM json_each($1))) AND ($2 IS NULL OR a.robot = $2) \
+             AND ($3 IS NULL OR a.camera = $3) AND ($4 IS NULL OR a.status = $4) AND ($5 IS NULL OR a.refusal = $5) \
+             AND ($6 IS NULL OR $6 IN (SELECT value FROM json_each(a.landmarks)) \
+                  OR $6 IN (SELECT value FROM json_each(a.candidates))) \
+             AND ($7 IS NULL OR a.stored_ms >= $7) AND ($8 IS NULL OR a.stored_ms < $8)";
 }
 
 /// Largest message that is stored, bytes; a larger answer is left out.

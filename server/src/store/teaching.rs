@@ -27,7 +27,7 @@ use vision::{
 
 statements! {
     STAMP = concat!("SELECT m.id AS map, m.walls_version, l.id AS landmark, l.revision, ", geometry_columns!("l."),
-            " FROM maps m JOIN landmarks l ON l.map_id = m.id WHERE m.name = ?1 AND l.name = ?2");
+            " FROM maps m JOIN landmarks l ON l.map_id = m.id WHERE m.name = $1 AND l.name = $2");
 }
 
 /// Two sizes are the same up to the rounding of their text.

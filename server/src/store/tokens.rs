@@ -6,17 +6,17 @@ use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
 
 statements! {
     COUNT = "SELECT count(*) FROM tokens";
-    INSERT = "INSERT INTO tokens (name, role, maps, sha256, created_ms, expires_ms) VALUES (?1, ?2, ?3, ?4, ?5, ?6) \
+    INSERT = "INSERT INTO tokens (name, role, maps, sha256, created_ms, expires_ms) VALUES ($1, $2, $3, $4, $5, $6) \
               RETURNING id";
     GET = "SELECT id, name, role, (SELECT json_group_array(m.name) FROM json_each(tokens.maps) e \
            JOIN maps m ON e.value IN (m.id, m.draft_of)) AS names, maps IS NULL AS everywhere, sha256, created_ms, expires_ms, revoked_ms \
-           FROM tokens WHERE id = ?1";
+           FROM tokens WHERE id = $1";
     PAGE = "SELECT id, name, role, (SELECT json_group_array(m.name) FROM json_each(tokens.maps) e \
             JOIN maps m ON e.value IN (m.id, m.draft_of)) AS names, maps IS NULL AS everywhere, sha256, created_ms, expires_ms, revoked_ms \
-            FROM tokens WHERE id > ?1 ORDER BY id LIMIT ?2";
-    REVOKE = "UPDATE tokens SET revoked_ms = ?2 WHERE id = ?1 AND revoked_ms IS NULL";
+            FROM tokens WHERE id > $1 ORDER BY id LIMIT $2";
+    REVOKE = "UPDATE tokens SET revoked_ms = $2 WHERE id = $1 AND revoked_ms IS NULL";
     FORGET_ENDED = "DELETE FROM tokens WHERE id = (SELECT id FROM tokens \
-                    WHERE revoked_ms IS NOT NULL OR expires_ms <= ?1 ORDER BY id LIMIT 1)";
+                    WHERE revoked_ms IS NOT NULL OR expires_ms <= $1 ORDER BY id LIMIT 1)";
 }
 
 /// Most tokens stored, with those that were revoked or have expired; of these the oldest make room.

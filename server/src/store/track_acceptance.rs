@@ -23,14 +23,14 @@ use vision::geometry::Corners;
 
 statements! {
     MOVE = "INSERT INTO views (landmark_id, image_sha256, image_kind, width_px, height_px, corners_px, icon_side, \
-            icon, icon_scale, created_ms, capture) SELECT ?3, image_sha256, image_kind, width_px, height_px, corners_px, \
+            icon, icon_scale, created_ms, capture) SELECT $3, image_sha256, image_kind, width_px, height_px, corners_px, \
             icon_side, icon, icon_scale, created_ms, capture FROM track_views \
-            WHERE gathering_id = ?1 AND track = ?2 ORDER BY id ON CONFLICT DO NOTHING";
-    COUNT = "SELECT count(*) FROM views WHERE landmark_id = ?1";
-    HELD = "SELECT image_sha256, corners_px, capture FROM views WHERE landmark_id = ?1 ORDER BY id";
-    DROP_VIEWS = "DELETE FROM track_views WHERE gathering_id = ?1 AND track = ?2";
-    DROP_VIEW = "DELETE FROM track_views WHERE id = ?1";
-    ACCEPTED = "UPDATE tracks SET state = 'accepted', landmark_id = ?3 WHERE gathering_id = ?1 AND number = ?2";
+            WHERE gathering_id = $1 AND track = $2 ORDER BY id ON CONFLICT DO NOTHING";
+    COUNT = "SELECT count(*) FROM views WHERE landmark_id = $1";
+    HELD = "SELECT image_sha256, corners_px, capture FROM views WHERE landmark_id = $1 ORDER BY id";
+    DROP_VIEWS = "DELETE FROM track_views WHERE gathering_id = $1 AND track = $2";
+    DROP_VIEW = "DELETE FROM track_views WHERE id = $1";
+    ACCEPTED = "UPDATE tracks SET state = 'accepted', landmark_id = $3 WHERE gathering_id = $1 AND number = $2";
 }
 
 /// A track that is accepted, and under which name.

@@ -12,13 +12,13 @@ use sqlx::{Row, SqliteExecutor};
 
 statements! {
     PUT = "INSERT INTO underlays (map_id, image_sha256, image_kind, width_px, height_px, metres_per_pixel, x_m, y_m, \
-           theta_rad, created_ms) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10) ON CONFLICT (map_id) DO UPDATE SET \
+           theta_rad, created_ms) VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10) ON CONFLICT (map_id) DO UPDATE SET \
            image_sha256 = excluded.image_sha256, image_kind = excluded.image_kind, width_px = excluded.width_px, \
            height_px = excluded.height_px, metres_per_pixel = excluded.metres_per_pixel, x_m = excluded.x_m, \
            y_m = excluded.y_m, theta_rad = excluded.theta_rad, created_ms = excluded.created_ms";
     GET = "SELECT image_sha256, image_kind, width_px, height_px, metres_per_pixel, x_m, y_m, theta_rad, created_ms FROM underlays \
-           WHERE map_id = ?1";
-    DELETE = "DELETE FROM underlays WHERE map_id = ?1";
+           WHERE map_id = $1";
+    DELETE = "DELETE FROM underlays WHERE map_id = $1";
 }
 
 /// An underlay without its picture.

@@ -13,33 +13,35 @@ use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
 use vision::{geometry::Corners, icon::Icon, model::LandmarkId};
 
 statements! {
-    COUNT = "SELECT count(*) FROM views WHERE landmark_id = ?1";
+    COUNT = "SELECT count(*) FROM views WHERE landmark_id = $1";
     SAME = "SELECT id, image_kind, width_px, height_px, corners_px, created_ms FROM views \
-            WHERE landmark_id = ?1 AND image_sha256 = ?2 AND corners_px = ?3";
+            WHERE landmark_id = $1 AND image_sha256 = $2 AND corners_px = $3";
     INSERT = "INSERT INTO views (landmark_id, image_sha256, image_kind, width_px, height_px, corners_px, \
               icon_side, icon, icon_scale, created_ms, capture) \
-              VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11) \
+              VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11) \
               RETURNING id";
     PAGE = "SELECT id, image_kind, width_px, height_px, corners_px, created_ms FROM views \
-            WHERE landmark_id = ?1 AND id > ?2 AND id < ?3 AND (?4 IS NULL OR (capture IS NOT NULL) = ?4) \
-            AND (?5 IS NULL OR created_ms >= ?5) AND (?6 IS NULL OR created_ms < ?6) \
-            ORDER BY CASE WHEN ?7 THEN -id ELSE id END LIMIT ?8";
-    COUNT_FILTERED = "SELECT count(*) FROM views WHERE landmark_id = ?1 AND (?2 IS NULL OR (capture IS NOT NULL) = ?2) \
-                      AND (?3 IS NULL OR created_ms >= ?3) AND (?4 IS NULL OR created_ms < ?4)";
+            WHERE landmark_id = $1 AND id > $2 AND id < $3 AND (CAST($4 AS BIGINT) IS NULL OR (capture IS NOT NULL) = ($4 = 1)) \
+            AND (CAST($5 AS BIGINT) IS NULL OR created_ms >= $5) \
+            AND (CAST($6 AS BIGINT) IS NULL OR created_ms < $6) ORDER BY CASE WHEN $7 = 1 THEN -id ELSE id END LIMIT $8";
+    COUNT_FILTERED = "SELECT count(*) FROM views WHERE landmark_id = $1 \
+                      AND (CAST($2 AS BIGINT) IS NULL OR (capture IS NOT NULL) = ($2 = 1)) \
+                      AND (CAST($3 AS BIGINT) IS NULL OR created_ms >= $3) \
+                      AND (CAST($4 AS BIGINT) IS NULL OR created_ms < $4)";
     ICON = "SELECT v.icon_side, v.icon, v.icon_scale FROM views v JOIN landmarks l ON l.id = v.landmark_id \
-            JOIN maps m ON m.id = l.map_id WHERE m.name = ?1 AND l.name = ?2 AND v.id = ?3";
-    DELETE = "DELETE FROM views WHERE id = ?1 AND landmark_id = ?2";
-    GET = "SELECT id, image_kind, width_px, height_px, corners_px, created_ms FROM views WHERE id = ?1";
-    CROPS = "SELECT id, corners_px, icon_side, icon, icon_scale FROM views WHERE landmark_id = ?1 ORDER BY id";
+            JOIN maps m ON m.id = l.map_id WHERE m.name = $1 AND l.name = $2 AND v.id = $3";
+    DELETE = "DELETE FROM views WHERE id = $1 AND landmark_id = $2";
+    GET = "SELECT id, image_kind, width_px, height_px, corners_px, created_ms FROM views WHERE id = $1";
+    CROPS = "SELECT id, corners_px, icon_side, icon, icon_scale FROM views WHERE landmark_id = $1 ORDER BY id";
     OF_MAP = "SELECT v.id, v.landmark_id, v.image_sha256, v.width_px, v.height_px, v.corners_px, v.icon_side, v.icon, \
-              v.icon_scale FROM views v JOIN landmarks l ON l.id = v.landmark_id WHERE l.map_id = ?1 ORDER BY v.id";
+              v.icon_scale FROM views v JOIN landmarks l ON l.id = v.landmark_id WHERE l.map_id = $1 ORDER BY v.id";
     PICTURE = "SELECT v.image_sha256, v.image_kind FROM views v JOIN landmarks l ON l.id = v.landmark_id \
-               JOIN maps m ON m.id = l.map_id WHERE m.name = ?1 AND l.name = ?2 AND v.id = ?3";
-    COUNT_DISTRACTORS = "SELECT count(*) FROM strangers WHERE map_id = ?1";
+               JOIN maps m ON m.id = l.map_id WHERE m.name = $1 AND l.name = $2 AND v.id = $3";
+    COUNT_DISTRACTORS = "SELECT count(*) FROM strangers WHERE map_id = $1";
     INSERT_DISTRACTOR = "INSERT INTO strangers (map_id, image_sha256, corners_px, icon_side, icon, icon_scale) \
-                       VALUES (?1, ?2, ?3, ?4, ?5, ?6) ON CONFLICT DO NOTHING";
+                       VALUES ($1, $2, $3, $4, $5, $6) ON CONFLICT DO NOTHING";
     DISTRACTORS = "SELECT image_sha256, corners_px, icon_side, icon, icon_scale FROM strangers \
-                 WHERE map_id = ?1 ORDER BY id";
+                 WHERE map_id = $1 ORDER BY id";
 }
 
 /// Distractors of one map; further ones are not stored.

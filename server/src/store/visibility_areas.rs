@@ -7,9 +7,9 @@ use sqlx::{Row, SqlitePool};
 use vision::model::LandmarkId;
 
 statements! {
-    GET = "SELECT area FROM visibility_areas WHERE landmark_id = ?1 AND inputs_sha256 = ?2";
-    PUT = "INSERT INTO visibility_areas (landmark_id, inputs_sha256, area) SELECT ?1, ?2, ?3 \
-           WHERE EXISTS (SELECT 1 FROM landmarks WHERE id = ?1) \
+    GET = "SELECT area FROM visibility_areas WHERE landmark_id = $1 AND inputs_sha256 = $2";
+    PUT = "INSERT INTO visibility_areas (landmark_id, inputs_sha256, area) SELECT $1, $2, $3 \
+           WHERE EXISTS (SELECT 1 FROM landmarks WHERE id = $1) \
            ON CONFLICT (landmark_id) DO UPDATE SET inputs_sha256 = excluded.inputs_sha256, area = excluded.area";
 }
 

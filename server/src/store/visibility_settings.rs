@@ -4,7 +4,7 @@ use super::{StoreError, Tx, maps, statements::statements, text_revision};
 use map::visibility::VisibilitySettings;
 
 statements! {
-    SET = "UPDATE maps SET sight = ?2 WHERE id = ?1";
+    SET = "UPDATE maps SET sight = $2 WHERE id = $1";
 }
 
 /// Sets the visibility settings of a map; the defaults are stored as NULL. The map gets a new

@@ -6,12 +6,12 @@ use nalgebra::{Matrix2, Point2};
 use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
 
 statements! {
-    CLEAR = "DELETE FROM laser_segments WHERE map_id = ?1";
+    CLEAR = "DELETE FROM laser_segments WHERE map_id = $1";
     INSERT = "INSERT INTO laser_segments (map_id, ordinal, ax_m, ay_m, bx_m, by_m, covariance) \
-              VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)";
-    WALLS = "UPDATE maps SET walls_version = walls_version + 1 WHERE id = ?1";
-    VERSION = "SELECT walls_version FROM maps WHERE id = ?1";
-    ALL_OF = "SELECT ax_m, ay_m, bx_m, by_m, covariance FROM laser_segments WHERE map_id = ?1 ORDER BY ordinal";
+              VALUES ($1, $2, $3, $4, $5, $6, $7)";
+    WALLS = "UPDATE maps SET walls_version = walls_version + 1 WHERE id = $1";
+    VERSION = "SELECT walls_version FROM maps WHERE id = $1";
+    ALL_OF = "SELECT ax_m, ay_m, bx_m, by_m, covariance FROM laser_segments WHERE map_id = $1 ORDER BY ordinal";
 }
 
 /// Ends of a wall: a.x, a.y, b.x, b.y (map frame, m), free side on the left.

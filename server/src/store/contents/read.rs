@@ -19,22 +19,22 @@ use std::collections::BTreeMap;
 use vision::model::LandmarkId;
 
 statements! {
-    SETTINGS = "SELECT fusion, areas, sight FROM maps WHERE id = ?1";
+    SETTINGS = "SELECT fusion, areas, sight FROM maps WHERE id = $1";
     LANDMARKS = concat!("SELECT id, name, health, finding, learning, created_ms, ", geometry_columns!(""), " FROM landmarks \
-                WHERE map_id = ?1 ORDER BY id");
+                WHERE map_id = $1 ORDER BY id");
     VIEWS = "SELECT v.landmark_id, v.image_sha256, v.image_kind, v.width_px, v.height_px, v.corners_px, v.created_ms, \
              v.icon_side, v.icon_scale, v.capture, v.icon FROM views v JOIN landmarks l ON l.id = v.landmark_id \
-             WHERE l.map_id = ?1 ORDER BY v.id";
+             WHERE l.map_id = $1 ORDER BY v.id";
     MODELS = "SELECT m.landmark_id, m.params_hash, m.active, m.reasons, m.facts, m.views, m.generated_views, \
               m.learnt_ms, m.looks_like, c.bytes FROM models m \
-              JOIN model_contents c ON c.sha256 = m.sha256 JOIN landmarks l ON l.id = m.landmark_id WHERE l.map_id = ?1";
-    DISTRACTORS = "SELECT image_sha256, corners_px, icon_side, icon, icon_scale FROM strangers WHERE map_id = ?1 ORDER BY id";
-    RUNS = "SELECT robot, created_ms, way_m, cells FROM runs WHERE map_id = ?1 ORDER BY id";
+              JOIN model_contents c ON c.sha256 = m.sha256 JOIN landmarks l ON l.id = m.landmark_id WHERE l.map_id = $1";
+    DISTRACTORS = "SELECT image_sha256, corners_px, icon_side, icon, icon_scale FROM strangers WHERE map_id = $1 ORDER BY id";
+    RUNS = "SELECT robot, created_ms, way_m, cells FROM runs WHERE map_id = $1 ORDER BY id";
     BYTES = "SELECT (SELECT coalesce(sum(length(v.icon)), 0) FROM views v JOIN landmarks l ON l.id = v.landmark_id \
-             WHERE l.map_id = ?1) + (SELECT coalesce(sum(length(c.bytes)), 0) FROM models m \
-             JOIN model_contents c ON c.sha256 = m.sha256 JOIN landmarks l ON l.id = m.landmark_id WHERE l.map_id = ?1) \
-             + (SELECT coalesce(sum(length(icon)), 0) FROM strangers WHERE map_id = ?1) \
-             + (SELECT coalesce(sum(length(cells)), 0) FROM runs WHERE map_id = ?1)";
+             WHERE l.map_id = $1) + (SELECT coalesce(sum(length(c.bytes)), 0) FROM models m \
+             JOIN model_contents c ON c.sha256 = m.sha256 JOIN landmarks l ON l.id = m.landmark_id WHERE l.map_id = $1) \
+             + (SELECT coalesce(sum(length(icon)), 0) FROM strangers WHERE map_id = $1) \
+             + (SELECT coalesce(sum(length(cells)), 0) FROM runs WHERE map_id = $1)";
 }
 
 /// A map and its contents. The connection is inside of a transaction, so that all is of one state.

@@ -38,14 +38,14 @@ use vision::{
 
 /// Tables of a map, with what says whose row it is.
 const TABLES: [(&str, &str); 8] = [
-    ("maps", "id = ?1"),
-    ("landmarks", "map_id = ?1"),
-    ("views", "landmark_id IN (SELECT id FROM landmarks WHERE map_id = ?1)"),
-    ("models", "landmark_id IN (SELECT id FROM landmarks WHERE map_id = ?1)"),
-    ("strangers", "map_id = ?1"),
-    ("laser_segments", "map_id = ?1"),
-    ("runs", "map_id = ?1"),
-    ("underlays", "map_id = ?1"),
+    ("maps", "id = $1"),
+    ("landmarks", "map_id = $1"),
+    ("views", "landmark_id IN (SELECT id FROM landmarks WHERE map_id = $1)"),
+    ("models", "landmark_id IN (SELECT id FROM landmarks WHERE map_id = $1)"),
+    ("strangers", "map_id = $1"),
+    ("laser_segments", "map_id = $1"),
+    ("runs", "map_id = $1"),
+    ("underlays", "map_id = $1"),
 ];
 
 /// Columns that number rows or count changes, and the name; `sha256` of a model and what names
@@ -161,7 +161,7 @@ pub(crate) async fn filled(store: &Catalogue) {
 }
 
 async fn columns(store: &Catalogue, table: &str) -> Vec<(String, Option<String>)> {
-    let sql = "SELECT name, dflt_value FROM pragma_table_info(?1) ORDER BY cid";
+    let sql = "SELECT name, dflt_value FROM pragma_table_info($1) ORDER BY cid";
     sqlx::query_as(sql).bind(table).fetch_all(store.reads()).await.unwrap()
 }
 
@@ -202,7 +202,7 @@ async fn a_copy_has_every_column_of_the_map() {
             assert!(!is_unfilled, "{table}.{column}: fill it above, so that the copy of it is tested");
         }
     }
-    let history: i64 = sqlx::query_scalar("SELECT count(*) FROM commits WHERE map_id = ?1")
+    let history: i64 = sqlx::query_scalar("SELECT count(*) FROM commits WHERE map_id = $1")
         .bind(b)
         .fetch_one(store.reads())
         .await

@@ -21,21 +21,21 @@ use crate::{
 use vision::model::LandmarkId;
 
 statements! {
-    SETTINGS = "UPDATE maps SET fusion = ?2, areas = ?3, sight = ?4, preset = ?5, distance = ?6, learning = ?7 WHERE id = ?1";
+    SETTINGS = "UPDATE maps SET fusion = $2, areas = $3, sight = $4, preset = $5, distance = $6, learning = $7 WHERE id = $1";
     LANDMARK = "INSERT INTO landmarks (map_id, name, created_ms, health, finding, learning) \
-                VALUES (?1, ?2, ?3, ?4, ?5, ?6) RETURNING id";
+                VALUES ($1, $2, $3, $4, $5, $6) RETURNING id";
     VIEW = "INSERT INTO views (landmark_id, image_sha256, image_kind, width_px, height_px, corners_px, created_ms, icon_side, \
-            icon_scale, capture, icon) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11)";
-    MODEL_BYTES = "INSERT INTO model_contents (sha256, bytes) VALUES (?1, ?2) ON CONFLICT (sha256) DO NOTHING";
+            icon_scale, capture, icon) VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11)";
+    MODEL_BYTES = "INSERT INTO model_contents (sha256, bytes) VALUES ($1, $2) ON CONFLICT (sha256) DO NOTHING";
     MODEL = "INSERT INTO models (landmark_id, sha256, params_hash, active, reasons, facts, views, generated_views, learnt_ms, \
-             looks_like) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10) \
+             looks_like) VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10) \
              ON CONFLICT (landmark_id) DO UPDATE SET sha256 = excluded.sha256, params_hash = excluded.params_hash, \
              active = excluded.active, reasons = excluded.reasons, facts = excluded.facts, views = excluded.views, \
              generated_views = excluded.generated_views, learnt_ms = excluded.learnt_ms, \
              looks_like = excluded.looks_like";
     DISTRACTOR = "INSERT INTO strangers (map_id, image_sha256, corners_px, icon_side, icon, icon_scale) \
-                  VALUES (?1, ?2, ?3, ?4, ?5, ?6) ON CONFLICT DO NOTHING";
-    RUN = "INSERT INTO runs (map_id, robot, created_ms, way_m, cells) VALUES (?1, ?2, ?3, ?4, ?5)";
+                  VALUES ($1, $2, $3, $4, $5, $6) ON CONFLICT DO NOTHING";
+    RUN = "INSERT INTO runs (map_id, robot, created_ms, way_m, cells) VALUES ($1, $2, $3, $4, $5)";
 }
 
 /// A map that was written.

@@ -30,14 +30,14 @@ use std::collections::BTreeMap;
 use vision::model::LandmarkId;
 
 statements! {
-    MARK = "UPDATE maps SET draft_of = ?2, draft_from = ?3 WHERE id = ?1";
-    COUNT = "SELECT count(*) FROM maps WHERE draft_of = ?1";
-    PUT_LANDMARK = "INSERT INTO draft_landmarks (draft_id, landmark_id, of_landmark) VALUES (?1, ?2, ?3)";
-    PUT_ROW = "INSERT INTO draft_rows (draft_id, row, in_map, in_draft) VALUES (?1, ?2, ?3, ?4)";
+    MARK = "UPDATE maps SET draft_of = $2, draft_from = $3 WHERE id = $1";
+    COUNT = "SELECT count(*) FROM maps WHERE draft_of = $1";
+    PUT_LANDMARK = "INSERT INTO draft_landmarks (draft_id, landmark_id, of_landmark) VALUES ($1, $2, $3)";
+    PUT_ROW = "INSERT INTO draft_rows (draft_id, row, in_map, in_draft) VALUES ($1, $2, $3, $4)";
     LIST = "SELECT id, name, draft_from, created_ms, id || '.' || revision AS revision, \
-            (SELECT count(*) FROM landmarks WHERE map_id = maps.id) AS landmarks FROM maps WHERE draft_of = ?1 ORDER BY name";
-    OF = "SELECT landmark_id, of_landmark FROM draft_landmarks WHERE draft_id = ?1";
-    ROWS = "SELECT row, in_map, in_draft FROM draft_rows WHERE draft_id = ?1";
+            (SELECT count(*) FROM landmarks WHERE map_id = maps.id) AS landmarks FROM maps WHERE draft_of = $1 ORDER BY name";
+    OF = "SELECT landmark_id, of_landmark FROM draft_landmarks WHERE draft_id = $1";
+    ROWS = "SELECT row, in_map, in_draft FROM draft_rows WHERE draft_id = $1";
 }
 
 /// Every statement of this folder.

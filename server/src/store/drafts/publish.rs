@@ -28,21 +28,21 @@ use std::collections::{BTreeMap, BTreeSet};
 use vision::model::LandmarkId;
 
 statements! {
-    REMOVE_LANDMARK = "DELETE FROM landmarks WHERE id = ?1";
+    REMOVE_LANDMARK = "DELETE FROM landmarks WHERE id = $1";
     // Names may have been exchanged; no name begins so.
-    SET_ASIDE = "UPDATE landmarks SET name = '~' || id WHERE id = ?1";
-    RENAME = "UPDATE landmarks SET name = ?2 WHERE id = ?1";
-    HEALTH = "UPDATE landmarks SET health = ?2, finding = ?3 WHERE id = ?1";
-    REMOVE_VIEW = "DELETE FROM views WHERE landmark_id = ?1 AND image_sha256 = ?2 AND corners_px = ?3";
-    REMOVE_MODEL = "DELETE FROM models WHERE landmark_id = ?1";
-    REMOVE_DISTRACTOR = "DELETE FROM strangers WHERE map_id = ?1 AND image_sha256 = ?2 AND corners_px = ?3";
-    REMOVE_RUN = "DELETE FROM runs WHERE id = (SELECT id FROM runs WHERE map_id = ?1 AND robot = ?2 AND created_ms = ?3 \
-                  AND cells = ?4 ORDER BY id LIMIT 1)";
-    REMOVE_UNDERLAY = "DELETE FROM underlays WHERE map_id = ?1";
-    COUNT_LANDMARKS = "SELECT count(*) FROM landmarks WHERE map_id = ?1";
+    SET_ASIDE = "UPDATE landmarks SET name = '~' || id WHERE id = $1";
+    RENAME = "UPDATE landmarks SET name = $2 WHERE id = $1";
+    HEALTH = "UPDATE landmarks SET health = $2, finding = $3 WHERE id = $1";
+    REMOVE_VIEW = "DELETE FROM views WHERE landmark_id = $1 AND image_sha256 = $2 AND corners_px = $3";
+    REMOVE_MODEL = "DELETE FROM models WHERE landmark_id = $1";
+    REMOVE_DISTRACTOR = "DELETE FROM strangers WHERE map_id = $1 AND image_sha256 = $2 AND corners_px = $3";
+    REMOVE_RUN = "DELETE FROM runs WHERE id = (SELECT id FROM runs WHERE map_id = $1 AND robot = $2 AND created_ms = $3 \
+                  AND cells = $4 ORDER BY id LIMIT 1)";
+    REMOVE_UNDERLAY = "DELETE FROM underlays WHERE map_id = $1";
+    COUNT_LANDMARKS = "SELECT count(*) FROM landmarks WHERE map_id = $1";
     MOST_VIEWS = "SELECT coalesce(max(n), 0) FROM (SELECT count(*) AS n FROM views v JOIN landmarks l ON l.id = v.landmark_id \
-                  WHERE l.map_id = ?1 GROUP BY l.id)";
-    COUNT_RUNS = "SELECT count(*) FROM runs WHERE map_id = ?1";
+                  WHERE l.map_id = $1 GROUP BY l.id) AS c";
+    COUNT_RUNS = "SELECT count(*) FROM runs WHERE map_id = $1";
 }
 
 /// Publishes a draft; says whether that changed anything of the map. `is` is the revision of the

@@ -19,19 +19,19 @@ use vision::pose::LandmarkSize;
 
 /// Tables of a map with all their columns but those that count changes.
 const TABLES: [(&str, &str); 7] = [
-    ("landmarks", "map_id = ?1"),
-    ("views", "landmark_id IN (SELECT id FROM landmarks WHERE map_id = ?1)"),
-    ("models", "landmark_id IN (SELECT id FROM landmarks WHERE map_id = ?1)"),
-    ("strangers", "map_id = ?1"),
-    ("laser_segments", "map_id = ?1"),
-    ("runs", "map_id = ?1"),
-    ("underlays", "map_id = ?1"),
+    ("landmarks", "map_id = $1"),
+    ("views", "landmark_id IN (SELECT id FROM landmarks WHERE map_id = $1)"),
+    ("models", "landmark_id IN (SELECT id FROM landmarks WHERE map_id = $1)"),
+    ("strangers", "map_id = $1"),
+    ("laser_segments", "map_id = $1"),
+    ("runs", "map_id = $1"),
+    ("underlays", "map_id = $1"),
 ];
 
 async fn state(store: &Catalogue) -> BTreeMap<&'static str, Vec<String>> {
     let counters = ["revision", "changed_ms", "version", "walls_version", "underlay_revision"];
     let mut all = BTreeMap::new();
-    for (table, of) in TABLES.into_iter().chain([("maps", "id = ?1")]) {
+    for (table, of) in TABLES.into_iter().chain([("maps", "id = $1")]) {
         all.insert(table, rows(store, (table, of), 1, &counters).await);
     }
     let bytes = "SELECT quote(c.bytes) FROM models m JOIN model_contents c ON c.sha256 = m.sha256 \

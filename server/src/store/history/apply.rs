@@ -24,43 +24,43 @@ statements! {
                 " f WHERE f.id = landmarks.id AND f.present = 1 AND f.name <> landmarks.name");
     LOST_PARENT = concat!("SELECT count(*) FROM ", before!("maps", "id"),
                   " f WHERE f.parent_id IS NOT NULL AND f.parent_id NOT IN (SELECT id FROM maps)");
-    OLDEST_WALLS = "SELECT min(id) FROM commits WHERE map_id = ?1 AND id > ?2 AND id <= ?3 AND walls = 1";
-    CLEAR_WALLS = "DELETE FROM laser_segments WHERE map_id = ?1";
+    OLDEST_WALLS = "SELECT min(id) FROM commits WHERE map_id = $1 AND id > $2 AND id <= $3 AND walls = 1";
+    CLEAR_WALLS = "DELETE FROM laser_segments WHERE map_id = $1";
     RESTORE_WALLS = "INSERT INTO laser_segments (map_id, ordinal, ax_m, ay_m, bx_m, by_m, covariance) \
-                     SELECT ?1, ordinal, ax_m, ay_m, bx_m, by_m, covariance FROM past_walls WHERE commit_id = ?2";
-    COUNT_WALLS = "UPDATE maps SET walls_version = walls_version + 1 WHERE id = ?1";
-    IS_OPEN = "SELECT count(*) FROM commits WHERE map_id = ?1 AND open = 1";
-    OPEN_JOB = "SELECT id FROM jobs WHERE map = ?1 AND state IN ('queued', 'running') LIMIT 1";
-    // What is in the way of taking back commit ?1 of map ?2: a row that it changed was changed
+                     SELECT $1, ordinal, ax_m, ay_m, bx_m, by_m, covariance FROM past_walls WHERE commit_id = $2";
+    COUNT_WALLS = "UPDATE maps SET walls_version = walls_version + 1 WHERE id = $1";
+    IS_OPEN = "SELECT count(*) FROM commits WHERE map_id = $1 AND open = 1";
+    OPEN_JOB = "SELECT id FROM jobs WHERE map = $1 AND state IN ('queued', 'running') LIMIT 1";
+    // What is in the way of taking back commit $1 of map $2: a row that it changed was changed
     // since, or others hang on it.
     LATER = "SELECT what, by FROM ( \
              SELECT 'landmark ' || coalesce(l.name, p.name, n.name, '') AS what, n.commit_id AS by FROM past_landmarks p \
-             JOIN past_landmarks n ON n.id = p.id AND n.commit_id > ?1 LEFT JOIN landmarks l ON l.id = p.id \
-             WHERE p.commit_id = ?1 \
+             JOIN past_landmarks n ON n.id = p.id AND n.commit_id > $1 LEFT JOIN landmarks l ON l.id = p.id \
+             WHERE p.commit_id = $1 \
              UNION ALL SELECT 'a view of landmark ' || coalesce(l.name, ''), n.commit_id FROM past_views p \
-             JOIN past_views n ON n.id = p.id AND n.commit_id > ?1 LEFT JOIN landmarks l ON l.id = p.landmark_id \
-             WHERE p.commit_id = ?1 \
+             JOIN past_views n ON n.id = p.id AND n.commit_id > $1 LEFT JOIN landmarks l ON l.id = p.landmark_id \
+             WHERE p.commit_id = $1 \
              UNION ALL SELECT 'the landmark of a view', n.commit_id FROM past_views p \
-             JOIN past_landmarks n ON n.id = p.landmark_id AND n.commit_id > ?1 \
-             WHERE p.commit_id = ?1 AND NOT EXISTS (SELECT 1 FROM landmarks WHERE id = p.landmark_id) \
+             JOIN past_landmarks n ON n.id = p.landmark_id AND n.commit_id > $1 \
+             WHERE p.commit_id = $1 AND NOT EXISTS (SELECT 1 FROM landmarks WHERE id = p.landmark_id) \
              UNION ALL SELECT 'the model of landmark ' || coalesce(l.name, ''), n.commit_id FROM past_models p \
-             JOIN past_models n ON n.landmark_id = p.landmark_id AND n.commit_id > ?1 \
-             LEFT JOIN landmarks l ON l.id = p.landmark_id WHERE p.commit_id = ?1 \
+             JOIN past_models n ON n.landmark_id = p.landmark_id AND n.commit_id > $1 \
+             LEFT JOIN landmarks l ON l.id = p.landmark_id WHERE p.commit_id = $1 \
              UNION ALL SELECT 'landmark ' || coalesce(l.name, ''), n.commit_id FROM past_landmarks p \
-             JOIN past_views n ON n.landmark_id = p.id AND n.commit_id > ?1 JOIN landmarks l ON l.id = p.id \
-             WHERE p.commit_id = ?1 AND p.present = 0 \
+             JOIN past_views n ON n.landmark_id = p.id AND n.commit_id > $1 JOIN landmarks l ON l.id = p.id \
+             WHERE p.commit_id = $1 AND p.present = 0 \
              UNION ALL SELECT 'landmark ' || coalesce(l.name, ''), n.commit_id FROM past_landmarks p \
-             JOIN past_models n ON n.landmark_id = p.id AND n.commit_id > ?1 JOIN landmarks l ON l.id = p.id \
-             WHERE p.commit_id = ?1 AND p.present = 0 \
+             JOIN past_models n ON n.landmark_id = p.id AND n.commit_id > $1 JOIN landmarks l ON l.id = p.id \
+             WHERE p.commit_id = $1 AND p.present = 0 \
              UNION ALL SELECT 'a reference run', n.commit_id FROM past_runs p \
-             JOIN past_runs n ON n.id = p.id AND n.commit_id > ?1 WHERE p.commit_id = ?1 \
+             JOIN past_runs n ON n.id = p.id AND n.commit_id > $1 WHERE p.commit_id = $1 \
              UNION ALL SELECT 'the underlay', n.commit_id FROM past_underlays p \
-             JOIN past_underlays n ON n.map_id = p.map_id AND n.commit_id > ?1 WHERE p.commit_id = ?1 \
+             JOIN past_underlays n ON n.map_id = p.map_id AND n.commit_id > $1 WHERE p.commit_id = $1 \
              UNION ALL SELECT 'the settings', n.commit_id FROM past_maps p \
-             JOIN past_maps n ON n.id = p.id AND n.commit_id > ?1 WHERE p.commit_id = ?1 \
+             JOIN past_maps n ON n.id = p.id AND n.commit_id > $1 WHERE p.commit_id = $1 \
              UNION ALL SELECT 'the walls', n.id FROM commits p \
-             JOIN commits n ON n.map_id = p.map_id AND n.id > p.id AND n.walls = 1 WHERE p.id = ?1 AND p.walls = 1 \
-             ) ORDER BY by DESC LIMIT 1";
+             JOIN commits n ON n.map_id = p.map_id AND n.id > p.id AND n.walls = 1 WHERE p.id = $1 AND p.walls = 1 \
+             ) AS r ORDER BY by DESC LIMIT 1";
 }
 
 /// Gives rows that are there the values that they had.
@@ -96,7 +96,7 @@ fn steps(table: &KeptTable, columns: &[KeptColumn]) -> Vec<String> {
         steps.push(SET_ASIDE.to_owned());
         // A finding stays with the place that it is about.
         let place = versioned.iter().filter(|column| !["name", "learning"].contains(*column));
-        let differs: Vec<String> = place.map(|c| format!("f.{c} IS NOT landmarks.{c}")).collect();
+        let differs: Vec<String> = place.map(|c| format!("f.{c} IS DISTINCT FROM landmarks.{c}")).collect();
         let health = change(table, &["health", "finding"]);
         steps.push(format!("{health} AND ({})", differs.join(" OR ")));
     }

@@ -7,18 +7,18 @@ use sqlx::{Row, SqliteConnection};
 
 statements! {
     OPEN = "SELECT id, map_id FROM commits WHERE open = 1 ORDER BY id";
-    CLOSE = "UPDATE commits SET open = 0, created_ms = ?2, author = ?3, job = ?4, operation = ?5, why = ?6, summary = ?7, \
-             parent_id = (SELECT max(o.id) FROM commits o WHERE o.map_id = commits.map_id AND o.id < ?1), bytes = \
+    CLOSE = "UPDATE commits SET open = 0, created_ms = $2, author = $3, job = $4, operation = $5, why = $6, summary = $7, \
+             parent_id = (SELECT max(o.id) FROM commits o WHERE o.map_id = commits.map_id AND o.id < $1), bytes = \
              (SELECT coalesce(sum(length(m.bytes)), 0) FROM past_models p JOIN model_contents m ON m.sha256 = p.sha256 \
-             WHERE p.commit_id = ?1) + (SELECT coalesce(sum(length(i.bytes) + length(p.icon)), 0) FROM past_views p \
-             JOIN pictures i ON i.sha256 = p.image_sha256 WHERE p.commit_id = ?1) + \
+             WHERE p.commit_id = $1) + (SELECT coalesce(sum(length(i.bytes) + length(p.icon)), 0) FROM past_views p \
+             JOIN pictures i ON i.sha256 = p.image_sha256 WHERE p.commit_id = $1) + \
              (SELECT coalesce(sum(length(i.bytes)), 0) FROM past_underlays p JOIN pictures i ON i.sha256 = p.image_sha256 \
-             WHERE p.commit_id = ?1) + (SELECT coalesce(sum(length(cells)), 0) FROM past_runs WHERE commit_id = ?1 \
-             AND present = 1) + (SELECT 64 * count(*) FROM past_walls WHERE commit_id = ?1) WHERE id = ?1";
-    CLOSE_OUTSIDE = "UPDATE commits SET open = 0, created_ms = ?1, operation = 'outside' WHERE open = 1";
-    FORGET = "DELETE FROM commits WHERE map_id = ?1 AND id <= (SELECT max(id) FROM (SELECT id, row_number() OVER w AS n, \
-              sum(bytes) OVER w AS total FROM commits WHERE map_id = ?1 WINDOW w AS (ORDER BY id DESC)) \
-              WHERE n > ?2 OR (total > ?3 AND n > 1))";
+             WHERE p.commit_id = $1) + (SELECT coalesce(sum(length(cells)), 0) FROM past_runs WHERE commit_id = $1 \
+             AND present = 1) + (SELECT 64 * count(*) FROM past_walls WHERE commit_id = $1) WHERE id = $1";
+    CLOSE_OUTSIDE = "UPDATE commits SET open = 0, created_ms = $1, operation = 'outside' WHERE open = 1";
+    FORGET = "DELETE FROM commits WHERE map_id = $1 AND id <= (SELECT max(id) FROM (SELECT id, row_number() OVER w AS n, \
+              sum(bytes) OVER w AS total FROM commits WHERE map_id = $1 WINDOW w AS (ORDER BY id DESC)) AS c \
+              WHERE n > $2 OR (total > $3 AND n > 1))";
 }
 
 /// Closes what another program has left open: nobody knows who wrote it.

@@ -1,7 +1,7 @@
 //! What differs between a map at one commit and at a later one. A row that was changed and changed
 //! back does not differ. Distractors are left out: nobody edits them.
 
-use super::before;
+use super::{before, oldest};
 use crate::store::{
     StoreError,
     landmarks::{LandmarkGeometry, geometry, geometry_columns},
@@ -12,35 +12,29 @@ use protos::api::{ChangeSummary, SizeAndPlace, WallsDifference};
 use sqlx::{Row, SqliteConnection, sqlite::SqliteRow};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// How much of a row there is at ?3: as the oldest later commit has stored it, or as it is.
+/// How much of a row there is at $3: as the oldest later commit has stored it, or as it is.
 macro_rules! is_present {
     ($table:literal) => {
         concat!(
             "coalesce((SELECT l.present FROM past_",
             $table,
-            " l WHERE l.id = f.id AND l.commit_id > ?3 \
-             ORDER BY l.commit_id LIMIT 1), EXISTS (SELECT 1 FROM ",
+            " l WHERE l.id = f.id AND l.commit_id > $3 \
+             ORDER BY l.commit_id LIMIT 1), (SELECT count(*) FROM ",
             $table,
             " t WHERE t.id = f.id))"
         )
     };
 }
 
-/// The columns of a row before, and of the same row at ?3.
+/// The columns of a row before, and of the same row at $3.
 macro_rules! with_later {
     ($table:literal, $key:literal, $columns:expr) => {
         concat!(
             "WITH f AS ",
             before!($table, $key),
-            ", later AS (SELECT *, min(commit_id) FROM past_",
-            $table,
-            " WHERE commit_id > ?3 AND ",
-            $key,
-            " IN (SELECT ",
-            $key,
-            " FROM f) GROUP BY ",
-            $key,
-            "), n AS (SELECT ",
+            ", later AS ",
+            oldest!($table, $key, concat!("commit_id > $3 AND ", $key, " IN (SELECT ", $key, " FROM f)")),
+            ", n AS (SELECT ",
             $key,
             ", present, ",
             $columns,
@@ -64,40 +58,42 @@ macro_rules! with_later {
 }
 
 statements! {
-    // The row before and the row at ?3, as far as they are there, under each other.
+    // The row before and the row at $3, as far as they are there, under each other.
     LANDMARKS = concat!(with_later!("landmarks", "id", concat!("name, ", geometry_columns!(""))),
                 "SELECT id, 0 AS side, present, name, ", geometry_columns!(""), " FROM f \
                 UNION ALL SELECT id, 1, present, name, ", geometry_columns!(""), " FROM n ORDER BY id");
-    VIEWS = concat!("SELECT landmark_id, sum(was = 0 AND is_now = 1) AS added, sum(was = 1 AND is_now = 0) AS removed FROM \
+    VIEWS = concat!("SELECT landmark_id, sum(CASE WHEN was < is_now THEN 1 ELSE 0 END) AS added, \
+            sum(CASE WHEN was > is_now THEN 1 ELSE 0 END) AS removed FROM \
             (SELECT f.landmark_id, f.present AS was, ", is_present!("views"), " AS is_now FROM ",
-            before!("views", "id"), " f) GROUP BY landmark_id HAVING added + removed > 0");
+            before!("views", "id"), " AS f) AS c WHERE was <> is_now GROUP BY landmark_id");
     MODELS = concat!(with_later!("models", "landmark_id", "sha256, active"),
              "SELECT f.landmark_id FROM f LEFT JOIN n ON n.landmark_id = f.landmark_id \
-             WHERE f.sha256 IS NOT n.sha256 OR f.active IS NOT n.active");
+             WHERE f.sha256 IS DISTINCT FROM n.sha256 OR f.active IS DISTINCT FROM n.active");
     LEARNING = concat!(with_later!("landmarks", "id", "learning"),
                "SELECT f.id FROM f JOIN n ON n.id = f.id WHERE f.present = 1 AND n.present = 1 \
-               AND f.learning IS NOT n.learning");
-    RUNS = concat!("SELECT coalesce(sum(was = 0 AND is_now = 1), 0) AS added, coalesce(sum(was = 1 AND is_now = 0), 0) AS removed \
+               AND f.learning IS DISTINCT FROM n.learning");
+    RUNS = concat!("SELECT coalesce(sum(CASE WHEN was < is_now THEN 1 ELSE 0 END), 0) AS added, \
+           coalesce(sum(CASE WHEN was > is_now THEN 1 ELSE 0 END), 0) AS removed \
            FROM (SELECT f.present AS was, ", is_present!("runs"), " AS is_now FROM ",
-           before!("runs", "id"), " f)");
+           before!("runs", "id"), " AS f) AS c");
     UNDERLAY = concat!(with_later!("underlays", "map_id", "image_sha256, metres_per_pixel, x_m, y_m, \
                theta_rad"),
-               "SELECT count(*) FROM f LEFT JOIN n ON n.map_id = f.map_id WHERE f.image_sha256 IS NOT n.image_sha256 \
-               OR f.metres_per_pixel IS NOT n.metres_per_pixel OR f.x_m IS NOT n.x_m OR f.y_m IS NOT n.y_m \
-               OR f.theta_rad IS NOT n.theta_rad");
+               "SELECT count(*) FROM f LEFT JOIN n ON n.map_id = f.map_id WHERE f.image_sha256 IS DISTINCT FROM n.image_sha256 \
+               OR f.metres_per_pixel IS DISTINCT FROM n.metres_per_pixel OR f.x_m IS DISTINCT FROM n.x_m OR f.y_m IS DISTINCT FROM n.y_m \
+               OR f.theta_rad IS DISTINCT FROM n.theta_rad");
     SETTINGS = concat!(with_later!("maps", "id", "name, site, building, floor, parent_id, parent_from_map, \
                preset, distance, learning, fusion, areas, sight"),
-               "SELECT f.name IS NOT n.name AS name, f.site IS NOT n.site AS site, f.building IS NOT n.building AS building, \
-               f.floor IS NOT n.floor AS floor, f.parent_id IS NOT n.parent_id OR f.parent_from_map IS NOT \
-               n.parent_from_map AS parent, f.preset IS NOT n.preset OR f.distance IS NOT n.distance AS pipeline, f.learning IS NOT n.learning AS learning, f.fusion IS NOT n.fusion AS fusion_mode, f.areas IS NOT n.areas AS areas, \
-               f.sight IS NOT n.sight AS visibility_settings FROM f JOIN n ON n.id = f.id");
-    WALLS_BEFORE = "SELECT min(id) FROM commits WHERE map_id = ?1 AND walls = 1 AND id > ?2 AND id <= ?3";
-    WALLS_AFTER = "SELECT min(id) FROM commits WHERE map_id = ?1 AND walls = 1 AND id > ?2";
-    PAST_WALLS = "SELECT ax_m, ay_m, bx_m, by_m, covariance FROM past_walls WHERE commit_id = ?1";
-    NOW_WALLS = "SELECT ax_m, ay_m, bx_m, by_m, covariance FROM laser_segments WHERE map_id = ?1";
+               "SELECT f.name IS DISTINCT FROM n.name AS name, f.site IS DISTINCT FROM n.site AS site, f.building IS DISTINCT FROM n.building AS building, \
+               f.floor IS DISTINCT FROM n.floor AS floor, f.parent_id IS DISTINCT FROM n.parent_id OR f.parent_from_map IS DISTINCT FROM \
+               n.parent_from_map AS parent, f.preset IS DISTINCT FROM n.preset OR f.distance IS DISTINCT FROM n.distance AS pipeline, f.learning IS DISTINCT FROM n.learning AS learning, f.fusion IS DISTINCT FROM n.fusion AS fusion_mode, f.areas IS DISTINCT FROM n.areas AS areas, \
+               f.sight IS DISTINCT FROM n.sight AS visibility_settings FROM f JOIN n ON n.id = f.id");
+    WALLS_BEFORE = "SELECT min(id) FROM commits WHERE map_id = $1 AND walls = 1 AND id > $2 AND id <= $3";
+    WALLS_AFTER = "SELECT min(id) FROM commits WHERE map_id = $1 AND walls = 1 AND id > $2";
+    PAST_WALLS = "SELECT ax_m, ay_m, bx_m, by_m, covariance FROM past_walls WHERE commit_id = $1";
+    NOW_WALLS = "SELECT ax_m, ay_m, bx_m, by_m, covariance FROM laser_segments WHERE map_id = $1";
     ROW_AT = concat!("SELECT * FROM (SELECT commit_id, name, ", geometry_columns!(""), " FROM past_landmarks \
-             WHERE id = ?1 AND commit_id > ?2 AND present = 1 UNION ALL SELECT 9223372036854775807, name, ",
-             geometry_columns!(""), " FROM landmarks WHERE id = ?1) ORDER BY commit_id LIMIT 1");
+             WHERE id = $1 AND commit_id > $2 AND present = 1 UNION ALL SELECT 9223372036854775807, name, ",
+             geometry_columns!(""), " FROM landmarks WHERE id = $1) AS r ORDER BY commit_id LIMIT 1");
 }
 
 /// Words for settings; also the columns of `SETTINGS`.

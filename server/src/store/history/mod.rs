@@ -25,11 +25,11 @@ use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
 
 statements! {
     PAGE = "SELECT id, parent_id, created_ms, author, job, operation, why, summary FROM commits \
-            WHERE map_id = ?1 AND open = 0 AND id < ?2 ORDER BY id DESC LIMIT ?3";
-    COUNT = "SELECT count(*) FROM commits WHERE map_id = ?1 AND open = 0";
+            WHERE map_id = $1 AND open = 0 AND id < $2 ORDER BY id DESC LIMIT $3";
+    COUNT = "SELECT count(*) FROM commits WHERE map_id = $1 AND open = 0";
     GET = "SELECT id, parent_id, created_ms, author, job, operation, why, summary FROM commits \
-           WHERE map_id = ?1 AND open = 0 AND id = ?2";
-    NEWEST = "SELECT coalesce(max(id), 0) FROM commits WHERE map_id = ?1 AND open = 0";
+           WHERE map_id = $1 AND open = 0 AND id = $2";
+    NEWEST = "SELECT coalesce(max(id), 0) FROM commits WHERE map_id = $1 AND open = 0";
 }
 
 /// Every statement of this folder.
@@ -126,19 +126,39 @@ pub(crate) async fn newest(db: impl SqliteExecutor<'_>, map: i64) -> Result<i64,
     newest.map_err(StoreError::during("read the newest commit"))
 }
 
-/// The rows before the commits of map ?1 after ?2, up to ?3: of each row the oldest.
+/// The rows before the commits of map $1 after $2, up to $3: of each row the oldest.
 macro_rules! before {
     ($table:literal, $key:literal) => {
-        concat!(
-            "(SELECT *, min(commit_id) FROM past_",
+        $crate::store::history::oldest!(
             $table,
-            " WHERE commit_id IN (SELECT id FROM commits WHERE map_id = ?1 AND id > ?2 AND id <= ?3) GROUP BY ",
             $key,
-            ")"
+            "commit_id IN (SELECT id FROM commits WHERE map_id = $1 AND id > $2 AND id <= $3)"
         )
     };
 }
 use before;
+
+/// Of each row that of `$rows`, the oldest.
+macro_rules! oldest {
+    ($table:literal, $key:literal, $rows:expr) => {
+        concat!(
+            "(SELECT * FROM past_",
+            $table,
+            " WHERE (commit_id, ",
+            $key,
+            ") IN (SELECT min(commit_id), ",
+            $key,
+            " FROM past_",
+            $table,
+            " WHERE ",
+            $rows,
+            " GROUP BY ",
+            $key,
+            "))"
+        )
+    };
+}
+use oldest;
 
 #[cfg(test)]
 mod tests;

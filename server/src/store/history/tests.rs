@@ -55,7 +55,7 @@ const TABLES: [(&str, &str); 8] = [
 ];
 
 async fn columns(store: &Catalogue, table: &str) -> Vec<String> {
-    let sql = "SELECT name FROM pragma_table_info(?1) ORDER BY cid";
+    let sql = "SELECT name FROM pragma_table_info($1) ORDER BY cid";
     sqlx::query_scalar(sql).bind(table).fetch_all(store.reads()).await.unwrap()
 }
 
