@@ -6,9 +6,8 @@
 //! [`answered`] says how the answer is made of what the write returns, and `Store::write` takes
 //! both along to the writer.
 
-use super::{Store, StoreError, Tx, now_ms, statements::statements};
+use super::{Store, StoreError, Tx, db, now_ms, statements::statements};
 use serde::Serialize;
-use sqlx::Row;
 use std::{
     any::Any,
     collections::BTreeSet,
@@ -130,9 +129,9 @@ impl IdempotencyRecord {
     ) -> Result<(), StoreError> {
         let Some(answer) = answer else { return Ok(()) };
         let (Answer { status, body }, now) = (answer?, now_ms());
-        let oldest = sqlx::query(FORGET).bind(&self.key.key).bind(now - KEPT_MS).bind(self.key.max as i64);
+        let oldest = db::query(FORGET).bind(&self.key.key).bind(now - KEPT_MS).bind(self.key.max as i64);
         oldest.execute(&mut tx.conn).await.map_err(StoreError::during("forget answers"))?;
-        let kept = sqlx::query(KEEP)
+        let kept = db::query(KEEP)
             .bind(&self.key.key)
             .bind(&self.key.request[..])
             .bind(status)
@@ -166,7 +165,7 @@ impl Store {
         let key =
             CreationKey { key: key.to_owned(), request, at_work: self.keys.clone(), max: self.kept_answers };
         let at = || StoreError::during("look for an answer");
-        let row = sqlx::query(FIND).bind(&key.key).bind(now_ms() - KEPT_MS).fetch_optional(&self.reads).await;
+        let row = db::query(FIND).bind(&key.key).bind(now_ms() - KEPT_MS).fetch_optional(&self.reads).await;
         let Some(row) = row.map_err(at())? else { return Ok(Creation::First(key)) };
         let (was, status): (Vec<u8>, i64) =
             (row.try_get("request_sha256").map_err(at())?, row.try_get("status").map_err(at())?);

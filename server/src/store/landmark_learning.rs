@@ -1,7 +1,7 @@
 //! Weights and gates of a landmark's own, as JSON of `LearningSettings`.
 
 use super::{
-    StoreError, Tx,
+    StoreError, Tx, db,
     landmarks::{self, LandmarkRow},
     maps,
     statements::statements,
@@ -28,6 +28,6 @@ pub(crate) async fn set(
 }
 
 pub(super) async fn put(tx: &mut Tx, id: i64, learning: Option<&str>) -> Result<(), StoreError> {
-    let done = sqlx::query(SET).bind(id).bind(learning).execute(&mut tx.conn).await;
+    let done = db::query(SET).bind(id).bind(learning).execute(&mut tx.conn).await;
     done.map_err(StoreError::during("set weights and gates of a landmark")).map(drop)
 }

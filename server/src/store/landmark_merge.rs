@@ -2,7 +2,7 @@
 //! views of the other.
 
 use super::{
-    Store, StoreError, Tx,
+    Store, StoreError, Tx, db,
     landmark_placement::{self, PlacementOutcome},
     landmarks::{self, LandmarkGeometry, LandmarkRow},
     maps,
@@ -98,8 +98,8 @@ async fn write(tx: &mut Tx, asked: &Merge, prepared: Prepared) -> Result<Landmar
     }
     let at = || StoreError::during("move views");
     let (kept, gone) = (prepared.into.landmark(), prepared.from.landmark());
-    sqlx::query(COPY_VIEWS).bind(gone).bind(kept).execute(&mut tx.conn).await.map_err(at())?;
-    let count = sqlx::query_scalar(COUNT).bind(kept).fetch_one(&mut tx.conn).await.map_err(at())?;
+    db::query(COPY_VIEWS).bind(gone).bind(kept).execute(&mut tx.conn).await.map_err(at())?;
+    let count = db::query_scalar(COUNT).bind(kept).fetch_one(&mut tx.conn).await.map_err(at())?;
     within(count, *max, "views of a landmark")?;
     landmarks::update(tx, map, into, |_| prepared.geometry).await?;
     landmark_placement::put(tx, map, into, prepared.placement).await?;

@@ -6,6 +6,7 @@
 //! alone.
 
 pub(crate) mod disk_guard;
+pub(crate) mod db;
 mod error;
 pub(crate) mod kind;
 pub(crate) mod migrations;
@@ -59,12 +60,12 @@ pub(crate) use open::OpenError;
 pub(crate) use writer::{PART as WRITER, Tx};
 
 use crate::config::Config;
+use db::{Conn, Pool};
 use disk_guard::DiskGuard;
 use engine::{heartbeats::Heartbeat, vitals::Vitals};
 use futures::future::BoxFuture;
 use protos::api::AuditHead;
 use sha2::{Digest as _, Sha256};
-use sqlx::{SqliteConnection, SqlitePool};
 use std::{
     fmt::Write as _,
     sync::{
@@ -79,7 +80,7 @@ use tokio::sync::{Mutex, MutexGuard, Notify, mpsc, oneshot};
 #[derive(Debug, Clone)]
 pub(crate) struct Store {
     commands: mpsc::Sender<writer::Command>,
-    reads: SqlitePool,
+    reads: Pool,
     vitals: Arc<Vitals>,
     jobs: Arc<Notify>,
     commits: Arc<AtomicU64>,
@@ -111,7 +112,7 @@ pub(crate) struct WriteQueue {
 pub(crate) struct WriterTask {
     task: tokio::task::JoinHandle<()>,
     close: oneshot::Sender<()>,
-    reads: SqlitePool,
+    reads: Pool,
     /// Held for as long as the writer runs: a second server on the same directory would be a second
     /// writer.
     _lock: std::fs::File,
@@ -245,7 +246,7 @@ impl Store {
     }
 
     /// The read-only pool.
-    pub(crate) fn reads(&self) -> &SqlitePool {
+    pub(crate) fn reads(&self) -> &Pool {
         &self.reads
     }
 
@@ -268,7 +269,7 @@ impl Store {
 
 /// Writes the newest place of the audit log to the server's own log: a note outside of the
 /// database.
-async fn note_head(conn: &mut SqliteConnection, at: &str) -> Result<(), StoreError> {
+async fn note_head(conn: &mut Conn, at: &str) -> Result<(), StoreError> {
     let head = AuditHead::from(audit::head(conn).await?);
     tracing::info!(seq = head.seq, sha256 = head.sha256, at, "audit_head");
     Ok(())

@@ -5,6 +5,7 @@
 
 use super::{
     Store, StoreError, Tx,
+    db::{self, Executor},
     kind::Kind,
     landmark_placement::{self, PlacementOutcome, PlacementReport},
     landmarks::{self, LandmarkGeometry, geometry_columns},
@@ -18,7 +19,6 @@ use engine::{
     threads::{self, Class},
 };
 use map::segments::LaserSegment;
-use sqlx::{Row, SqliteExecutor};
 use std::sync::Arc;
 use vision::{
     learn::near_duplicates::{NoveltyParams, ViewSummary, most_alike},
@@ -56,13 +56,12 @@ impl Stamp {
 
 /// The stamp of a landmark; `None` if there is none of that name.
 pub(super) async fn stamp(
-    db: impl SqliteExecutor<'_>,
+    db: impl Executor<'_>,
     map: &str,
     landmark: &str,
 ) -> Result<Option<Stamp>, StoreError> {
     let at = || StoreError::during("read what a view rests on");
-    let Some(row) = sqlx::query(STAMP).bind(map).bind(landmark).fetch_optional(db).await.map_err(at())?
-    else {
+    let Some(row) = db::query(STAMP).bind(map).bind(landmark).fetch_optional(db).await.map_err(at())? else {
         return Ok(None);
     };
     let number = |column: &str| row.try_get::<i64, _>(column).map_err(at());

@@ -1,7 +1,7 @@
 //! The statements against the schema.
 
 use super::*;
-use sqlx::{Executor, SqlSafeStr};
+use sqlx::{Executor as _, SqlSafeStr as _};
 
 type Statements = &'static [(&'static str, &'static str)];
 
@@ -50,7 +50,7 @@ async fn every_statement_prepares_on_the_migrated_schema() {
     let dir = tempfile::tempdir().unwrap();
     let mut opened = open::open(dir.path(), None).await.unwrap();
     for (name, sql) in every() {
-        if let Err(error) = opened.writer.prepare(sql.into_sql_str()).await {
+        if let Err(error) = opened.writer.sqlite().prepare(sql.into_sql_str()).await {
             panic!("{name}: {error}");
         }
     }

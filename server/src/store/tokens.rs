@@ -1,8 +1,14 @@
 //! Tokens: whom each is for, what it may do, and the digest of its secret.
 
-use super::{CommittedChange, StoreError, Tx, kind::Kind, maps, now_ms, statements::statements, within};
+use super::{
+    CommittedChange, StoreError, Tx,
+    db::{self, Executor, Row},
+    kind::Kind,
+    maps, now_ms,
+    statements::statements,
+    within,
+};
 use protos::api::{Role, Token};
-use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
 
 statements! {
     COUNT = "SELECT count(*) FROM tokens";
@@ -44,7 +50,7 @@ fn damaged(id: i64, reason: &impl ToString) -> StoreError {
     StoreError::Damaged { what: format!("token {id}"), reason: reason.to_string() }
 }
 
-fn token_row(row: &SqliteRow) -> Result<TokenRow, StoreError> {
+fn token_row(row: &Row) -> Result<TokenRow, StoreError> {
     let read = StoreError::during;
     let id: i64 = row.try_get("id").map_err(read("read token"))?;
     let role: String = row.try_get("role").map_err(read("read token"))?;
@@ -82,10 +88,10 @@ pub(crate) async fn create(tx: &mut Tx, new: TokenInsert) -> Result<Token, Store
     };
     let now = now_ms();
     if count(&mut tx.conn).await? as usize >= MAX_TOKENS {
-        let forgotten = sqlx::query(FORGET_ENDED).bind(now).execute(&mut tx.conn).await;
+        let forgotten = db::query(FORGET_ENDED).bind(now).execute(&mut tx.conn).await;
         forgotten.map_err(StoreError::during("forget an ended token"))?;
     }
-    let id: i64 = sqlx::query_scalar(INSERT)
+    let id: i64 = db::query_scalar(INSERT)
         .bind(&new.name)
         .bind(new.role.as_str())
         .bind(numbers)
@@ -101,33 +107,33 @@ pub(crate) async fn create(tx: &mut Tx, new: TokenInsert) -> Result<Token, Store
 }
 
 /// How many there are.
-pub(crate) async fn count(db: impl SqliteExecutor<'_>) -> Result<u64, StoreError> {
+pub(crate) async fn count(db: impl Executor<'_>) -> Result<u64, StoreError> {
     let count: i64 =
-        sqlx::query_scalar(COUNT).fetch_one(db).await.map_err(StoreError::during("count tokens"))?;
+        db::query_scalar(COUNT).fetch_one(db).await.map_err(StoreError::during("count tokens"))?;
     Ok(count as u64)
 }
 
 /// One token.
-pub(crate) async fn get(db: impl SqliteExecutor<'_>, id: i64) -> Result<Token, StoreError> {
-    let row = sqlx::query(GET).bind(id).fetch_optional(db).await.map_err(StoreError::during("read token"))?;
+pub(crate) async fn get(db: impl Executor<'_>, id: i64) -> Result<Token, StoreError> {
+    let row = db::query(GET).bind(id).fetch_optional(db).await.map_err(StoreError::during("read token"))?;
     let row = row.ok_or_else(|| StoreError::NotFound { what: Kind::Token, name: id.to_string() })?;
     Ok(token_row(&row)?.token)
 }
 
 /// Tokens with numbers after `after`, in order.
 pub(crate) async fn page(
-    db: impl SqliteExecutor<'_>,
+    db: impl Executor<'_>,
     after: i64,
     limit: usize,
 ) -> Result<Vec<TokenRow>, StoreError> {
-    let rows = sqlx::query(PAGE).bind(after).bind(limit as i64).fetch_all(db).await;
+    let rows = db::query(PAGE).bind(after).bind(limit as i64).fetch_all(db).await;
     rows.map_err(StoreError::during("list tokens"))?.iter().map(token_row).collect()
 }
 
 /// Revokes a token; one that was revoked before keeps its time.
 pub(crate) async fn revoke(tx: &mut Tx, id: i64) -> Result<(), StoreError> {
     get(&mut tx.conn, id).await?;
-    let revoked = sqlx::query(REVOKE).bind(id).bind(now_ms()).execute(&mut tx.conn).await;
+    let revoked = db::query(REVOKE).bind(id).bind(now_ms()).execute(&mut tx.conn).await;
     revoked.map_err(StoreError::during("revoke token"))?;
     tx.changed(CommittedChange::Tokens);
     Ok(())

@@ -1,6 +1,6 @@
 //! Visibility settings: the camera and the limits that define "visible", one set for each map.
 
-use super::{StoreError, Tx, maps, statements::statements, text_revision};
+use super::{StoreError, Tx, db, maps, statements::statements, text_revision};
 use map::visibility::VisibilitySettings;
 
 statements! {
@@ -15,7 +15,7 @@ pub(crate) async fn set(tx: &mut Tx, map: &str, settings: &VisibilitySettings) -
     let text = (!is_default).then(|| serde_json::to_string(settings)).transpose();
     let text = text
         .map_err(|e| StoreError::Damaged { what: "visibility settings".to_owned(), reason: e.to_string() })?;
-    sqlx::query(SET)
+    db::query(SET)
         .bind(map.id)
         .bind(text)
         .execute(&mut tx.conn)

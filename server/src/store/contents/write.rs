@@ -4,6 +4,7 @@ use super::{
     CropContents, LandmarkContents, MapContents, MapSettings, ModelContents, RunContents, ViewContents,
     numbers::{self, Numbers},
 };
+use crate::store::db;
 use crate::{
     config::Limits,
     store::{
@@ -105,7 +106,7 @@ pub(in crate::store) async fn settings(
     settings: &MapSettings,
 ) -> Result<(), StoreError> {
     let (preset, distance) = settings.pipeline.words();
-    let done = sqlx::query(SETTINGS)
+    let done = db::query(SETTINGS)
         .bind(map)
         .bind(modality_stats::mode_word(settings.fusion_mode))
         .bind(&settings.areas)
@@ -124,7 +125,7 @@ pub(in crate::store) async fn landmark(
     map: i64,
     new: &LandmarkContents,
 ) -> Result<LandmarkId, StoreError> {
-    let id: i64 = sqlx::query_scalar(LANDMARK)
+    let id: i64 = db::query_scalar(LANDMARK)
         .bind(map)
         .bind(&new.name)
         .bind(new.created_ms)
@@ -143,7 +144,7 @@ pub(in crate::store) async fn view(
     of: LandmarkId,
     new: &ViewContents,
 ) -> Result<(), StoreError> {
-    let done = sqlx::query(VIEW)
+    let done = db::query(VIEW)
         .bind(of.0 as i64)
         .bind(&new.crop.image_sha256[..])
         .bind(&new.image_kind)
@@ -168,9 +169,9 @@ pub(in crate::store) async fn model(
 ) -> Result<(), StoreError> {
     let at = || StoreError::during("store model");
     let sha256 = models::digest(&new.bytes);
-    let bytes = sqlx::query(MODEL_BYTES).bind(&sha256[..]).bind(&new.bytes).execute(&mut tx.conn).await;
+    let bytes = db::query(MODEL_BYTES).bind(&sha256[..]).bind(&new.bytes).execute(&mut tx.conn).await;
     bytes.map_err(at())?;
-    let done = sqlx::query(MODEL)
+    let done = db::query(MODEL)
         .bind(of.0 as i64)
         .bind(&sha256[..])
         .bind(&new.params_hash[..])
@@ -191,7 +192,7 @@ pub(in crate::store) async fn distractor(
     map: i64,
     new: &CropContents,
 ) -> Result<(), StoreError> {
-    let done = sqlx::query(DISTRACTOR)
+    let done = db::query(DISTRACTOR)
         .bind(map)
         .bind(&new.image_sha256[..])
         .bind(views::point_bytes(&new.corners_px))
@@ -204,7 +205,7 @@ pub(in crate::store) async fn distractor(
 }
 
 pub(in crate::store) async fn run(tx: &mut Tx, map: i64, new: &RunContents) -> Result<(), StoreError> {
-    let done = sqlx::query(RUN)
+    let done = db::query(RUN)
         .bind(map)
         .bind(&new.robot)
         .bind(new.created_ms)

@@ -7,6 +7,7 @@ use super::{
     merge::{Merge, merge},
     rows::{Owner, RowKey, crop_key, rows, run_key},
 };
+use crate::store::db;
 use crate::{
     config::Limits,
     store::{
@@ -106,7 +107,7 @@ async fn check(tx: &mut Tx, map: &MapRow, limits: &Limits) -> Result<(), StoreEr
         (MOST_VIEWS, limits.views, "views of a landmark"),
         (COUNT_RUNS, modality_stats::MAX_RUNS, "runs"),
     ] {
-        let count = sqlx::query_scalar(sql).bind(map.id).fetch_one(&mut tx.conn).await;
+        let count = db::query_scalar(sql).bind(map.id).fetch_one(&mut tx.conn).await;
         within(count.map_err(StoreError::during("count what is published"))?, max, what)?;
     }
     Ok(())
@@ -161,7 +162,7 @@ impl<'a> Publication<'a> {
     }
 
     async fn run(&self, tx: &mut Tx, sql: &'static str) -> Result<(), StoreError> {
-        let done = sqlx::query(sql).bind(self.map.id).execute(&mut tx.conn).await;
+        let done = db::query(sql).bind(self.map.id).execute(&mut tx.conn).await;
         done.map_err(StoreError::during("publish")).map(drop)
     }
 
@@ -181,7 +182,7 @@ impl<'a> Publication<'a> {
                 Some(new) if new.name != old.name => SET_ASIDE,
                 Some(_) => continue,
             };
-            sqlx::query(sql).bind(old.number.0 as i64).execute(&mut tx.conn).await.map_err(at())?;
+            db::query(sql).bind(old.number.0 as i64).execute(&mut tx.conn).await.map_err(at())?;
         }
         for (old, new) in pairs {
             match (old, new) {
@@ -212,7 +213,7 @@ impl<'a> Publication<'a> {
             };
             let Some(number) = self.number(*owner) else { continue };
             if let Some(old) = find(self.in_map.get(owner)) {
-                let removed = sqlx::query(REMOVE_VIEW)
+                let removed = db::query(REMOVE_VIEW)
                     .bind(number.0 as i64)
                     .bind(&old.crop.image_sha256[..])
                     .bind(views::point_bytes(&old.crop.corners_px));
@@ -233,7 +234,7 @@ impl<'a> Publication<'a> {
                 let model = contents::in_other_map(model, number, &self.numbers);
                 contents::model(tx, number, &model).await?;
             } else {
-                let done = sqlx::query(REMOVE_MODEL).bind(number.0 as i64).execute(&mut tx.conn).await;
+                let done = db::query(REMOVE_MODEL).bind(number.0 as i64).execute(&mut tx.conn).await;
                 done.map_err(StoreError::during("publish a model"))?;
             }
         }
@@ -251,7 +252,7 @@ impl<'a> Publication<'a> {
         let key = |d: &contents::DistractorContents| RowKey::Distractor(crop_key(&d.crop));
         let (gone, new) = self.moved(&self.old.distractors, &self.new.distractors, key);
         for each in gone {
-            let removed = sqlx::query(REMOVE_DISTRACTOR)
+            let removed = db::query(REMOVE_DISTRACTOR)
                 .bind(self.map.id)
                 .bind(&each.crop.image_sha256[..])
                 .bind(views::point_bytes(&each.crop.corners_px));
@@ -267,7 +268,7 @@ impl<'a> Publication<'a> {
         let key = |run: &contents::RunContents| RowKey::Run(run_key(run));
         let (gone, new) = self.moved(&self.old.reference_runs, &self.new.reference_runs, key);
         for run in gone {
-            let removed = sqlx::query(REMOVE_RUN)
+            let removed = db::query(REMOVE_RUN)
                 .bind(self.map.id)
                 .bind(&run.robot)
                 .bind(run.created_ms)
@@ -324,9 +325,9 @@ async fn change(tx: &mut Tx, old: &LandmarkContents, new: &LandmarkContents) -> 
     landmark_learning::put(tx, id, new.learning.as_deref()).await?;
     if old.geometry != new.geometry {
         let health = landmarks::health_word(new.health);
-        let done = sqlx::query(HEALTH).bind(id).bind(health).bind(&new.finding).execute(&mut tx.conn).await;
+        let done = db::query(HEALTH).bind(id).bind(health).bind(&new.finding).execute(&mut tx.conn).await;
         done.map_err(StoreError::during("publish a landmark"))?;
     }
-    let renamed = sqlx::query(RENAME).bind(id).bind(&new.name).execute(&mut tx.conn).await;
+    let renamed = db::query(RENAME).bind(id).bind(&new.name).execute(&mut tx.conn).await;
     renamed.map_err(StoreError::inserting("publish a landmark", Kind::Landmark, &new.name)).map(drop)
 }

@@ -36,7 +36,7 @@ async fn state(store: &Catalogue) -> BTreeMap<&'static str, Vec<String>> {
     }
     let bytes = "SELECT quote(c.bytes) FROM models m JOIN model_contents c ON c.sha256 = m.sha256 \
                  JOIN landmarks l ON l.id = m.landmark_id WHERE l.map_id = 1 ORDER BY m.landmark_id";
-    all.insert("bytes", sqlx::query_scalar(bytes).fetch_all(store.reads()).await.unwrap());
+    all.insert("bytes", db::query_scalar(bytes).fetch_all(store.reads()).await.unwrap());
     all
 }
 
@@ -284,13 +284,13 @@ async fn a_finding_ends_with_the_geometry_that_it_is_about() {
     let (_dir, store, _task) = open().await;
     let health = async || {
         let sql = "SELECT name || ' ' || health FROM landmarks WHERE map_id = 1 AND name IN ('p1', 'p2') ORDER BY name";
-        sqlx::query_scalar::<_, String>(sql).fetch_all(store.reads()).await.unwrap()
+        db::query_scalar::<String>(sql).fetch_all(store.reads()).await.unwrap()
     };
     let flag = "UPDATE landmarks SET health = 'flagged', finding = '{}' WHERE map_id = 1";
     draft(&store, "d").await;
     let write = store.write(move |tx| {
         Box::pin(async move {
-            sqlx::query(flag).execute(&mut tx.conn).await.map_err(StoreError::during("flag"))?;
+            db::query(flag).execute(&mut tx.conn).await.map_err(StoreError::during("flag"))?;
             landmarks::update(tx, "d", "p1", |_| sized()).await.map(drop)
         })
     });

@@ -11,12 +11,13 @@ use super::{
     newest,
 };
 use crate::store::{
-    CommittedChange, StoreError, Tx, map_locations,
+    CommittedChange, StoreError, Tx,
+    db::{self, AssertSqlSafe},
+    map_locations,
     maps::{self, MapRow},
     statements::statements,
 };
 use map::map_links;
-use sqlx::{AssertSqlSafe, Row};
 
 statements! {
     // Names may have been exchanged; no name begins so.
@@ -122,7 +123,7 @@ pub(crate) async fn undo(tx: &mut Tx, map: &str, commit: i64) -> Result<(), Stor
     get(&mut tx.conn, map.id, commit).await?;
     no_job_on(tx, &map).await?;
     let at = || StoreError::during("look for later changes");
-    let later = sqlx::query(LATER).bind(commit).fetch_optional(&mut tx.conn).await.map_err(at())?;
+    let later = db::query(LATER).bind(commit).fetch_optional(&mut tx.conn).await.map_err(at())?;
     if let Some(row) = later {
         let (what, by) = (row.try_get("what").map_err(at())?, row.try_get("by").map_err(at())?);
         return Err(StoreError::ChangedSince { what, by });
@@ -137,7 +138,7 @@ pub(crate) async fn undo(tx: &mut Tx, map: &str, commit: i64) -> Result<(), Stor
 
 /// A lesson rests on the models that it began with: what it stores would bring them back.
 pub(in crate::store) async fn no_job_on(tx: &mut Tx, map: &MapRow) -> Result<(), StoreError> {
-    let job: Option<i64> = sqlx::query_scalar(OPEN_JOB)
+    let job: Option<i64> = db::query_scalar(OPEN_JOB)
         .bind(&map.name)
         .fetch_optional(&mut tx.conn)
         .await
@@ -157,13 +158,13 @@ async fn apply(tx: &mut Tx, map: &MapRow, (from, to): (i64, i64)) -> Result<bool
     for table in &PARTS {
         let columns = table.columns(&mut tx.conn).await.map_err(StoreError::during("read the schema"))?;
         for sql in steps(table, &columns) {
-            let done = sqlx::query(AssertSqlSafe(sql)).bind(map.id).bind(from).bind(to);
+            let done = db::query(AssertSqlSafe(sql)).bind(map.id).bind(from).bind(to);
             done.execute(&mut tx.conn).await.map_err(|error| in_the_way(table.name, error))?;
         }
     }
     settings(tx, map, (from, to)).await?;
     walls(tx, map, (from, to)).await?;
-    let open: i64 = sqlx::query_scalar(IS_OPEN)
+    let open: i64 = db::query_scalar(IS_OPEN)
         .bind(map.id)
         .fetch_one(&mut tx.conn)
         .await
@@ -176,9 +177,9 @@ async fn apply(tx: &mut Tx, map: &MapRow, (from, to): (i64, i64)) -> Result<bool
 }
 
 /// What of today is in the way of an old row.
-fn in_the_way(table: &str, error: sqlx::Error) -> StoreError {
-    match &error {
-        sqlx::Error::Database(e) if e.is_unique_violation() => StoreError::InUse(format!(
+fn in_the_way(table: &str, error: db::Error) -> StoreError {
+    match db::class(&error) {
+        db::ErrorClass::Taken => StoreError::InUse(format!(
             "cannot restore {table}: a name or a view of it is taken by something newer; rename or delete that first"
         )),
         _ => StoreError::during("restore rows")(error),
@@ -186,7 +187,7 @@ fn in_the_way(table: &str, error: sqlx::Error) -> StoreError {
 }
 
 async fn settings(tx: &mut Tx, map: &MapRow, (from, to): (i64, i64)) -> Result<(), StoreError> {
-    let lost: i64 = sqlx::query_scalar(LOST_PARENT)
+    let lost: i64 = db::query_scalar(LOST_PARENT)
         .bind(map.id)
         .bind(from)
         .bind(to)
@@ -200,7 +201,7 @@ async fn settings(tx: &mut Tx, map: &MapRow, (from, to): (i64, i64)) -> Result<(
     let at = || StoreError::during("restore settings");
     let columns = MAPS.columns(&mut tx.conn).await.map_err(at())?;
     let columns: Vec<&str> = columns.iter().map(|c| c.name.as_str()).filter(|name| *name != "name").collect();
-    let changed = sqlx::query(AssertSqlSafe(change(&MAPS, &columns))).bind(map.id).bind(from).bind(to);
+    let changed = db::query(AssertSqlSafe(change(&MAPS, &columns))).bind(map.id).bind(from).bind(to);
     if changed.execute(&mut tx.conn).await.map_err(at())?.rows_affected() > 0 {
         let locations = map_locations::all(&mut tx.conn).await?;
         map_links::check_all(&map_locations::links(&locations))?;
@@ -210,7 +211,7 @@ async fn settings(tx: &mut Tx, map: &MapRow, (from, to): (i64, i64)) -> Result<(
 
 async fn walls(tx: &mut Tx, map: &MapRow, (from, to): (i64, i64)) -> Result<(), StoreError> {
     let at = || StoreError::during("restore walls");
-    let oldest: Option<i64> = sqlx::query_scalar(OLDEST_WALLS)
+    let oldest: Option<i64> = db::query_scalar(OLDEST_WALLS)
         .bind(map.id)
         .bind(from)
         .bind(to)
@@ -218,7 +219,7 @@ async fn walls(tx: &mut Tx, map: &MapRow, (from, to): (i64, i64)) -> Result<(), 
         .await
         .map_err(at())?;
     let Some(oldest) = oldest else { return Ok(()) };
-    sqlx::query(CLEAR_WALLS).bind(map.id).execute(&mut tx.conn).await.map_err(at())?;
-    sqlx::query(RESTORE_WALLS).bind(map.id).bind(oldest).execute(&mut tx.conn).await.map_err(at())?;
-    sqlx::query(COUNT_WALLS).bind(map.id).execute(&mut tx.conn).await.map_err(at()).map(drop)
+    db::query(CLEAR_WALLS).bind(map.id).execute(&mut tx.conn).await.map_err(at())?;
+    db::query(RESTORE_WALLS).bind(map.id).bind(oldest).execute(&mut tx.conn).await.map_err(at())?;
+    db::query(COUNT_WALLS).bind(map.id).execute(&mut tx.conn).await.map_err(at()).map(drop)
 }

@@ -2,8 +2,12 @@
 //! forgets the oldest commits beyond the bounds; what only they referred to goes with them.
 
 use super::{Author, difference};
-use crate::store::{StoreError, Tx, now_ms, statements::statements};
-use sqlx::{Row, SqliteConnection};
+use crate::store::{
+    StoreError, Tx,
+    db::{self, Conn},
+    now_ms,
+    statements::statements,
+};
 
 statements! {
     OPEN = "SELECT id, map_id FROM commits WHERE open = 1 ORDER BY id";
@@ -22,8 +26,8 @@ statements! {
 }
 
 /// Closes what another program has left open: nobody knows who wrote it.
-pub(in crate::store) async fn close_outside(conn: &mut SqliteConnection) -> Result<(), sqlx::Error> {
-    sqlx::query(CLOSE_OUTSIDE).bind(now_ms()).execute(conn).await.map(drop)
+pub(in crate::store) async fn close_outside(conn: &mut Conn) -> Result<(), db::Error> {
+    db::query(CLOSE_OUTSIDE).bind(now_ms()).execute(conn).await.map(drop)
 }
 
 /// How much history of each map is kept.
@@ -38,18 +42,17 @@ pub(crate) struct HistoryLimits {
 /// Closes what is open, in the name of the transaction's author.
 pub(in crate::store) async fn close(tx: &mut Tx) -> Result<(), StoreError> {
     let at = || StoreError::during("close commits");
-    let open = sqlx::query(OPEN).fetch_all(&mut tx.conn).await.map_err(at())?;
+    let open = db::query(OPEN).fetch_all(&mut tx.conn).await.map_err(at())?;
     for row in &open {
         let (id, map): (i64, i64) = (row.try_get("id").map_err(at())?, row.try_get("map_id").map_err(at())?);
         let changed = difference::between(&mut tx.conn, map, (id - 1, id)).await?;
         let summary = difference::summary(&mut tx.conn, &changed, id).await?;
         let summary = serde_json::to_string(&summary).unwrap_or_default();
         let Author { name, job, operation, why } = tx.author.clone();
-        let closed =
-            sqlx::query(CLOSE).bind(id).bind(now_ms()).bind(name).bind(job).bind(operation).bind(why);
+        let closed = db::query(CLOSE).bind(id).bind(now_ms()).bind(name).bind(job).bind(operation).bind(why);
         closed.bind(summary).execute(&mut tx.conn).await.map_err(at())?;
         let HistoryLimits { commits, bytes } = tx.history;
-        let forgotten = sqlx::query(FORGET).bind(map).bind(commits as i64).bind(bytes as i64);
+        let forgotten = db::query(FORGET).bind(map).bind(commits as i64).bind(bytes as i64);
         forgotten.execute(&mut tx.conn).await.map_err(StoreError::during("forget commits"))?;
     }
     Ok(())

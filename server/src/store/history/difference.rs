@@ -4,12 +4,12 @@
 use super::{before, oldest};
 use crate::store::{
     StoreError,
+    db::{self, Conn, Row},
     landmarks::{LandmarkGeometry, geometry, geometry_columns},
     statements::statements,
     walls::StoredWall,
 };
 use protos::api::{ChangeSummary, SizeAndPlace, WallsDifference};
-use sqlx::{Row, SqliteConnection, sqlite::SqliteRow};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// How much of a row there is at $3: as the oldest later commit has stored it, or as it is.
@@ -188,7 +188,7 @@ pub(crate) struct Difference {
 /// What differs between the states after the commits `from` and `to` of a map; `from` is less than
 /// `to`.
 pub(crate) async fn between(
-    conn: &mut SqliteConnection,
+    conn: &mut Conn,
     map: i64,
     (from, to): (i64, i64),
 ) -> Result<Difference, StoreError> {
@@ -235,29 +235,29 @@ pub(crate) async fn between(
 }
 
 async fn rows(
-    conn: &mut SqliteConnection,
+    conn: &mut Conn,
     sql: &'static str,
     map: i64,
     (from, to): (i64, i64),
-) -> Result<Vec<SqliteRow>, StoreError> {
-    let rows = sqlx::query(sql).bind(map).bind(from).bind(to).fetch_all(conn).await;
+) -> Result<Vec<Row>, StoreError> {
+    let rows = db::query(sql).bind(map).bind(from).bind(to).fetch_all(conn).await;
     rows.map_err(StoreError::during("compare versions"))
 }
 
 /// Number, side (before or after), and name and geometry where it is there.
-fn landmark_at(row: &SqliteRow) -> Result<(i64, usize, Option<NamedGeometry>), sqlx::Error> {
+fn landmark_at(row: &Row) -> Result<(i64, usize, Option<NamedGeometry>), db::Error> {
     let is_present: bool = row.try_get("present")?;
-    let landmark = is_present.then(|| Ok::<_, sqlx::Error>((row.try_get("name")?, geometry(row)?)));
+    let landmark = is_present.then(|| Ok::<_, db::Error>((row.try_get("name")?, geometry(row)?)));
     Ok((row.try_get("id")?, usize::from(row.try_get::<bool, _>("side")?), landmark.transpose()?))
 }
 
 async fn walls(
-    conn: &mut SqliteConnection,
+    conn: &mut Conn,
     map: i64,
     (from, to): (i64, i64),
 ) -> Result<Option<WallsDifference>, StoreError> {
     let at = || StoreError::during("compare walls");
-    let first: Option<i64> = sqlx::query_scalar(WALLS_BEFORE)
+    let first: Option<i64> = db::query_scalar(WALLS_BEFORE)
         .bind(map)
         .bind(from)
         .bind(to)
@@ -266,7 +266,7 @@ async fn walls(
         .map_err(at())?;
     let Some(first) = first else { return Ok(None) };
     let later: Option<i64> =
-        sqlx::query_scalar(WALLS_AFTER).bind(map).bind(to).fetch_one(&mut *conn).await.map_err(at())?;
+        db::query_scalar(WALLS_AFTER).bind(map).bind(to).fetch_one(&mut *conn).await.map_err(at())?;
     let before = segments(&mut *conn, PAST_WALLS, first).await?;
     let after = match later {
         Some(later) => segments(&mut *conn, PAST_WALLS, later).await?,
@@ -275,13 +275,9 @@ async fn walls(
     Ok(walls_difference(&before, &after))
 }
 
-async fn segments(
-    conn: &mut SqliteConnection,
-    sql: &'static str,
-    of: i64,
-) -> Result<Vec<StoredWall>, StoreError> {
+async fn segments(conn: &mut Conn, sql: &'static str, of: i64) -> Result<Vec<StoredWall>, StoreError> {
     let at = || StoreError::during("compare walls");
-    let rows = sqlx::query(sql).bind(of).fetch_all(conn).await.map_err(at())?;
+    let rows = db::query(sql).bind(of).fetch_all(conn).await.map_err(at())?;
     rows.iter().map(StoredWall::of).collect::<Result<_, _>>().map_err(at())
 }
 
@@ -315,11 +311,7 @@ pub(in crate::store) fn walls_difference(
 }
 
 /// Counts of a difference, with the names of its first landmarks, as they are at commit `to`.
-pub(crate) async fn summary(
-    conn: &mut SqliteConnection,
-    of: &Difference,
-    to: i64,
-) -> Result<ChangeSummary, StoreError> {
+pub(crate) async fn summary(conn: &mut Conn, of: &Difference, to: i64) -> Result<ChangeSummary, StoreError> {
     let count =
         |test: &dyn Fn(&LandmarkChange) -> bool| of.landmarks.values().filter(|c| test(c)).count() as u64;
     let mut named: Vec<(i64, LandmarkChange)> =
@@ -343,13 +335,13 @@ pub(crate) async fn summary(
 
 /// Fills in name, size and place of landmarks of which only views or the model have changed.
 pub(crate) async fn fill_unchanged(
-    conn: &mut SqliteConnection,
+    conn: &mut Conn,
     changes: &mut [(i64, LandmarkChange)],
     to: i64,
 ) -> Result<(), StoreError> {
     let at = || StoreError::during("read a landmark");
     for (id, change) in changes.iter_mut().filter(|(_, change)| change.names == [None, None]) {
-        let row = sqlx::query(ROW_AT).bind(*id).bind(to).fetch_optional(&mut *conn).await.map_err(at())?;
+        let row = db::query(ROW_AT).bind(*id).bind(to).fetch_optional(&mut *conn).await.map_err(at())?;
         let Some(row) = row else { continue };
         let name: String = row.try_get("name").map_err(at())?;
         change.names = [Some(name.clone()), Some(name)];

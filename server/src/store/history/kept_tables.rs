@@ -3,8 +3,8 @@
 //! these tables have.
 
 use super::before;
+use crate::store::db::{self, Conn};
 use crate::store::statements::statements;
-use sqlx::{Row as _, SqliteConnection};
 
 /// A table of rows of a map.
 pub(in crate::store) struct KeptTable {
@@ -109,11 +109,8 @@ statements! {
 
 impl KeptTable {
     /// The columns that are kept, without the key.
-    pub(in crate::store) async fn columns(
-        &self,
-        conn: &mut SqliteConnection,
-    ) -> Result<Vec<KeptColumn>, sqlx::Error> {
-        let rows = sqlx::query(COLUMNS).bind(self.name).fetch_all(conn).await?;
+    pub(in crate::store) async fn columns(&self, conn: &mut Conn) -> Result<Vec<KeptColumn>, db::Error> {
+        let rows = db::query(COLUMNS).bind(self.name).fetch_all(conn).await?;
         let mut columns = Vec::with_capacity(rows.len());
         for row in rows {
             let name: String = row.try_get("name")?;

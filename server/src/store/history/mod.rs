@@ -20,8 +20,8 @@ pub(in crate::store) use difference::{SETTINGS_OF_MAP, walls_difference};
 pub(in crate::store) use kept_tables::{CONTENTS, KeptColumn, KeptTable, MAPS, PARTS};
 
 use super::{StoreError, actor::Actor, kind::Kind, statements::statements};
+use crate::store::db::{self, Executor, Row};
 use protos::api::ChangeSummary;
-use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
 
 statements! {
     PAGE = "SELECT id, parent_id, created_ms, author, job, operation, why, summary FROM commits \
@@ -78,7 +78,7 @@ pub(crate) struct CommitRow {
     pub(crate) summary: ChangeSummary,
 }
 
-fn commit_row(row: &SqliteRow) -> Result<CommitRow, sqlx::Error> {
+fn commit_row(row: &Row) -> Result<CommitRow, db::Error> {
     Ok(CommitRow {
         id: row.try_get("id")?,
         parent: row.try_get("parent_id")?,
@@ -96,33 +96,33 @@ fn commit_row(row: &SqliteRow) -> Result<CommitRow, sqlx::Error> {
 
 /// Kept commits of a map with numbers below `before`, newest first.
 pub(crate) async fn page(
-    db: impl SqliteExecutor<'_>,
+    db: impl Executor<'_>,
     map: i64,
     before: i64,
     limit: usize,
 ) -> Result<Vec<CommitRow>, StoreError> {
     let at = || StoreError::during("list commits");
-    let rows = sqlx::query(PAGE).bind(map).bind(before).bind(limit as i64).fetch_all(db).await;
+    let rows = db::query(PAGE).bind(map).bind(before).bind(limit as i64).fetch_all(db).await;
     rows.map_err(at())?.iter().map(commit_row).collect::<Result<_, _>>().map_err(at())
 }
 
 /// How many commits of a map are kept.
-pub(crate) async fn count(db: impl SqliteExecutor<'_>, map: i64) -> Result<u64, StoreError> {
-    let count = sqlx::query_scalar::<_, i64>(COUNT).bind(map).fetch_one(db).await;
+pub(crate) async fn count(db: impl Executor<'_>, map: i64) -> Result<u64, StoreError> {
+    let count = db::query_scalar::<i64>(COUNT).bind(map).fetch_one(db).await;
     count.map(|n| n as u64).map_err(StoreError::during("count commits"))
 }
 
 /// A kept commit of a map. Errors: `NotFound`.
-pub(crate) async fn get(db: impl SqliteExecutor<'_>, map: i64, id: i64) -> Result<CommitRow, StoreError> {
+pub(crate) async fn get(db: impl Executor<'_>, map: i64, id: i64) -> Result<CommitRow, StoreError> {
     let at = || StoreError::during("read commit");
-    let row = sqlx::query(GET).bind(map).bind(id).fetch_optional(db).await.map_err(at())?;
+    let row = db::query(GET).bind(map).bind(id).fetch_optional(db).await.map_err(at())?;
     let row = row.ok_or_else(|| StoreError::NotFound { what: Kind::Commit, name: id.to_string() })?;
     commit_row(&row).map_err(at())
 }
 
 /// The number of a map's newest commit.
-pub(crate) async fn newest(db: impl SqliteExecutor<'_>, map: i64) -> Result<i64, StoreError> {
-    let newest = sqlx::query_scalar(NEWEST).bind(map).fetch_one(db).await;
+pub(crate) async fn newest(db: impl Executor<'_>, map: i64) -> Result<i64, StoreError> {
+    let newest = db::query_scalar(NEWEST).bind(map).fetch_one(db).await;
     newest.map_err(StoreError::during("read the newest commit"))
 }
 
