@@ -5,13 +5,10 @@
 //! schema. One listener learns of every commit ([`on_commit`]); the store knows it by its trait
 //! alone.
 
-pub(crate) mod disk_guard;
 pub(crate) mod db;
 mod error;
 pub(crate) mod kind;
-pub(crate) mod migrations;
-pub(crate) mod open;
-mod checkpoint;
+pub(crate) mod sqlite;
 mod derived_schema;
 mod writer;
 mod statements;
@@ -21,10 +18,7 @@ pub(crate) mod maps;
 pub(crate) mod map_locations;
 pub(crate) mod landmarks;
 pub(crate) mod underlays;
-pub(crate) mod copies;
-pub(crate) mod integrity;
 pub(crate) mod schema;
-pub(crate) mod restored;
 pub(crate) mod page_sessions;
 pub(crate) mod pictures;
 pub(crate) mod views;
@@ -56,7 +50,11 @@ pub(crate) mod drafts;
 
 pub(crate) use error::StoreError;
 pub(crate) use on_commit::{CommittedChange, OnCommit};
-pub(crate) use open::OpenError;
+pub(crate) use sqlite::{
+    copies, disk_guard, integrity,
+    open::{self, OpenError},
+    restored,
+};
 pub(crate) use writer::{PART as WRITER, Tx};
 
 use crate::config::Config;
@@ -160,7 +158,7 @@ impl Store {
         let commits = Arc::<AtomicU64>::default();
         let parts = (on_commit, vitals.clone(), jobs.clone(), commits.clone());
         let heart = vitals.hearts().begin(WRITER);
-        let with = (heart.clone(), config.log_pages().unwrap_or(checkpoint::LOG_PAGES));
+        let with = (heart.clone(), config.log_pages().unwrap_or(sqlite::checkpoint::LOG_PAGES));
         let writer = writer::Writer::new(conn, received, history, parts, with);
         let (close, closed) = oneshot::channel();
         let task = tokio::spawn(writer.run(closed, vitals.begin(WRITER)));

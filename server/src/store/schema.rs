@@ -3,7 +3,7 @@
 use super::{
     StoreError,
     db::{self, Conn},
-    migrations,
+    sqlite::migrations,
     statements::statements,
 };
 

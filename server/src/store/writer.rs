@@ -14,13 +14,13 @@
 use super::{
     actor::Actor,
     audit,
-    checkpoint::{empty_log, move_long_log},
     db::{self, Conn},
     error::StoreError,
     history::{self, Author, HistoryLimits},
     kept_answers::IdempotencyRecord,
     note_head,
     on_commit::{CommittedChange, OnCommit},
+    sqlite::checkpoint::{empty_log, move_long_log},
 };
 use engine::{
     heartbeats::Heartbeat,

@@ -4,6 +4,8 @@ use super::*;
 use futures::TryStreamExt as _;
 use sqlx::{ConnectOptions as _, sqlite::SqliteConnectOptions};
 
+type Read = (Option<i64>, Option<f64>, Option<Vec<u8>>);
+
 async fn memory() -> Conn {
     let mut conn = Conn::from(SqliteConnectOptions::new().connect().await.unwrap());
     let table = "CREATE TABLE t (name TEXT UNIQUE, n INTEGER, x REAL, bytes BLOB) STRICT";
@@ -21,10 +23,9 @@ async fn a_value_is_read_as_it_was_bound() {
     let some = insert("a").bind(i64::MIN).bind(0.1).bind(&b"\0\xff"[..]);
     assert_eq!(some.execute(&mut conn).await.unwrap().rows_affected(), 1);
     // What is absent has a type, too.
-    let none = insert("b").bind(None::<i64>).bind(&None::<f64>).bind(None::<Vec<u8>>);
+    let none = insert("b").bind(None::<i64>).bind(None::<f64>).bind(None::<Vec<u8>>);
     none.execute(&mut conn).await.unwrap();
     insert("c").bind(true).bind(Some(-2.5)).bind(Some(vec![7])).execute(&mut conn).await.unwrap();
-    type Read = (Option<i64>, Option<f64>, Option<Vec<u8>>);
     let rows = query("SELECT * FROM t ORDER BY name").fetch(&mut conn);
     let read =
         |row: Row| -> Result<Read, Error> { Ok((row.try_get("n")?, row.try_get(2)?, row.try_get("bytes")?)) };

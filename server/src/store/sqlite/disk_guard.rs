@@ -5,11 +5,13 @@
 //! Reading, recognition, deletions, revocations and small edits go on. Pages of the database that
 //! deletions have freed count as room, since the file does not shrink and new data take them first.
 
-use super::{
-    StoreError,
-    db::{self, Pool},
+use crate::{
+    config::Limits,
+    store::{
+        StoreError,
+        db::{self, Pool},
+    },
 };
-use crate::config::Limits;
 use engine::vitals::Pulse;
 use std::{
     fmt, io,
@@ -105,7 +107,7 @@ pub(crate) struct DiskGuard {
 
 impl DiskGuard {
     /// Looks once.
-    pub(super) fn new(data: &Path, limits: &Limits) -> Self {
+    pub(in crate::store) fn new(data: &Path, limits: &Limits) -> Self {
         let bounds = Bounds {
             percent: u64::from(limits.disk_percent),
             spare_bytes: limits.disk_spare_bytes as u64,

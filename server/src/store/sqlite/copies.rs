@@ -4,15 +4,17 @@
 //! A copy reads one snapshot of the write-ahead log: the writer goes on, and what it commits
 //! meanwhile is not in the copy.
 
-use super::{
-    StoreError, audit,
-    db::{self, Conn},
-    open::{FILE, read_options},
-    pictures,
-    schema::schema,
-    statements::statements,
+use super::open::{FILE, read_options};
+use crate::{
+    private_file,
+    store::{
+        StoreError, audit,
+        db::{self, Conn},
+        pictures,
+        schema::schema,
+        statements::statements,
+    },
 };
-use crate::private_file;
 use futures::TryStreamExt as _;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};

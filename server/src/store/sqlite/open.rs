@@ -12,13 +12,15 @@ use std::{
     time::Duration,
 };
 
-use super::{
-    StoreError,
-    checkpoint::renew_log,
-    db::{self, Conn, Pool},
-    derived_schema, disk_guard, history, migrations, restored, schema,
+use super::{checkpoint::renew_log, disk_guard, migrations, restored};
+use crate::{
+    private_file::{self, OpenToOthers},
+    store::{
+        StoreError,
+        db::{self, Conn, Pool},
+        derived_schema, history, schema,
+    },
 };
-use crate::private_file::{self, OpenToOthers};
 
 /// First version without the write-ahead-log corruption of 3.7.0 to 3.51.2
 /// (sqlite.org/wal.html#walresetbug).
@@ -95,10 +97,10 @@ pub(crate) enum OpenError {
 }
 
 /// An open database.
-pub(super) struct Opened {
-    pub(super) writer: Conn,
-    pub(super) reads: Pool,
-    pub(super) lock: File,
+pub(in crate::store) struct Opened {
+    pub(in crate::store) writer: Conn,
+    pub(in crate::store) reads: Pool,
+    pub(in crate::store) lock: File,
 }
 
 /// Layer of SQLite that keeps the index of the write-ahead log in memory and not in a file. It
@@ -108,7 +110,7 @@ const WITHOUT_SHARED_MEMORY: &str = "unix-excl";
 /// Opens the database in `data` for reading and writing. A full disk does not keep it from opening:
 /// where there is no room for the file of the log's index, the index is in memory. On a read-only
 /// file system it opens for reading alone.
-pub(super) async fn open(data: &Path, vfs: Option<&'static str>) -> Result<Opened, OpenError> {
+pub(in crate::store) async fn open(data: &Path, vfs: Option<&'static str>) -> Result<Opened, OpenError> {
     if disk_guard::is_read_only(data) {
         return open_read_only(data).await;
     }

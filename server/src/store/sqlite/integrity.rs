@@ -5,7 +5,7 @@
 //! The start itself compares no indexes (`open`): that reads the file once more, and robots would
 //! wait for it. An index that differs from its table makes a query miss rows, or find others.
 
-use super::{Store, StoreError, now_ms, statements::statements};
+use crate::store::{Store, StoreError, now_ms, statements::statements};
 use protos::api::DatabaseCheckState;
 use sqlx::Connection as _;
 use std::{
