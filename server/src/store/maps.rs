@@ -33,8 +33,6 @@ statements! {
     LIES_IN = "SELECT name FROM maps WHERE parent_id = $1 ORDER BY name LIMIT 1";
     DRAFT_OF = "SELECT name FROM maps WHERE draft_of = $1 ORDER BY name LIMIT 1";
     ROBOT_ON = "SELECT name FROM robots WHERE map_id = $1 ORDER BY name LIMIT 1";
-    FORGET_IN_TOKENS = "UPDATE tokens SET maps = (SELECT json_group_array(value) FROM json_each(tokens.maps) \
-                        WHERE value <> $1) WHERE maps IS NOT NULL";
 }
 
 /// A map without its content.
@@ -286,9 +284,7 @@ pub(crate) async fn delete(tx: &mut Tx, name: &str) -> Result<(), StoreError> {
         return Err(StoreError::InUse(why));
     }
     db::query(DELETE).bind(map.id).execute(&mut tx.conn).await.map_err(StoreError::during("delete map"))?;
-    // A token is not for a later map of the same name; one that was for this map alone is for none.
-    let forgotten = db::query(FORGET_IN_TOKENS).bind(map.id).execute(&mut tx.conn).await;
-    forgotten.map_err(StoreError::during("forget map in tokens"))?;
+    // A token that was for this map alone is for none.
     tx.changed(CommittedChange::Tokens);
     tx.changed(CommittedChange::MapRemoved(map.name));
     tx.changed(CommittedChange::Links);

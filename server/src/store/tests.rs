@@ -61,7 +61,7 @@ async fn every_statement_prepares_on_the_migrated_schema() {
 }
 
 /// What SQLite alone takes, outside of its folder: its own tables, and lists in JSON.
-const OF_SQLITE: [&str; 16] = [
+const OF_SQLITE: [&str; 13] = [
     "audit::TOTAL_CHANGES",
     "derived_schema::NAMES",
     "derived_schema::REFERENCES",
@@ -70,14 +70,11 @@ const OF_SQLITE: [&str; 16] = [
     "jobs::COUNT",
     "jobs::LIST",
     "map_rows::LANDMARKS",
-    "maps::FORGET_IN_TOKENS",
     "models::DIGESTS",
     "pictures::DAMAGED",
     "stored_answers::ABOUT",
     "stored_answers::COUNT",
     "stored_answers::LIST",
-    "tokens::GET",
-    "tokens::PAGE",
 ];
 
 /// What a text has that PostgreSQL does not take, or takes for something else. Words are lower

@@ -10,16 +10,25 @@ use super::{
 };
 use protos::api::{Role, Token};
 
+/// The columns of [`token_row`]. A map's drafts belong to it; no name has a slash.
+macro_rules! select {
+    ($tail:literal) => {
+        concat!(
+            "SELECT id, name, role, everywhere, sha256, created_ms, expires_ms, revoked_ms, \
+             (SELECT string_agg(m.name, '/') FROM token_maps t \
+             JOIN maps m ON m.id = t.map_id OR m.draft_of = t.map_id WHERE t.token_id = tokens.id) AS names FROM tokens ",
+            $tail
+        )
+    };
+}
+
 statements! {
     COUNT = "SELECT count(*) FROM tokens";
-    INSERT = "INSERT INTO tokens (name, role, maps, sha256, created_ms, expires_ms) VALUES ($1, $2, $3, $4, $5, $6) \
-              RETURNING id";
-    GET = "SELECT id, name, role, (SELECT json_group_array(m.name) FROM json_each(tokens.maps) e \
-           JOIN maps m ON e.value IN (m.id, m.draft_of)) AS names, maps IS NULL AS everywhere, sha256, created_ms, expires_ms, revoked_ms \
-           FROM tokens WHERE id = $1";
-    PAGE = "SELECT id, name, role, (SELECT json_group_array(m.name) FROM json_each(tokens.maps) e \
-            JOIN maps m ON e.value IN (m.id, m.draft_of)) AS names, maps IS NULL AS everywhere, sha256, created_ms, expires_ms, revoked_ms \
-            FROM tokens WHERE id > $1 ORDER BY id LIMIT $2";
+    INSERT = "INSERT INTO tokens (name, role, everywhere, sha256, created_ms, expires_ms) \
+              VALUES ($1, $2, $3, $4, $5, $6) RETURNING id";
+    INSERT_MAP = "INSERT INTO token_maps (token_id, map_id) VALUES ($1, $2) ON CONFLICT DO NOTHING";
+    GET = select!("WHERE id = $1");
+    PAGE = select!("WHERE id > $1 ORDER BY id LIMIT $2");
     REVOKE = "UPDATE tokens SET revoked_ms = $2 WHERE id = $1 AND revoked_ms IS NULL";
     FORGET_ENDED = "DELETE FROM tokens WHERE id = (SELECT id FROM tokens \
                     WHERE revoked_ms IS NOT NULL OR expires_ms <= $1 ORDER BY id LIMIT 1)";
@@ -54,9 +63,9 @@ fn token_row(row: &Row) -> Result<TokenRow, StoreError> {
     let read = StoreError::during;
     let id: i64 = row.try_get("id").map_err(read("read token"))?;
     let role: String = row.try_get("role").map_err(read("read token"))?;
-    let names: String = row.try_get("names").map_err(read("read token"))?;
+    let names: Option<String> = row.try_get("names").map_err(read("read token"))?;
     let everywhere: bool = row.try_get("everywhere").map_err(read("read token"))?;
-    let mut names: Vec<String> = serde_json::from_str(&names).map_err(|e| damaged(id, &e))?;
+    let mut names: Vec<String> = names.iter().flat_map(|names| names.split('/')).map(str::to_owned).collect();
     names.sort_unstable();
     let sha256: Vec<u8> = row.try_get("sha256").map_err(read("read token"))?;
     let token = Token {
@@ -74,18 +83,6 @@ fn token_row(row: &Row) -> Result<TokenRow, StoreError> {
 
 /// Stores a token. Errors: a map that does not exist; more than [`MAX_TOKENS`] in use.
 pub(crate) async fn create(tx: &mut Tx, new: TokenInsert) -> Result<Token, StoreError> {
-    let numbers = match &new.maps {
-        None => None,
-        Some(names) => {
-            let mut numbers = Vec::new();
-            for name in names {
-                numbers.push(maps::get(&mut tx.conn, name).await?.id);
-            }
-            numbers.sort_unstable();
-            numbers.dedup();
-            Some(serde_json::to_string(&numbers).map_err(|e| damaged(0, &e))?)
-        }
-    };
     let now = now_ms();
     if count(&mut tx.conn).await? as usize >= MAX_TOKENS {
         let forgotten = db::query(FORGET_ENDED).bind(now).execute(&mut tx.conn).await;
@@ -94,13 +91,18 @@ pub(crate) async fn create(tx: &mut Tx, new: TokenInsert) -> Result<Token, Store
     let id: i64 = db::query_scalar(INSERT)
         .bind(&new.name)
         .bind(new.role.as_str())
-        .bind(numbers)
+        .bind(new.maps.is_none())
         .bind(new.sha256.as_slice())
         .bind(now)
         .bind(new.expires_ms)
         .fetch_one(&mut tx.conn)
         .await
         .map_err(StoreError::during("create token"))?;
+    for name in new.maps.iter().flatten() {
+        let map = maps::get(&mut tx.conn, name).await?.id;
+        let inserted = db::query(INSERT_MAP).bind(id).bind(map).execute(&mut tx.conn).await;
+        inserted.map_err(StoreError::during("store the map of a token"))?;
+    }
     within(count(&mut tx.conn).await? as i64, MAX_TOKENS, "tokens")?;
     tx.changed(CommittedChange::Tokens);
     get(&mut tx.conn, id).await
