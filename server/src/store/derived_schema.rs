@@ -122,7 +122,7 @@ fn history_triggers(table: &KeptTable, columns: &[KeptColumn]) -> Vec<Trigger> {
     };
     let all: Vec<&str> = columns.iter().map(|column| column.name.as_str()).collect();
     let edited = versioned(columns);
-    let differs = list(edited.iter().copied(), " OR ", |c| format!("OLD.{c} IS NOT NEW.{c}"));
+    let differs = list(edited.iter().copied(), " OR ", |c| format!("OLD.{c} IS DISTINCT FROM NEW.{c}"));
     let before_change = store("OLD", 1, &all);
     let change = format!("BEFORE UPDATE OF {} ON {name} WHEN {differs} {before_change}", edited.join(", "));
     let mut triggers = vec![(format!("{name}_before_change"), change)];
@@ -180,8 +180,9 @@ fn content_triggers(content: &str, references: &[(String, String)]) -> Vec<Trigg
         };
         let unused = unused.concat();
         let delete = format!("BEGIN DELETE FROM {content} WHERE sha256 = OLD.{column}{unused}{damaged}; END");
-        let replaced =
-            format!("AFTER UPDATE OF {column} ON {name} WHEN OLD.{column} IS NOT NEW.{column} {delete}");
+        let replaced = format!(
+            "AFTER UPDATE OF {column} ON {name} WHEN OLD.{column} IS DISTINCT FROM NEW.{column} {delete}"
+        );
         [
             (format!("content_after_{name}"), format!("AFTER DELETE ON {name} {delete}")),
             (format!("content_after_replaced_{name}"), replaced),

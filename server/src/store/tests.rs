@@ -4,6 +4,10 @@ use super::*;
 use sqlx::{Executor as _, SqlSafeStr as _};
 use std::path::{Path, PathBuf};
 
+mod postgres;
+mod postgres_schema;
+mod scenario;
+
 type Statements = &'static [(&'static str, &'static str)];
 
 /// Every statement of the store: its path and its text.
