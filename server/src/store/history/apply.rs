@@ -89,7 +89,7 @@ fn restore(KeptTable { name, key, before, restored_as, .. }: &KeptTable, columns
 /// first, so that nothing restored meets it.
 fn steps(table: &KeptTable, columns: &[KeptColumn]) -> Vec<String> {
     let KeptTable { name, key, before, .. } = table;
-    let gone = format!("SELECT {key} FROM {before} WHERE present = 0");
+    let gone = format!("SELECT f.{key} FROM {before} f WHERE f.present = 0");
     let mut steps = vec![format!("DELETE FROM {name} WHERE {key} IN ({gone})")];
     let versioned: Vec<&str> =
         columns.iter().filter(|column| column.is_versioned).map(|column| column.name.as_str()).collect();
@@ -103,6 +103,18 @@ fn steps(table: &KeptTable, columns: &[KeptColumn]) -> Vec<String> {
     }
     steps.extend([change(table, &versioned), restore(table, columns)]);
     steps
+}
+
+/// What is made of the columns of the tables: every text of the way back.
+#[cfg(test)]
+pub(in crate::store) async fn every_step(conn: &mut db::Conn) -> Vec<String> {
+    let mut every = Vec::new();
+    for table in &PARTS {
+        every.extend(steps(table, &table.columns(conn).await.unwrap()));
+    }
+    let columns = MAPS.columns(conn).await.unwrap();
+    every.push(change(&MAPS, &columns.iter().map(|column| column.name.as_str()).collect::<Vec<_>>()));
+    every
 }
 
 /// Makes a map what it was at a kept commit; says whether that changed anything. Errors:

@@ -32,6 +32,9 @@ statements! {
     NEWEST = "SELECT coalesce(max(id), 0) FROM commits WHERE map_id = $1 AND open = 0";
 }
 
+#[cfg(test)]
+pub(super) use apply::every_step;
+
 /// Every statement of this folder.
 #[cfg(test)]
 pub(super) const EVERY: [&[(&str, &str)]; 5] =

@@ -8,7 +8,7 @@ use super::{
 };
 use crate::store::{
     db::{self, Conn},
-    open,
+    history, open,
     schema::tests::on_one_line,
 };
 use std::{
@@ -112,6 +112,9 @@ async fn every_portable_text_prepares_on_postgresql() {
         if !OF_SQLITE.contains(&name) && !name.starts_with("sqlite::") {
             script.push(format!("PREPARE s{number} AS {sql}"));
         }
+    }
+    for (number, sql) in history::every_step(&mut opened.writer).await.iter().enumerate() {
+        script.push(format!("PREPARE h{number} AS {}", schema::with_clock(sql)));
     }
     assert!(script.len() > before + 200, "{} texts", script.len() - before);
     let errors = errors(&cluster, &script);

@@ -31,6 +31,11 @@ fn with_types(sql: &str) -> String {
     replaced.collect()
 }
 
+/// The time in ms since the Unix epoch is that of a function.
+pub(super) fn with_clock(sql: &str) -> String {
+    sql.replace("CAST(unixepoch('subsec') * 1000 AS INTEGER)", "now_ms()")
+}
+
 /// A trigger: its name, when it fires, and a function with its condition and its statements.
 fn with_trigger(trigger: &str) -> String {
     let (head, body) = trigger.split_once(" BEGIN ").unwrap_or((trigger, ""));
@@ -42,10 +47,7 @@ fn with_trigger(trigger: &str) -> String {
         (true, false) => "NEW",
         (false, _) => "NULL",
     };
-    let body = body
-        .replace("CAST(unixepoch('subsec') * 1000 AS INTEGER)", "now_ms()")
-        .replace("SELECT RAISE(ABORT, ", "RAISE EXCEPTION ")
-        .replace("');", "';");
+    let body = with_clock(body).replace("SELECT RAISE(ABORT, ", "RAISE EXCEPTION ").replace("');", "';");
     format!(
         "CREATE FUNCTION {name}() RETURNS trigger LANGUAGE plpgsql AS $$ BEGIN IF {condition} THEN {body} END IF; \
          RETURN {row}; END $$; CREATE TRIGGER {name} {event} FOR EACH ROW EXECUTE FUNCTION {name}()"
