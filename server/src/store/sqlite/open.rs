@@ -2,16 +2,6 @@
 //! power cut. Each setting is read back. Errors: a SQLite with the write-ahead-log corruption bug,
 //! a damaged file, a second server.
 
-use sqlx::{
-    ConnectOptions, Row,
-    sqlite::{SqliteConnectOptions, SqlitePoolOptions, SqliteSynchronous},
-};
-use std::{
-    fs::{File, TryLockError},
-    path::{Path, PathBuf},
-    time::Duration,
-};
-
 use super::{checkpoint::renew_log, disk_guard, migrations, restored};
 use crate::{
     private_file::{self, OpenToOthers},
@@ -20,6 +10,15 @@ use crate::{
         db::{self, Conn, Pool},
         derived_schema, history, schema,
     },
+};
+use sqlx::{
+    ConnectOptions, Row,
+    sqlite::{SqliteConnectOptions, SqlitePoolOptions, SqliteSynchronous},
+};
+use std::{
+    fs::{File, TryLockError},
+    path::{Path, PathBuf},
+    time::Duration,
 };
 
 /// First version without the write-ahead-log corruption of 3.7.0 to 3.51.2
