@@ -6,13 +6,22 @@ CREATE TABLE tokens (
     id         INTEGER PRIMARY KEY AUTOINCREMENT,
     name       TEXT    NOT NULL CHECK (length(name) BETWEEN 1 AND 64),
     role       TEXT    NOT NULL CHECK (role IN ('viewer', 'robot', 'teacher', 'operator', 'admin')),
-    -- NULL: all maps. Otherwise a JSON list of numbers of maps: a new map under the name of a deleted one is another map.
-    maps       TEXT    CHECK (maps IS NULL OR json_type(maps) = 'array'),
+    -- For all maps; 0: for those in `token_maps`.
+    everywhere INTEGER NOT NULL CHECK (everywhere IN (0, 1)),
     sha256     BLOB    NOT NULL CHECK (length(sha256) = 32),
     created_ms INTEGER NOT NULL,
     expires_ms INTEGER,
     revoked_ms INTEGER
 ) STRICT;
+
+-- Maps that a token is for, by their numbers: a new map under the name of a deleted one is another map.
+CREATE TABLE token_maps (
+    token_id INTEGER NOT NULL REFERENCES tokens (id) ON DELETE CASCADE,
+    map_id   INTEGER NOT NULL REFERENCES maps (id) ON DELETE CASCADE,
+    PRIMARY KEY (token_id, map_id)
+) STRICT, WITHOUT ROWID;
+-- A map that is deleted finds its tokens.
+CREATE INDEX token_maps_by_map ON token_maps (map_id);
 
 -- Sessions of the pages, so that they outlive a restart of the server. Of a cookie only the digest is stored. A bounded
 -- number (MAX_SESSIONS of server/src/identity/sessions.rs). In no history: they are no part of a map.

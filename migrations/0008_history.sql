@@ -39,7 +39,7 @@ BEGIN
 END;
 
 CREATE TRIGGER model_changed AFTER UPDATE OF sha256, active, looks_like ON models
-WHEN OLD.sha256 <> NEW.sha256 OR OLD.active <> NEW.active OR OLD.looks_like IS NOT NEW.looks_like
+WHEN OLD.sha256 <> NEW.sha256 OR OLD.active <> NEW.active OR OLD.looks_like IS DISTINCT FROM NEW.looks_like
 BEGIN
     UPDATE landmarks SET revision = revision + 1, changed_ms = CAST(unixepoch('subsec') * 1000 AS INTEGER) WHERE id = NEW.landmark_id;
 END;

@@ -48,8 +48,11 @@ pub async fn check(path: &Path, noted: Option<&AuditHead>) -> Result<AuditCheck,
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{config::Config, publication::Catalogue, store::maps};
-    use sqlx::Executor as _;
+    use crate::{
+        config::Config,
+        publication::Catalogue,
+        store::{db, maps},
+    };
     use vision::recognise::DistanceKind;
 
     async fn fault_of(path: &Path) -> Option<String> {
@@ -75,7 +78,7 @@ mod tests {
         let write = store.write(|tx| {
             Box::pin(async move {
                 let sql = "DROP TRIGGER audit_is_not_changed; UPDATE audit SET actor = 'sam' WHERE seq = 1";
-                tx.conn().execute(sql).await.unwrap();
+                db::raw_sql(sql).execute(tx.conn()).await.unwrap();
                 Ok(())
             })
         });

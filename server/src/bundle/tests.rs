@@ -4,6 +4,7 @@
 mod any_bytes;
 
 use super::{BundleError, Fault, Request, archive::Writer, load, save};
+use crate::store::db;
 use crate::{
     config::Limits,
     publication::{Catalogue, tests::config},
@@ -33,8 +34,8 @@ async fn filled_with_pictures(store: &Catalogue) {
             for (table, picture) in [("views", photograph), ("underlays", floor)] {
                 let sha256 = pictures::digest(&picture);
                 pictures::put(tx, &sha256, &picture).await?;
-                let sql = format!("UPDATE {table} SET image_sha256 = ?1");
-                let done = sqlx::query(sqlx::AssertSqlSafe(sql)).bind(&sha256[..]).execute(tx.conn()).await;
+                let sql = format!("UPDATE {table} SET image_sha256 = $1");
+                let done = db::query(db::AssertSqlSafe(sql)).bind(&sha256[..]).execute(tx.conn()).await;
                 done.map_err(StoreError::during("give a picture"))?;
             }
             Ok(())
@@ -99,12 +100,11 @@ async fn a_bundle_of_a_loaded_map_is_the_first_one_byte_for_byte() {
         assert_eq!(new.bytes[22..new.bytes.len() - 8], old.bytes[22..old.bytes.len() - 8]);
         assert_eq!((new.params_hash, &new.summary.reasons), (old.params_hash, &old.summary.reasons));
     }
-    let commits: i64 = sqlx::query_scalar(
-        "SELECT count(*) FROM commits c JOIN maps m ON m.id = c.map_id WHERE m.name = 'a'",
-    )
-    .fetch_one(other.reads())
-    .await
-    .unwrap();
+    let commits: i64 =
+        db::query_scalar("SELECT count(*) FROM commits c JOIN maps m ON m.id = c.map_id WHERE m.name = 'a'")
+            .fetch_one(other.reads())
+            .await
+            .unwrap();
     assert_eq!(commits, 1);
 }
 
@@ -129,8 +129,8 @@ async fn every_changed_byte_is_refused_and_nothing_is_left() {
         assert_eq!(fault, Fault::NotABundle, "{length} bytes");
     }
     for table in ["landmarks", "pictures", "model_contents"] {
-        let sql = sqlx::AssertSqlSafe(format!("SELECT count(*) FROM {table}"));
-        let rows: i64 = sqlx::query_scalar(sql).fetch_one(other.reads()).await.unwrap();
+        let sql = db::AssertSqlSafe(format!("SELECT count(*) FROM {table}"));
+        let rows: i64 = db::query_scalar(sql).fetch_one(other.reads()).await.unwrap();
         assert_eq!(rows, 0, "{table}");
     }
     loaded(&other, &first, None).await.unwrap();

@@ -103,11 +103,11 @@ async fn difference(
     let mut reading = app.store.reads().begin().await.map_err(crate::store::StoreError::during("compare"))?;
     let of = |id: u64| i64::try_from(id).unwrap_or(i64::MAX);
     let from = of(query.from);
-    history::get(&mut *reading, map, from).await.map_err(|e| ApiError::from(e).field("from"))?;
+    history::get(&mut reading, map, from).await.map_err(|e| ApiError::from(e).field("from"))?;
     let to = match query.to {
-        None => history::newest(&mut *reading, map).await?,
+        None => history::newest(&mut reading, map).await?,
         Some(to) => {
-            history::get(&mut *reading, map, of(to)).await.map_err(|e| ApiError::from(e).field("to"))?;
+            history::get(&mut reading, map, of(to)).await.map_err(|e| ApiError::from(e).field("to"))?;
             of(to)
         }
     };

@@ -2,6 +2,7 @@
 //! before: walls by their version number, models by their digests, visibility areas by place, walls
 //! and camera. A damaged or outdated model is named and left out, never matched.
 
+use crate::store::db;
 use crate::{
     learning_rules,
     store::{
@@ -13,6 +14,7 @@ use crate::{
         walls,
     },
 };
+use db::Conn;
 use engine::{
     panics::{Edge, Panics},
     snapshot::{LandmarkInfo, LookAlikeClasses, MapSnapshot, Pending, Snapshots, StoredModel},
@@ -20,7 +22,6 @@ use engine::{
 use map::{
     laser_fix::WallIndex, modality_stats::ModalityMap, segments::LaserSegment, visibility::VisibilityMap,
 };
-use sqlx::SqliteConnection;
 use std::{collections::BTreeMap, sync::Arc};
 use vision::{
     learn::LearnRules,
@@ -32,7 +33,7 @@ use vision::{
 /// The current version of a map as it is in the database, without what is derived from it; `None`
 /// if the map is gone.
 pub(super) async fn snapshot(
-    conn: &mut SqliteConnection,
+    conn: &mut Conn,
     id: i64,
     snapshots: &Snapshots,
     params: &Arc<Params>,
@@ -91,7 +92,7 @@ pub(super) async fn snapshot(
 
 /// Its landmarks; only those are read whose rows have changed.
 async fn landmarks(
-    conn: &mut SqliteConnection,
+    conn: &mut Conn,
     id: i64,
     before: Option<&MapSnapshot>,
 ) -> Result<BTreeMap<LandmarkId, LandmarkInfo>, StoreError> {
@@ -122,7 +123,7 @@ type Walls = (Arc<Vec<LaserSegment>>, Arc<WallIndex>);
 
 /// The walls and their index, which is built off the runtime.
 async fn walls_and_index(
-    conn: &mut SqliteConnection,
+    conn: &mut Conn,
     id: i64,
     head: &MapHead,
     before: Option<&MapSnapshot>,
@@ -141,7 +142,7 @@ async fn walls_and_index(
 
 /// The modality statistics, and count and latest number of the reference runs that they rest on.
 async fn modalities(
-    conn: &mut SqliteConnection,
+    conn: &mut Conn,
     id: i64,
     before: Option<&MapSnapshot>,
 ) -> Result<(Arc<ModalityMap>, (i64, i64)), StoreError> {
@@ -210,7 +211,7 @@ type Models = (BTreeMap<LandmarkId, StoredModel>, BTreeMap<LandmarkId, String>);
 /// Models of a map, read only where the previous snapshot has not the same by the same rules; and
 /// those that must not be used.
 async fn models(
-    conn: &mut SqliteConnection,
+    conn: &mut Conn,
     (map_id, landmarks): (i64, &BTreeMap<LandmarkId, LandmarkInfo>),
     before: Option<&MapSnapshot>,
     params: &Params,

@@ -4,15 +4,16 @@
 //! start), the log and `/readyz` name the map, and the next write to it tries again.
 
 use super::build;
+use crate::store::db;
 use crate::{
     identity::{PublishedToken, TokenRegistry, certificates::CertificateRegistry},
     store::{
         CommittedChange, OnCommit, StoreError, map_locations, map_rows, robot_certificates, robots, tokens,
     },
 };
+use db::Conn;
 use engine::{panics::Edge, snapshot::Snapshots, vitals::Vitals};
 use futures::{FutureExt, future::BoxFuture};
-use sqlx::SqliteConnection;
 use std::{panic::AssertUnwindSafe, sync::Arc};
 use tokio::sync::Notify;
 use vision::params::Params;
@@ -42,7 +43,7 @@ impl Publisher {
         Self { snapshots, tokens, certificates, params, vitals, derive: Arc::default() }
     }
 
-    async fn all(&self, conn: &mut SqliteConnection) -> Result<(), StoreError> {
+    async fn all(&self, conn: &mut Conn) -> Result<(), StoreError> {
         for id in map_rows::ids(&mut *conn).await? {
             match self.map(conn, id).await {
                 Ok(()) | Err(StoreError::NotPublished { .. }) => {}
@@ -63,26 +64,26 @@ impl Publisher {
         }
     }
 
-    async fn links(&self, conn: &mut SqliteConnection) -> Result<(), StoreError> {
+    async fn links(&self, conn: &mut Conn) -> Result<(), StoreError> {
         self.snapshots.set_links(map_locations::links(&map_locations::all(conn).await?));
         Ok(())
     }
 
-    async fn tokens(&self, conn: &mut SqliteConnection) -> Result<(), StoreError> {
+    async fn tokens(&self, conn: &mut Conn) -> Result<(), StoreError> {
         let all = tokens::page(conn, 0, tokens::MAX_TOKENS).await?;
         let published = |row: tokens::TokenRow| PublishedToken { token: row.token, sha256: row.sha256 };
         self.tokens.publish(all.into_iter().map(published));
         Ok(())
     }
 
-    async fn certificates(&self, conn: &mut SqliteConnection) -> Result<(), StoreError> {
+    async fn certificates(&self, conn: &mut Conn) -> Result<(), StoreError> {
         self.certificates.publish(robot_certificates::all(conn).await?);
         Ok(())
     }
 
     /// Publishes a map. Errors: `NotPublished` if it cannot be built; any other means that the
     /// database cannot be read.
-    async fn map(&self, conn: &mut SqliteConnection, id: i64) -> Result<(), StoreError> {
+    async fn map(&self, conn: &mut Conn, id: i64) -> Result<(), StoreError> {
         // Unwind safety: a panic drops the unfinished snapshot.
         let panics = self.vitals.panics();
         let made = build::snapshot(&mut *conn, id, &self.snapshots, &self.params, panics);
@@ -121,13 +122,13 @@ impl Publisher {
 }
 
 impl OnCommit for Publisher {
-    fn opened<'c>(&'c self, conn: &'c mut SqliteConnection) -> BoxFuture<'c, Result<(), StoreError>> {
+    fn opened<'c>(&'c self, conn: &'c mut Conn) -> BoxFuture<'c, Result<(), StoreError>> {
         Box::pin(self.all(conn))
     }
 
     fn committed<'c>(
         &'c self,
-        conn: &'c mut SqliteConnection,
+        conn: &'c mut Conn,
         change: CommittedChange,
     ) -> BoxFuture<'c, Result<(), StoreError>> {
         Box::pin(async move {

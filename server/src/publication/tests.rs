@@ -5,6 +5,7 @@ mod readers;
 mod simulation;
 
 use super::{build::tests as planting, *};
+use crate::store::db;
 use crate::store::kind::Kind;
 use crate::{
     config::RawConfig,
@@ -195,7 +196,7 @@ async fn damaged_and_outdated_models_are_named_and_not_used() {
                   WHERE sha256 = (SELECT sha256 FROM models WHERE landmark_id = 2)";
     let write = store.write(move |tx| {
         Box::pin(async move {
-            sqlx::query(damage).execute(tx.conn()).await.map(drop).map_err(StoreError::during("damage"))
+            db::query(damage).execute(tx.conn()).await.map(drop).map_err(StoreError::during("damage"))
         })
     });
     write.await.unwrap();
@@ -239,7 +240,7 @@ async fn a_write_that_panics_is_rolled_back_and_the_writer_goes_on() {
 async fn an_error_after_which_nothing_may_be_written_is_a_failure_of_the_server() {
     let dir = tempfile::tempdir().unwrap();
     let (store, _task) = Catalogue::open(&config(dir.path())).await.unwrap();
-    let source = || sqlx::Error::WorkerCrashed;
+    let source = || db::Error::WorkerCrashed;
     let fatal = store.write(move |_| {
         Box::pin(async move { Err::<(), _>(StoreError::Database { operation: "planted", source: source() }) })
     });
@@ -367,7 +368,7 @@ pub(crate) async fn refuse_runs(store: &Catalogue) {
     let trigger = "CREATE TRIGGER refuse BEFORE INSERT ON runs BEGIN SELECT RAISE(ABORT, 'planted'); END";
     let write = store.write(move |tx| {
         Box::pin(async move {
-            sqlx::raw_sql(trigger).execute(tx.conn()).await.map(drop).map_err(StoreError::during("plant"))
+            db::raw_sql(trigger).execute(tx.conn()).await.map(drop).map_err(StoreError::during("plant"))
         })
     });
     write.await.unwrap();

@@ -1,21 +1,26 @@
 //! Views of a landmark as the ratio of its sides needs them (method 16.7).
 
-use super::{StoreError, landmark_placement, statements::statements, views::corners_in};
-use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
+use super::{
+    StoreError,
+    db::{self, Executor},
+    landmark_placement,
+    statements::statements,
+    views::corners_in,
+};
 use vision::learn::aspect::AspectView;
 
 statements! {
-    ASPECTS = "SELECT width_px, height_px, corners_px, capture FROM views WHERE landmark_id = ?1 ORDER BY id DESC LIMIT 64";
+    ASPECTS = "SELECT width_px, height_px, corners_px, capture FROM views WHERE landmark_id = $1 ORDER BY id DESC LIMIT 64";
 }
 
 /// Corners, sizes and cameras of the newest views of a landmark.
 pub(crate) async fn aspect_views(
-    db: impl SqliteExecutor<'_>,
+    db: impl Executor<'_>,
     landmark: i64,
 ) -> Result<Vec<AspectView>, StoreError> {
     let at = || StoreError::during("read the corners of views");
-    let rows = sqlx::query(ASPECTS).bind(landmark).fetch_all(db).await.map_err(at())?;
-    let view = |row: &SqliteRow| -> Result<AspectView, StoreError> {
+    let rows = db::query(ASPECTS).bind(landmark).fetch_all(db).await.map_err(at())?;
+    let view = |row: &db::Row| -> Result<AspectView, StoreError> {
         let side = |column: &str| row.try_get::<u32, _>(column).map_err(at());
         let capture: Option<&str> = row.try_get("capture").map_err(at())?;
         Ok(AspectView {

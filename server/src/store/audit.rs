@@ -6,11 +6,17 @@
 //! `action`, `target`, `request` and `why`: numbers as 8 bytes little-endian, texts as their length
 //! in bytes (so, too) and their bytes, an absent value as the length `u64::MAX`.
 
-use super::{StoreError, Tx, actor::Actor, now_ms, pictures::hex, statements::statements};
+use super::{
+    StoreError, Tx,
+    actor::Actor,
+    db::{self, Conn, Executor, Row},
+    now_ms,
+    pictures::hex,
+    statements::statements,
+};
 use futures::TryStreamExt as _;
 use protos::api::{AuditCheck, AuditEntry, AuditHead};
 use sha2::{Digest as _, Sha256};
-use sqlx::{Row, SqliteConnection, SqliteExecutor, sqlite::SqliteRow};
 
 statements! {
     TOTAL_CHANGES = "SELECT total_changes()";
@@ -18,16 +24,17 @@ statements! {
             UNION ALL SELECT seq, sha256 FROM audit_start ORDER BY seq DESC LIMIT 1";
     START = "SELECT seq, sha256 FROM audit_start";
     INSERT = "INSERT INTO audit (seq, time_ms, actor, token, action, target, request, why, sha256) \
-              VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)";
+              VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9)";
     NEW_START = "UPDATE audit_start SET (seq, sha256) = (SELECT seq, sha256 FROM audit ORDER BY seq LIMIT 1)";
     FORGET = "DELETE FROM audit WHERE seq = (SELECT seq FROM audit_start)";
     ALL_ENTRIES = "SELECT seq, time_ms, actor, token, action, target, request, why, sha256 FROM audit ORDER BY seq";
-    PAGE = "SELECT seq, time_ms, actor, token, action, target, request, why, sha256 FROM audit WHERE seq < ?1 \
-            AND (?2 IS NULL OR actor = ?2) AND (?3 IS NULL OR substr(target, 1, length(?3)) = ?3) \
-            AND (?4 IS NULL OR time_ms >= ?4) AND (?5 IS NULL OR time_ms < ?5) ORDER BY seq DESC LIMIT ?6";
-    COUNT = "SELECT count(*) FROM audit WHERE (?1 IS NULL OR actor = ?1) \
-             AND (?2 IS NULL OR substr(target, 1, length(?2)) = ?2) \
-             AND (?3 IS NULL OR time_ms >= ?3) AND (?4 IS NULL OR time_ms < ?4)";
+    PAGE = "SELECT seq, time_ms, actor, token, action, target, request, why, sha256 FROM audit WHERE seq < $1 \
+            AND (CAST($2 AS TEXT) IS NULL OR actor = $2) \
+            AND (CAST($3 AS TEXT) IS NULL OR substr(target, 1, length($3)) = $3) \
+            AND (CAST($4 AS BIGINT) IS NULL OR time_ms >= $4) AND (CAST($5 AS BIGINT) IS NULL OR time_ms < $5) ORDER BY seq DESC LIMIT $6";
+    COUNT = "SELECT count(*) FROM audit WHERE (CAST($1 AS TEXT) IS NULL OR actor = $1) \
+             AND (CAST($2 AS TEXT) IS NULL OR substr(target, 1, length($2)) = $2) \
+             AND (CAST($3 AS BIGINT) IS NULL OR time_ms >= $3) AND (CAST($4 AS BIGINT) IS NULL OR time_ms < $4)";
 }
 
 /// Most entries that one transaction forgets: after `limits.audit_entries` was lowered, there may
@@ -91,13 +98,13 @@ impl AuditRow {
     }
 }
 
-fn link(row: &SqliteRow) -> Result<ChainLink, sqlx::Error> {
+fn link(row: &Row) -> Result<ChainLink, db::Error> {
     let sha256: Vec<u8> = row.try_get("sha256")?;
     // The schema holds its length.
     Ok(ChainLink { seq: row.try_get::<i64, _>("seq")? as u64, sha256: sha256.try_into().unwrap_or_default() })
 }
 
-fn audit_row(row: &SqliteRow) -> Result<AuditRow, sqlx::Error> {
+fn audit_row(row: &Row) -> Result<AuditRow, db::Error> {
     let ChainLink { seq, sha256 } = link(row)?;
     Ok(AuditRow {
         seq,
@@ -114,7 +121,7 @@ fn audit_row(row: &SqliteRow) -> Result<AuditRow, sqlx::Error> {
 
 /// How many rows this connection has changed since it was opened.
 pub(super) async fn total_changes(tx: &mut Tx) -> Result<i64, StoreError> {
-    let total = sqlx::query_scalar(TOTAL_CHANGES).fetch_one(&mut tx.conn).await;
+    let total = db::query_scalar(TOTAL_CHANGES).fetch_one(&mut tx.conn).await;
     total.map_err(StoreError::during("count changes"))
 }
 
@@ -134,7 +141,7 @@ pub(super) async fn append(tx: &mut Tx, actor: &Actor, max: usize) -> Result<(),
         sha256: [0; 32],
     };
     row.sha256 = row.digest(&before.sha256);
-    let insert = sqlx::query(INSERT)
+    let insert = db::query(INSERT)
         .bind(row.seq as i64)
         .bind(row.time_ms)
         .bind(row.actor)
@@ -147,32 +154,32 @@ pub(super) async fn append(tx: &mut Tx, actor: &Actor, max: usize) -> Result<(),
     insert.execute(&mut tx.conn).await.map_err(at())?;
     let kept = row.seq - start(&mut tx.conn).await?.seq;
     for _ in 0..kept.saturating_sub(max as u64).min(FORGOTTEN_AT_ONCE) {
-        sqlx::query(NEW_START).execute(&mut tx.conn).await.map_err(at())?;
-        sqlx::query(FORGET).execute(&mut tx.conn).await.map_err(at())?;
+        db::query(NEW_START).execute(&mut tx.conn).await.map_err(at())?;
+        db::query(FORGET).execute(&mut tx.conn).await.map_err(at())?;
     }
     Ok(())
 }
 
-async fn start(db: impl SqliteExecutor<'_>) -> Result<ChainLink, StoreError> {
-    let row = sqlx::query(START).fetch_one(db).await;
+async fn start(db: impl Executor<'_>) -> Result<ChainLink, StoreError> {
+    let row = db::query(START).fetch_one(db).await;
     row.and_then(|row| link(&row)).map_err(StoreError::during("read the start of the audit log"))
 }
 
 /// The newest place of the chain.
-pub(crate) async fn head(db: impl SqliteExecutor<'_>) -> Result<ChainLink, StoreError> {
-    let row = sqlx::query(HEAD).fetch_one(db).await;
+pub(crate) async fn head(db: impl Executor<'_>) -> Result<ChainLink, StoreError> {
+    let row = db::query(HEAD).fetch_one(db).await;
     row.and_then(|row| link(&row)).map_err(StoreError::during("read the audit log"))
 }
 
 /// Entries with numbers below `before`, newest first.
 pub(crate) async fn page(
-    db: impl SqliteExecutor<'_>,
+    db: impl Executor<'_>,
     filter: &AuditFilter,
     before: i64,
     limit: usize,
 ) -> Result<Vec<AuditRow>, StoreError> {
     let at = || StoreError::during("read the audit log");
-    let rows = sqlx::query(PAGE)
+    let rows = db::query(PAGE)
         .bind(before)
         .bind(&filter.actor)
         .bind(&filter.target)
@@ -186,8 +193,8 @@ pub(crate) async fn page(
 }
 
 /// How many entries a filter finds.
-pub(crate) async fn count(db: impl SqliteExecutor<'_>, filter: &AuditFilter) -> Result<u64, StoreError> {
-    let count: i64 = sqlx::query_scalar(COUNT)
+pub(crate) async fn count(db: impl Executor<'_>, filter: &AuditFilter) -> Result<u64, StoreError> {
+    let count: i64 = db::query_scalar(COUNT)
         .bind(&filter.actor)
         .bind(&filter.target)
         .bind(filter.since_ms)
@@ -200,15 +207,12 @@ pub(crate) async fn count(db: impl SqliteExecutor<'_>, filter: &AuditFilter) -> 
 
 /// Computes the digest of every entry anew. An entry that was `noted` elsewhere has to have its
 /// digest still.
-pub(crate) async fn check(
-    conn: &mut SqliteConnection,
-    noted: Option<ChainLink>,
-) -> Result<AuditCheck, StoreError> {
+pub(crate) async fn check(conn: &mut Conn, noted: Option<ChainLink>) -> Result<AuditCheck, StoreError> {
     let at = || StoreError::during("read the audit log");
     let start = start(&mut *conn).await?;
     let (mut head, mut entries, mut fault) = (start, 0, None);
     let mut found = (noted.map(|noted| noted.seq) == Some(start.seq)).then_some(start.sha256);
-    let mut rows = sqlx::query(ALL_ENTRIES).fetch(conn);
+    let mut rows = db::query(ALL_ENTRIES).fetch(conn);
     while let Some(row) = rows.try_next().await.map_err(at())? {
         let row = audit_row(&row).map_err(at())?;
         let wrong = if row.seq != head.seq + 1 {

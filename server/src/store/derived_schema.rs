@@ -8,61 +8,61 @@
 //! there.
 
 use super::{
+    db::{self, AssertSqlSafe, Conn},
     history::{CONTENTS, KeptColumn, KeptTable, MAPS, PARTS},
     statements::statements,
 };
-use sqlx::{AssertSqlSafe, Connection as _, SqliteConnection};
 
 statements! {
-    TRIGGER = "SELECT sql FROM sqlite_schema WHERE type = 'trigger' AND name = ?1";
-    NAMES = "SELECT name FROM pragma_table_info(?1) ORDER BY cid";
+    TRIGGER = "SELECT sql FROM sqlite_schema WHERE type = 'trigger' AND name = $1";
+    NAMES = "SELECT name FROM pragma_table_info($1) ORDER BY cid";
     REFERENCES = "SELECT m.name, k.\"from\" FROM sqlite_schema m JOIN pragma_foreign_key_list(m.name) k \
-                  WHERE m.type = 'table' AND k.\"table\" = ?1 ORDER BY m.name";
+                  WHERE m.type = 'table' AND k.\"table\" = $1 ORDER BY m.name";
 }
 
 /// A trigger: its name, and what follows the name in its definition.
 type Trigger = (String, String);
 
 /// Makes what is missing and replaces what is otherwise, in one transaction. Where nothing is, it
-/// writes nothing.
-pub(super) async fn complete(conn: &mut SqliteConnection) -> Result<(), sqlx::Error> {
-    let mut tx = conn.begin().await?;
+/// writes nothing. After an error the transaction is open: the connection is of no further use.
+pub(super) async fn complete(conn: &mut Conn) -> Result<(), db::Error> {
+    db::raw_sql("BEGIN").execute(&mut *conn).await?;
     let mut triggers = Vec::new();
     for table in std::iter::once(&MAPS).chain(&PARTS) {
-        let columns = table.columns(&mut tx).await?;
-        past_rows(&mut tx, table, &columns).await?;
+        let columns = table.columns(conn).await?;
+        past_rows(conn, table, &columns).await?;
         triggers.extend(history_triggers(table, &columns));
         triggers.extend(table.revised_by.map(|further| revision_trigger(table, &columns, further)));
     }
-    triggers.extend(wall_triggers(&names(&mut tx, "laser_segments").await?));
+    triggers.extend(wall_triggers(&names(conn, "laser_segments").await?));
     for content in CONTENTS {
-        let references = sqlx::query_as(REFERENCES).bind(content).fetch_all(&mut *tx).await?;
+        let references = db::query_as(REFERENCES).bind(content).fetch_all(&mut *conn).await?;
         triggers.extend(content_triggers(content, &references));
     }
     for (name, rest) in triggers {
         let sql = format!("CREATE TRIGGER {name} {rest}");
-        let there: Option<String> = sqlx::query_scalar(TRIGGER).bind(&name).fetch_optional(&mut *tx).await?;
+        let there: Option<String> = db::query_scalar(TRIGGER).bind(&name).fetch_optional(&mut *conn).await?;
         if there.as_ref() != Some(&sql) {
-            execute(&mut tx, format!("DROP TRIGGER IF EXISTS {name}; {sql}")).await?;
+            execute(conn, format!("DROP TRIGGER IF EXISTS {name}; {sql}")).await?;
         }
     }
-    tx.commit().await
+    db::raw_sql("COMMIT").execute(conn).await.map(drop)
 }
 
-async fn execute(conn: &mut SqliteConnection, sql: String) -> Result<(), sqlx::Error> {
-    sqlx::raw_sql(AssertSqlSafe(sql)).execute(conn).await.map(drop)
+async fn execute(conn: &mut Conn, sql: String) -> Result<(), db::Error> {
+    db::raw_sql(AssertSqlSafe(sql)).execute(conn).await.map(drop)
 }
 
-async fn names(conn: &mut SqliteConnection, table: &str) -> Result<Vec<String>, sqlx::Error> {
-    sqlx::query_scalar(NAMES).bind(table).fetch_all(conn).await
+async fn names(conn: &mut Conn, table: &str) -> Result<Vec<String>, db::Error> {
+    db::query_scalar(NAMES).bind(table).fetch_all(conn).await
 }
 
 /// The table of past rows. `present` = 0: there was none, and the other columns say nothing.
 async fn past_rows(
-    conn: &mut SqliteConnection,
+    conn: &mut Conn,
     KeptTable { name, key, .. }: &KeptTable,
     columns: &[KeptColumn],
-) -> Result<(), sqlx::Error> {
+) -> Result<(), db::Error> {
     let there = names(conn, &format!("past_{name}")).await?;
     if there.is_empty() {
         let columns: Vec<_> = columns.iter().map(|c| format!("{} {}, ", c.name, c.declaration)).collect();
@@ -122,7 +122,7 @@ fn history_triggers(table: &KeptTable, columns: &[KeptColumn]) -> Vec<Trigger> {
     };
     let all: Vec<&str> = columns.iter().map(|column| column.name.as_str()).collect();
     let edited = versioned(columns);
-    let differs = list(edited.iter().copied(), " OR ", |c| format!("OLD.{c} IS NOT NEW.{c}"));
+    let differs = list(edited.iter().copied(), " OR ", |c| format!("OLD.{c} IS DISTINCT FROM NEW.{c}"));
     let before_change = store("OLD", 1, &all);
     let change = format!("BEFORE UPDATE OF {} ON {name} WHEN {differs} {before_change}", edited.join(", "));
     let mut triggers = vec![(format!("{name}_before_change"), change)];
@@ -180,8 +180,9 @@ fn content_triggers(content: &str, references: &[(String, String)]) -> Vec<Trigg
         };
         let unused = unused.concat();
         let delete = format!("BEGIN DELETE FROM {content} WHERE sha256 = OLD.{column}{unused}{damaged}; END");
-        let replaced =
-            format!("AFTER UPDATE OF {column} ON {name} WHEN OLD.{column} IS NOT NEW.{column} {delete}");
+        let replaced = format!(
+            "AFTER UPDATE OF {column} ON {name} WHEN OLD.{column} IS DISTINCT FROM NEW.{column} {delete}"
+        );
         [
             (format!("content_after_{name}"), format!("AFTER DELETE ON {name} {delete}")),
             (format!("content_after_replaced_{name}"), replaced),
@@ -212,8 +213,8 @@ mod tests {
         drop(store);
         let file = SqliteConnectOptions::new().filename(dir.path().join(crate::store::open::FILE));
         let step = "ALTER TABLE landmarks ADD COLUMN colour TEXT NOT NULL DEFAULT 'red'";
-        let mut conn = file.connect().await.unwrap();
-        sqlx::raw_sql(step).execute(&mut conn).await.unwrap();
+        let mut conn = Conn::from(file.connect().await.unwrap());
+        db::raw_sql(step).execute(&mut conn).await.unwrap();
         conn.close().await.unwrap();
 
         let (store, _tasks) = Catalogue::open(&config(dir.path())).await.unwrap();
@@ -222,8 +223,8 @@ mod tests {
         let paint = |colour: &'static str| {
             store.write(move |tx| {
                 Box::pin(async move {
-                    let sql = "UPDATE landmarks SET colour = ?1";
-                    let done = sqlx::query(sql).bind(colour).execute(tx.conn()).await;
+                    let sql = "UPDATE landmarks SET colour = $1";
+                    let done = db::query(sql).bind(colour).execute(tx.conn()).await;
                     done.map(drop).map_err(crate::store::StoreError::during("paint"))
                 })
             })
@@ -235,7 +236,7 @@ mod tests {
         for (commit, name, colour) in [(green, "p2", "green"), (named, "p1", "red"), (green, "p2", "green")] {
             store.write(move |tx| Box::pin(history::roll_back(tx, "a", commit))).await.unwrap();
             let row: (String, String) =
-                sqlx::query_as("SELECT name, colour FROM landmarks").fetch_one(store.reads()).await.unwrap();
+                db::query_as("SELECT name, colour FROM landmarks").fetch_one(store.reads()).await.unwrap();
             assert_eq!((row.0.as_str(), row.1.as_str()), (name, colour), "at commit {commit}");
         }
     }

@@ -1,6 +1,10 @@
 //! What can go wrong with the store, sorted by what the caller can do about it.
 
-use super::{disk_guard::DiskSpace, kind::Kind};
+use super::{
+    db::{self, ErrorClass, class},
+    disk_guard::DiskSpace,
+    kind::Kind,
+};
 use vision::pose::LandmarkSize;
 
 /// Why a read or a write did not happen. Nothing was changed, except with
@@ -141,7 +145,7 @@ pub(crate) enum StoreError {
     Database {
         operation: &'static str,
         /// What the database says.
-        source: sqlx::Error,
+        source: db::Error,
     },
 }
 
@@ -149,48 +153,12 @@ fn size_text(size: &LandmarkSize) -> String {
     format!("{} x {}", size.width_m, size.height_m)
 }
 
-/// SQLite result codes (primary, the low byte).
-const SQLITE_READONLY: i32 = 8;
-const SQLITE_IOERR: i32 = 10;
-const SQLITE_CORRUPT: i32 = 11;
-const SQLITE_FULL: i32 = 13;
-const SQLITE_NOTADB: i32 = 26;
-
-/// SQLite extended result codes of shared memory that cannot be made: it has nothing to do with
-/// what is stored.
-const SQLITE_IOERR_SHMOPEN: i32 = 4618;
-const SQLITE_IOERR_SHMSIZE: i32 = 4874;
-const SQLITE_IOERR_SHMMAP: i32 = 5386;
-const SQLITE_CANTOPEN: i32 = 14;
-
-fn extended_code(error: &sqlx::Error) -> Option<i32> {
-    error.as_database_error()?.code()?.parse::<i32>().ok()
-}
-
-fn primary_code(error: &sqlx::Error) -> Option<i32> {
-    extended_code(error).map(|code| code & 0xff)
-}
-
-/// Whether a file beside the database cannot be made or enlarged.
-pub(super) fn is_without_room(error: &sqlx::Error) -> bool {
-    matches!(
-        extended_code(error),
-        Some(SQLITE_FULL | SQLITE_IOERR_SHMOPEN | SQLITE_IOERR_SHMSIZE | SQLITE_IOERR_SHMMAP)
-    ) || primary_code(error) == Some(SQLITE_CANTOPEN)
-}
-
-/// Whether the content of the file is wrong at the place that was read. Reading it again gives the
-/// same.
-pub(super) fn is_damage(error: &sqlx::Error) -> bool {
-    matches!(primary_code(error), Some(SQLITE_CORRUPT | SQLITE_NOTADB))
-}
-
 impl StoreError {
     /// Names the operation. For `map_err`.
-    pub(crate) fn during(operation: &'static str) -> impl FnOnce(sqlx::Error) -> Self {
-        move |source| match (primary_code(&source), extended_code(&source)) {
-            (Some(SQLITE_FULL), _) | (_, Some(SQLITE_IOERR_SHMSIZE)) => Self::Full,
-            (Some(SQLITE_READONLY), _) => Self::ReadOnly,
+    pub(crate) fn during(operation: &'static str) -> impl FnOnce(db::Error) -> Self {
+        move |source| match class(&source) {
+            ErrorClass::Full => Self::Full,
+            ErrorClass::ReadOnly => Self::ReadOnly,
             _ => Self::Database { operation, source },
         }
     }
@@ -200,22 +168,18 @@ impl StoreError {
         operation: &'static str,
         what: Kind,
         name: &str,
-    ) -> impl FnOnce(sqlx::Error) -> Self {
-        move |source| match &source {
-            sqlx::Error::Database(e) if e.is_unique_violation() => {
-                Self::Exists { what, name: name.to_owned() }
-            }
+    ) -> impl FnOnce(db::Error) -> Self {
+        move |source| match class(&source) {
+            ErrorClass::Taken => Self::Exists { what, name: name.to_owned() },
             _ => Self::during(operation)(source),
         }
     }
 
-    /// Whether the state on disk is unknown after this. A failed fsync cannot be repeated, since it
-    /// marks the pages clean. The only safe way is to stop, and to open the file again.
+    /// Whether the state on disk is unknown after this, or damaged: the server stops.
     pub(crate) fn is_fatal(&self) -> bool {
         match self {
             Self::Database { source, .. } => {
-                matches!(primary_code(source), Some(SQLITE_IOERR | SQLITE_CORRUPT | SQLITE_NOTADB))
-                    || matches!(source, sqlx::Error::Io(_) | sqlx::Error::WorkerCrashed)
+                matches!(class(source), ErrorClass::Damaged | ErrorClass::Lost)
             }
             Self::At { source, .. } => source.is_fatal(),
             _ => false,

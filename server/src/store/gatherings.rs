@@ -3,13 +3,13 @@
 
 use super::{
     StoreError, Tx,
+    db::{self, Executor, Row},
     kind::Kind,
     landmarks, maps, now_ms, pictures, robots,
     statements::statements,
     views::{self, NewView, QuadCrop},
     within,
 };
-use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
 
 /// Columns of [`GatheringRow`].
 macro_rules! select {
@@ -24,33 +24,33 @@ macro_rules! select {
 }
 
 statements! {
-    COUNT = "SELECT count(*) FROM gatherings WHERE map_id = ?1";
+    COUNT = "SELECT count(*) FROM gatherings WHERE map_id = $1";
     COUNT_OPEN = "SELECT count(*) FROM gatherings WHERE open = 1";
     INSERT = "INSERT INTO gatherings (map_id, robot, landmark_id, known, open, created_ms) \
-              VALUES (?1, ?2, ?3, ?4, 1, ?5) RETURNING id";
-    GET = select!("WHERE m.name = ?1 AND g.id = ?2");
-    PAGE = select!("WHERE g.map_id = ?1 AND g.id > ?2 ORDER BY g.id LIMIT ?3");
+              VALUES ($1, $2, $3, $4, 1, $5) RETURNING id";
+    GET = select!("WHERE m.name = $1 AND g.id = $2");
+    PAGE = select!("WHERE g.map_id = $1 AND g.id > $2 ORDER BY g.id LIMIT $3");
     OPEN = select!("WHERE g.open = 1 ORDER BY g.id");
-    IS_OPEN = "SELECT open FROM gatherings WHERE id = ?1";
-    END = "UPDATE gatherings SET open = 0, counts = ?2, ended_ms = ?3 WHERE id = ?1";
-    DELETE = "DELETE FROM gatherings WHERE id = ?1";
-    PUT_TRACK = "INSERT INTO tracks (gathering_id, number, landmark_id, sightings, known) VALUES (?1, ?2, ?3, ?4, ?5) \
+    IS_OPEN = "SELECT open FROM gatherings WHERE id = $1";
+    END = "UPDATE gatherings SET open = 0, counts = $2, ended_ms = $3 WHERE id = $1";
+    DELETE = "DELETE FROM gatherings WHERE id = $1";
+    PUT_TRACK = "INSERT INTO tracks (gathering_id, number, landmark_id, sightings, known) VALUES ($1, $2, $3, $4, $5) \
                  ON CONFLICT (gathering_id, number) DO UPDATE SET sightings = excluded.sightings, known = excluded.known \
                  RETURNING state";
-    COUNT_TRACKS = "SELECT count(*) FROM tracks WHERE gathering_id = ?1 AND state = 'open'";
+    COUNT_TRACKS = "SELECT count(*) FROM tracks WHERE gathering_id = $1 AND state = 'open'";
     TRACKS = "SELECT t.number, t.landmark_id, l.name AS landmark, t.state, t.sightings, t.known, \
               (SELECT count(*) FROM track_views v WHERE v.gathering_id = t.gathering_id AND v.track = t.number) AS views \
-              FROM tracks t LEFT JOIN landmarks l ON l.id = t.landmark_id WHERE t.gathering_id = ?1 ORDER BY t.number";
+              FROM tracks t LEFT JOIN landmarks l ON l.id = t.landmark_id WHERE t.gathering_id = $1 ORDER BY t.number";
     INSERT_VIEW = "INSERT INTO track_views (gathering_id, track, image_sha256, image_kind, width_px, height_px, \
                    corners_px, icon_side, icon, icon_scale, created_ms, capture) \
-                   VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12) ON CONFLICT DO NOTHING";
-    COUNT_VIEWS = "SELECT count(*) FROM track_views WHERE gathering_id = ?1 AND track = ?2";
+                   VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12) ON CONFLICT DO NOTHING";
+    COUNT_VIEWS = "SELECT count(*) FROM track_views WHERE gathering_id = $1 AND track = $2";
     BYTES = "SELECT coalesce(sum(length(bytes)), 0) FROM pictures WHERE sha256 IN \
-             (SELECT image_sha256 FROM track_views WHERE gathering_id = ?1)";
+             (SELECT image_sha256 FROM track_views WHERE gathering_id = $1)";
     VIEWS = "SELECT id, image_sha256, width_px, height_px, corners_px, icon_side, icon, icon_scale, capture FROM track_views \
-             WHERE gathering_id = ?1 AND track = ?2 ORDER BY id";
-    DISCARD = "UPDATE tracks SET state = 'discarded' WHERE gathering_id = ?1 AND number = ?2 AND state = 'open'";
-    DROP_VIEWS = "DELETE FROM track_views WHERE gathering_id = ?1 AND track = ?2";
+             WHERE gathering_id = $1 AND track = $2 ORDER BY id";
+    DISCARD = "UPDATE tracks SET state = 'discarded' WHERE gathering_id = $1 AND number = $2 AND state = 'open'";
+    DROP_VIEWS = "DELETE FROM track_views WHERE gathering_id = $1 AND track = $2";
 }
 
 /// Bounds of gatherings.
@@ -100,7 +100,7 @@ pub(crate) struct GatheringRow {
     pub(crate) ended_ms: Option<i64>,
 }
 
-fn gathering_row(row: &SqliteRow) -> Result<GatheringRow, sqlx::Error> {
+fn gathering_row(row: &Row) -> Result<GatheringRow, db::Error> {
     Ok(GatheringRow {
         id: row.try_get("id")?,
         map: row.try_get("map")?,
@@ -145,8 +145,8 @@ fn unknown(what: Kind, number: i64) -> StoreError {
 }
 
 /// How many gatherings a map has.
-pub(crate) async fn count(db: impl SqliteExecutor<'_>, map_id: i64) -> Result<u64, StoreError> {
-    let count = sqlx::query_scalar::<_, i64>(COUNT).bind(map_id).fetch_one(db).await;
+pub(crate) async fn count(db: impl Executor<'_>, map_id: i64) -> Result<u64, StoreError> {
+    let count = db::query_scalar::<i64>(COUNT).bind(map_id).fetch_one(db).await;
     count.map(|n| n as u64).map_err(StoreError::during("count gatherings"))
 }
 
@@ -166,7 +166,7 @@ pub(crate) async fn create(
         Some(name) => Some(landmarks::get(&mut tx.conn, &map.name, name).await?.id),
         None => None,
     };
-    let id = sqlx::query_scalar(INSERT)
+    let id = db::query_scalar(INSERT)
         .bind(map.id)
         .bind(&robot.name)
         .bind(landmark_id)
@@ -179,7 +179,7 @@ pub(crate) async fn create(
             StoreError::Exists { name, .. } => StoreError::InUse(format!("robot `{name}` gathers already")),
             other => other,
         })?;
-    let count = |sql| sqlx::query_scalar(sql);
+    let count = |sql| db::query_scalar(sql);
     let open =
         count(COUNT_OPEN).fetch_one(&mut tx.conn).await.map_err(StoreError::during("count gatherings"))?;
     within(open, limits.open, "robots that gather at a time")?;
@@ -189,28 +189,28 @@ pub(crate) async fn create(
 }
 
 /// One gathering of a map.
-pub(crate) async fn get(db: impl SqliteExecutor<'_>, map: &str, id: i64) -> Result<GatheringRow, StoreError> {
+pub(crate) async fn get(db: impl Executor<'_>, map: &str, id: i64) -> Result<GatheringRow, StoreError> {
     let at = || StoreError::during("read gathering");
-    let row = sqlx::query(GET).bind(map).bind(id).fetch_optional(db).await.map_err(at())?;
+    let row = db::query(GET).bind(map).bind(id).fetch_optional(db).await.map_err(at())?;
     gathering_row(&row.ok_or_else(|| unknown(Kind::Gathering, id))?).map_err(at())
 }
 
 /// Gatherings of a map with numbers above `after`, in order.
 pub(crate) async fn page(
-    db: impl SqliteExecutor<'_>,
+    db: impl Executor<'_>,
     map_id: i64,
     after: i64,
     limit: usize,
 ) -> Result<Vec<GatheringRow>, StoreError> {
     let at = || StoreError::during("list gatherings");
-    let rows = sqlx::query(PAGE).bind(map_id).bind(after).bind(limit as i64).fetch_all(db).await;
+    let rows = db::query(PAGE).bind(map_id).bind(after).bind(limit as i64).fetch_all(db).await;
     rows.map_err(at())?.iter().map(gathering_row).collect::<Result<_, _>>().map_err(at())
 }
 
 /// Open gatherings, for the start of the server.
-pub(crate) async fn open(db: impl SqliteExecutor<'_>) -> Result<Vec<GatheringRow>, StoreError> {
+pub(crate) async fn open(db: impl Executor<'_>) -> Result<Vec<GatheringRow>, StoreError> {
     let at = || StoreError::during("list gatherings");
-    let rows = sqlx::query(OPEN).fetch_all(db).await.map_err(at())?;
+    let rows = db::query(OPEN).fetch_all(db).await.map_err(at())?;
     rows.iter().map(gathering_row).collect::<Result<_, _>>().map_err(at())
 }
 
@@ -221,7 +221,7 @@ pub(crate) async fn end(tx: &mut Tx, map: &str, id: i64, counts: &str) -> Result
     if !row.open {
         return Ok(row);
     }
-    sqlx::query(END)
+    db::query(END)
         .bind(id)
         .bind(counts)
         .bind(now_ms())
@@ -234,11 +234,7 @@ pub(crate) async fn end(tx: &mut Tx, map: &str, id: i64, counts: &str) -> Result
 /// Deletes a gathering with all tracks that were not accepted.
 pub(crate) async fn delete(tx: &mut Tx, map: &str, id: i64) -> Result<(), StoreError> {
     get(&mut tx.conn, map, id).await?;
-    sqlx::query(DELETE)
-        .bind(id)
-        .execute(&mut tx.conn)
-        .await
-        .map_err(StoreError::during("delete gathering"))?;
+    db::query(DELETE).bind(id).execute(&mut tx.conn).await.map_err(StoreError::during("delete gathering"))?;
     Ok(())
 }
 
@@ -252,11 +248,11 @@ pub(crate) async fn add_view(
 ) -> Result<(), StoreError> {
     let at = || StoreError::during("store view of a track");
     let open: Option<bool> =
-        sqlx::query_scalar(IS_OPEN).bind(id).fetch_optional(&mut tx.conn).await.map_err(at())?;
+        db::query_scalar(IS_OPEN).bind(id).fetch_optional(&mut tx.conn).await.map_err(at())?;
     if !open.ok_or_else(|| unknown(Kind::Gathering, id))? {
         return Err(StoreError::InUse(format!("gathering {id} has ended")));
     }
-    let state: String = sqlx::query_scalar(PUT_TRACK)
+    let state: String = db::query_scalar(PUT_TRACK)
         .bind(id)
         .bind(track.number)
         .bind(track.landmark.map(|l| l.0 as i64))
@@ -268,10 +264,10 @@ pub(crate) async fn add_view(
     if state != "open" {
         return Err(StoreError::InUse(format!("track {} is {state}", track.number)));
     }
-    let tracks = sqlx::query_scalar(COUNT_TRACKS).bind(id).fetch_one(&mut tx.conn).await.map_err(at())?;
+    let tracks = db::query_scalar(COUNT_TRACKS).bind(id).fetch_one(&mut tx.conn).await.map_err(at())?;
     within(tracks, limits.tracks, "tracks of a gathering")?;
     pictures::put(tx, &new.image_sha256, &new.image).await?;
-    sqlx::query(INSERT_VIEW)
+    db::query(INSERT_VIEW)
         .bind(id)
         .bind(track.number)
         .bind(&new.image_sha256[..])
@@ -287,17 +283,17 @@ pub(crate) async fn add_view(
         .execute(&mut tx.conn)
         .await
         .map_err(at())?;
-    let count = sqlx::query_scalar(COUNT_VIEWS).bind(id).bind(track.number).fetch_one(&mut tx.conn).await;
+    let count = db::query_scalar(COUNT_VIEWS).bind(id).bind(track.number).fetch_one(&mut tx.conn).await;
     within(count.map_err(at())?, limits.views, "views of a track")?;
-    let bytes = sqlx::query_scalar(BYTES).bind(id).fetch_one(&mut tx.conn).await.map_err(at())?;
+    let bytes = db::query_scalar(BYTES).bind(id).fetch_one(&mut tx.conn).await.map_err(at())?;
     within(bytes, limits.bytes, "bytes of a gathering")
 }
 
 /// The tracks of a gathering by number, decided ones included.
-pub(crate) async fn tracks(db: impl SqliteExecutor<'_>, id: i64) -> Result<Vec<TrackRow>, StoreError> {
+pub(crate) async fn tracks(db: impl Executor<'_>, id: i64) -> Result<Vec<TrackRow>, StoreError> {
     let at = || StoreError::during("list tracks");
-    let rows = sqlx::query(TRACKS).bind(id).fetch_all(db).await.map_err(at())?;
-    let track = |row: &SqliteRow| {
+    let rows = db::query(TRACKS).bind(id).fetch_all(db).await.map_err(at())?;
+    let track = |row: &Row| {
         Ok(TrackRow {
             number: row.try_get("number")?,
             landmark_id: row.try_get("landmark_id")?,
@@ -308,11 +304,11 @@ pub(crate) async fn tracks(db: impl SqliteExecutor<'_>, id: i64) -> Result<Vec<T
             views: row.try_get::<i64, _>("views")? as u64,
         })
     };
-    rows.iter().map(track).collect::<Result<_, sqlx::Error>>().map_err(at())
+    rows.iter().map(track).collect::<Result<_, db::Error>>().map_err(at())
 }
 
 /// One track that nobody has decided on.
-pub(crate) async fn track(db: impl SqliteExecutor<'_>, id: i64, number: u32) -> Result<TrackRow, StoreError> {
+pub(crate) async fn track(db: impl Executor<'_>, id: i64, number: u32) -> Result<TrackRow, StoreError> {
     let mut all = tracks(db, id).await?.into_iter();
     let found = all.find(|t| t.number == number && t.state == "open");
     found.ok_or_else(|| unknown(Kind::Track, i64::from(number)))
@@ -320,13 +316,13 @@ pub(crate) async fn track(db: impl SqliteExecutor<'_>, id: i64, number: u32) -> 
 
 /// The views of a track, oldest first.
 pub(crate) async fn track_views(
-    db: impl SqliteExecutor<'_>,
+    db: impl Executor<'_>,
     id: i64,
     number: u32,
 ) -> Result<Vec<TrackView>, StoreError> {
     let at = || StoreError::during("read views of a track");
-    let rows = sqlx::query(VIEWS).bind(id).bind(number).fetch_all(db).await.map_err(at())?;
-    let view = |row: &SqliteRow| {
+    let rows = db::query(VIEWS).bind(id).bind(number).fetch_all(db).await.map_err(at())?;
+    let view = |row: &Row| {
         let pixels = |column: &str| row.try_get::<i64, _>(column).map(|s| s as usize).map_err(at());
         Ok(TrackView {
             id: row.try_get("id").map_err(at())?,
@@ -342,11 +338,11 @@ pub(crate) async fn track_views(
 /// Discards a track: deletes its views.
 pub(crate) async fn discard(tx: &mut Tx, map: &str, id: i64, number: u32) -> Result<(), StoreError> {
     get(&mut tx.conn, map, id).await?;
-    let done = sqlx::query(DISCARD).bind(id).bind(number).execute(&mut tx.conn).await;
+    let done = db::query(DISCARD).bind(id).bind(number).execute(&mut tx.conn).await;
     if done.map_err(StoreError::during("discard track"))?.rows_affected() == 0 {
         return Err(unknown(Kind::Track, i64::from(number)));
     }
-    let dropped = sqlx::query(DROP_VIEWS).bind(id).bind(number).execute(&mut tx.conn).await;
+    let dropped = db::query(DROP_VIEWS).bind(id).bind(number).execute(&mut tx.conn).await;
     dropped.map_err(StoreError::during("discard track")).map(drop)
 }
 

@@ -4,7 +4,7 @@
 //! the database and of its log, once or from then on.
 
 use super::{
-    landmarks,
+    db, landmarks,
     open::{FILE, OpenError},
     power_cuts::{self, StoredState, folder, found, name, template},
     writer,
@@ -128,7 +128,7 @@ async fn restart(
         left.set_error(None);
     }
     let (store, task) = open(dir).await.unwrap_or_else(|e| panic!("{what}: {e}"));
-    let names = sqlx::query_scalar::<_, i64>("SELECT count(*) FROM landmarks");
+    let names = db::query_scalar::<i64>("SELECT count(*) FROM landmarks");
     let landmarks = names.fetch_one(store.reads()).await.unwrap() as u64;
     let version = store.snapshots().get("hall").unwrap().version;
     is_in(&StoredState { landmarks, version }, "after a kill");

@@ -1,28 +1,34 @@
 //! Jobs as rows: an accepted job survives a crash and is run again.
 
-use super::{CommittedChange, StoreError, Tx, kind::Kind, maps, now_ms, statements::statements, within};
-use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
+use super::{
+    CommittedChange, StoreError, Tx,
+    db::{self, Executor, Row},
+    kind::Kind,
+    maps, now_ms,
+    statements::statements,
+    within,
+};
+use serde_json::Value;
 
 statements! {
     COUNT_OPEN = "SELECT count(*) FROM jobs WHERE state IN ('queued', 'running')";
     INSERT = "INSERT INTO jobs (kind, map, request, state, created_ms, author, why) \
-              VALUES (?1, ?2, ?3, 'queued', ?4, ?5, ?6) RETURNING id";
-    GET = "SELECT id, kind, map, request, state, message, result, attempts, author, why, created_ms, started_ms, ended_ms FROM jobs WHERE id = ?1";
-    LIST = "SELECT id, kind, map, request, state, message, result, attempts, author, why, created_ms, started_ms, ended_ms FROM jobs WHERE id < ?1 \
-            AND (?2 IS NULL OR state = ?2) AND (?3 IS NULL OR map IN (SELECT value FROM json_each(?3))) ORDER BY id DESC LIMIT ?4";
-    COUNT = "SELECT count(*) FROM jobs WHERE (?1 IS NULL OR state = ?1) AND (?2 IS NULL OR map IN (SELECT value FROM json_each(?2)))";
+              VALUES ($1, $2, $3, 'queued', $4, $5, $6) RETURNING id";
+    GET = "SELECT id, kind, map, request, state, message, result, attempts, author, why, created_ms, started_ms, ended_ms FROM jobs WHERE id = $1";
+    LIST = "SELECT id, kind, map, request, state, message, result, attempts, author, why, created_ms, started_ms, ended_ms FROM jobs WHERE id < $1 \
+            AND ($2 IS NULL OR state = $2) AND ($3 IS NULL OR map IN (SELECT value FROM json_each($3))) ORDER BY id DESC LIMIT $4";
+    COUNT = "SELECT count(*) FROM jobs WHERE ($1 IS NULL OR state = $1) AND ($2 IS NULL OR map IN (SELECT value FROM json_each($2)))";
     OPEN = "SELECT id, kind, map, request, state, message, result, attempts, author, why, created_ms, started_ms, ended_ms FROM jobs \
             WHERE state IN ('queued', 'running') ORDER BY id";
-    BEGIN = "UPDATE jobs SET state = 'running', attempts = attempts + 1, started_ms = ?2 \
-             WHERE id = ?1 AND state IN ('queued', 'running')";
-    PUT_BACK = "UPDATE jobs SET state = 'queued', attempts = attempts - 1, started_ms = NULL WHERE id = ?1 AND state = 'running'";
-    END = "UPDATE jobs SET state = ?2, message = ?3, result = ?4, ended_ms = ?5 \
-           WHERE id = ?1 AND state IN ('queued', 'running')";
-    RENAME_LANDMARK = "UPDATE jobs SET request = json_set(request, '$.landmarks', json((SELECT \
-              json_group_array(CASE value WHEN ?2 THEN ?3 ELSE value END) FROM json_each(jobs.request, '$.landmarks')))) \
-              WHERE map = ?1 AND state IN ('queued', 'running') AND json_type(request, '$.landmarks') = 'array'";
+    BEGIN = "UPDATE jobs SET state = 'running', attempts = attempts + 1, started_ms = $2 \
+             WHERE id = $1 AND state IN ('queued', 'running')";
+    PUT_BACK = "UPDATE jobs SET state = 'queued', attempts = attempts - 1, started_ms = NULL WHERE id = $1 AND state = 'running'";
+    END = "UPDATE jobs SET state = $2, message = $3, result = $4, ended_ms = $5 \
+           WHERE id = $1 AND state IN ('queued', 'running')";
+    OPEN_REQUESTS = "SELECT id, request FROM jobs WHERE map = $1 AND state IN ('queued', 'running') ORDER BY id";
+    SET_REQUEST = "UPDATE jobs SET request = $2 WHERE id = $1";
     DELETE_OLD = "DELETE FROM jobs WHERE ended_ms IS NOT NULL AND id NOT IN \
-              (SELECT id FROM jobs WHERE ended_ms IS NOT NULL ORDER BY id DESC LIMIT ?1)";
+              (SELECT id FROM jobs WHERE ended_ms IS NOT NULL ORDER BY id DESC LIMIT $1)";
 }
 
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -60,7 +66,7 @@ pub(crate) struct Ended {
     pub(crate) result: Option<String>,
 }
 
-fn job_row(row: &SqliteRow) -> Result<JobRow, sqlx::Error> {
+fn job_row(row: &Row) -> Result<JobRow, db::Error> {
     Ok(JobRow {
         id: row.try_get("id")?,
         kind: row.try_get("kind")?,
@@ -80,8 +86,20 @@ fn job_row(row: &SqliteRow) -> Result<JobRow, sqlx::Error> {
 
 /// Gives a landmark its new name in what open jobs are asked for.
 pub(super) async fn rename_landmark(tx: &mut Tx, map: &str, name: &str, new: &str) -> Result<(), StoreError> {
-    let renamed = sqlx::query(RENAME_LANDMARK).bind(map).bind(name).bind(new).execute(&mut tx.conn).await;
-    renamed.map_err(StoreError::during("rename landmark in jobs")).map(drop)
+    let at = || StoreError::during("rename landmark in jobs");
+    let open = db::query_as::<(i64, String)>(OPEN_REQUESTS).bind(map).fetch_all(&mut tx.conn).await;
+    for (id, request) in open.map_err(at())? {
+        let damaged =
+            |e: serde_json::Error| StoreError::Damaged { what: format!("job {id}"), reason: e.to_string() };
+        let mut request: Value = serde_json::from_str(&request).map_err(damaged)?;
+        let Some(Value::Array(landmarks)) = request.get_mut("landmarks") else { continue };
+        for landmark in landmarks.iter_mut().filter(|landmark| **landmark == name) {
+            *landmark = new.into();
+        }
+        let set = db::query(SET_REQUEST).bind(id).bind(request.to_string());
+        set.execute(&mut tx.conn).await.map_err(at())?;
+    }
+    Ok(())
 }
 
 /// Queues a job and deletes the oldest finished ones beyond `retained`. Errors: more than `max`
@@ -94,13 +112,13 @@ pub(crate) async fn create(
     (max, retained): (usize, usize),
 ) -> Result<JobRow, StoreError> {
     maps::get(&mut tx.conn, map).await?;
-    sqlx::query(DELETE_OLD)
+    db::query(DELETE_OLD)
         .bind(retained as i64)
         .execute(&mut tx.conn)
         .await
         .map_err(StoreError::during("delete old jobs"))?;
     let created_ms = now_ms();
-    let id = sqlx::query_scalar(INSERT)
+    let id = db::query_scalar(INSERT)
         .bind(kind)
         .bind(map)
         .bind(request)
@@ -110,7 +128,7 @@ pub(crate) async fn create(
         .fetch_one(&mut tx.conn)
         .await;
     let id = id.map_err(StoreError::during("queue job"))?;
-    let open = sqlx::query_scalar(COUNT_OPEN)
+    let open = db::query_scalar(COUNT_OPEN)
         .fetch_one(&mut tx.conn)
         .await
         .map_err(StoreError::during("count jobs"))?;
@@ -134,8 +152,8 @@ pub(crate) async fn create(
 }
 
 /// One job.
-pub(crate) async fn get(db: impl SqliteExecutor<'_>, id: i64) -> Result<JobRow, StoreError> {
-    let row = sqlx::query(GET).bind(id).fetch_optional(db).await.map_err(StoreError::during("read job"))?;
+pub(crate) async fn get(db: impl Executor<'_>, id: i64) -> Result<JobRow, StoreError> {
+    let row = db::query(GET).bind(id).fetch_optional(db).await.map_err(StoreError::during("read job"))?;
     let row = row.ok_or_else(|| StoreError::NotFound { what: Kind::Job, name: id.to_string() })?;
     job_row(&row).map_err(StoreError::during("read job"))
 }
@@ -151,43 +169,43 @@ pub(crate) struct JobFilter {
 
 /// Jobs with numbers below `before`, newest first.
 pub(crate) async fn page(
-    db: impl SqliteExecutor<'_>,
+    db: impl Executor<'_>,
     filter: &JobFilter,
     before: i64,
     limit: usize,
 ) -> Result<Vec<JobRow>, StoreError> {
-    let rows = sqlx::query(LIST).bind(before).bind(filter.state).bind(&filter.maps).bind(limit as i64);
+    let rows = db::query(LIST).bind(before).bind(filter.state).bind(&filter.maps).bind(limit as i64);
     let rows = rows.fetch_all(db).await.map_err(StoreError::during("list jobs"))?;
     rows.iter().map(job_row).collect::<Result<_, _>>().map_err(StoreError::during("list jobs"))
 }
 
 /// How many jobs a list has.
-pub(crate) async fn count(db: impl SqliteExecutor<'_>, filter: &JobFilter) -> Result<u64, StoreError> {
-    let count = sqlx::query_scalar::<_, i64>(COUNT).bind(filter.state).bind(&filter.maps).fetch_one(db).await;
+pub(crate) async fn count(db: impl Executor<'_>, filter: &JobFilter) -> Result<u64, StoreError> {
+    let count = db::query_scalar::<i64>(COUNT).bind(filter.state).bind(&filter.maps).fetch_one(db).await;
     count.map(|n| n as u64).map_err(StoreError::during("count jobs"))
 }
 
 /// Jobs not ended, oldest first.
-pub(crate) async fn open(db: impl SqliteExecutor<'_>) -> Result<Vec<JobRow>, StoreError> {
-    let rows = sqlx::query(OPEN).fetch_all(db).await.map_err(StoreError::during("list jobs"))?;
+pub(crate) async fn open(db: impl Executor<'_>) -> Result<Vec<JobRow>, StoreError> {
+    let rows = db::query(OPEN).fetch_all(db).await.map_err(StoreError::during("list jobs"))?;
     rows.iter().map(job_row).collect::<Result<_, _>>().map_err(StoreError::during("list jobs"))
 }
 
 /// Begins with an open job and counts the attempt. False when it has ended meanwhile.
 pub(crate) async fn begin(tx: &mut Tx, id: i64) -> Result<bool, StoreError> {
-    let done = sqlx::query(BEGIN).bind(id).bind(now_ms()).execute(&mut tx.conn).await;
+    let done = db::query(BEGIN).bind(id).bind(now_ms()).execute(&mut tx.conn).await;
     Ok(done.map_err(StoreError::during("begin job"))?.rows_affected() == 1)
 }
 
 /// Puts a running job back into the queue without an attempt, because the server stops.
 pub(crate) async fn put_back(tx: &mut Tx, id: i64) -> Result<(), StoreError> {
-    let done = sqlx::query(PUT_BACK).bind(id).execute(&mut tx.conn).await;
+    let done = db::query(PUT_BACK).bind(id).execute(&mut tx.conn).await;
     done.map_err(StoreError::during("put job back")).map(drop)
 }
 
 /// Ends a job. False when it had ended already; then nothing changed.
 pub(crate) async fn end(tx: &mut Tx, id: i64, ended: &Ended) -> Result<bool, StoreError> {
-    let done = sqlx::query(END)
+    let done = db::query(END)
         .bind(id)
         .bind(ended.state)
         .bind(&ended.message)

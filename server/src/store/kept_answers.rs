@@ -6,9 +6,8 @@
 //! [`answered`] says how the answer is made of what the write returns, and `Store::write` takes
 //! both along to the writer.
 
-use super::{Store, StoreError, Tx, now_ms, statements::statements};
+use super::{Store, StoreError, Tx, db, now_ms, statements::statements};
 use serde::Serialize;
-use sqlx::Row;
 use std::{
     any::Any,
     collections::BTreeSet,
@@ -16,10 +15,12 @@ use std::{
 };
 
 statements! {
-    FIND = "SELECT request_sha256, status, body FROM kept_answers WHERE key = ?1 AND created_ms > ?2";
-    KEEP = "INSERT OR REPLACE INTO kept_answers (key, request_sha256, status, body, created_ms) \
-            VALUES (?1, ?2, ?3, ?4, ?5)";
-    FORGET = "DELETE FROM kept_answers WHERE created_ms <= ?1 OR id <= (SELECT max(id) FROM kept_answers) - ?2";
+    FIND = "SELECT request_sha256, status, body FROM kept_answers WHERE key = $1 AND created_ms > $2";
+    KEEP = "INSERT INTO kept_answers (key, request_sha256, status, body, created_ms) \
+            VALUES ($1, $2, $3, $4, $5)";
+    // One under the same key is older than a day. There is room for one more after it.
+    FORGET = "DELETE FROM kept_answers WHERE key = $1 OR created_ms <= $2 \
+              OR id <= (SELECT max(id) FROM kept_answers) + 1 - $3";
 }
 
 /// How long an answer is kept, ms.
@@ -128,7 +129,9 @@ impl IdempotencyRecord {
     ) -> Result<(), StoreError> {
         let Some(answer) = answer else { return Ok(()) };
         let (Answer { status, body }, now) = (answer?, now_ms());
-        let kept = sqlx::query(KEEP)
+        let oldest = db::query(FORGET).bind(&self.key.key).bind(now - KEPT_MS).bind(self.key.max as i64);
+        oldest.execute(&mut tx.conn).await.map_err(StoreError::during("forget answers"))?;
+        let kept = db::query(KEEP)
             .bind(&self.key.key)
             .bind(&self.key.request[..])
             .bind(status)
@@ -136,9 +139,7 @@ impl IdempotencyRecord {
             .bind(now)
             .execute(&mut tx.conn)
             .await;
-        kept.map_err(StoreError::during("keep an answer"))?;
-        let oldest = sqlx::query(FORGET).bind(now - KEPT_MS).bind(self.key.max as i64);
-        oldest.execute(&mut tx.conn).await.map_err(StoreError::during("forget answers")).map(drop)
+        kept.map_err(StoreError::during("keep an answer")).map(drop)
     }
 
     /// The answer to what a write has made; `None` if that is something else than was announced.
@@ -164,7 +165,7 @@ impl Store {
         let key =
             CreationKey { key: key.to_owned(), request, at_work: self.keys.clone(), max: self.kept_answers };
         let at = || StoreError::during("look for an answer");
-        let row = sqlx::query(FIND).bind(&key.key).bind(now_ms() - KEPT_MS).fetch_optional(&self.reads).await;
+        let row = db::query(FIND).bind(&key.key).bind(now_ms() - KEPT_MS).fetch_optional(&self.reads).await;
         let Some(row) = row.map_err(at())? else { return Ok(Creation::First(key)) };
         let (was, status): (Vec<u8>, i64) =
             (row.try_get("request_sha256").map_err(at())?, row.try_get("status").map_err(at())?);

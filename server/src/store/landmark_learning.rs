@@ -1,14 +1,14 @@
 //! Weights and gates of a landmark's own, as JSON of `LearningSettings`.
 
 use super::{
-    StoreError, Tx,
+    StoreError, Tx, db,
     landmarks::{self, LandmarkRow},
     maps,
     statements::statements,
 };
 
 statements! {
-    SET = "UPDATE landmarks SET learning = ?2 WHERE id = ?1";
+    SET = "UPDATE landmarks SET learning = $2 WHERE id = $1";
 }
 
 /// Sets weights and gates of a landmark's own, for the reason that the history names unless the
@@ -28,6 +28,6 @@ pub(crate) async fn set(
 }
 
 pub(super) async fn put(tx: &mut Tx, id: i64, learning: Option<&str>) -> Result<(), StoreError> {
-    let done = sqlx::query(SET).bind(id).bind(learning).execute(&mut tx.conn).await;
+    let done = db::query(SET).bind(id).bind(learning).execute(&mut tx.conn).await;
     done.map_err(StoreError::during("set weights and gates of a landmark")).map(drop)
 }

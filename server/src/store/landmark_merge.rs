@@ -2,7 +2,7 @@
 //! views of the other.
 
 use super::{
-    Store, StoreError, Tx,
+    Store, StoreError, Tx, db,
     landmark_placement::{self, PlacementOutcome},
     landmarks::{self, LandmarkGeometry, LandmarkRow},
     maps,
@@ -18,11 +18,11 @@ statements! {
     // Numbers of views are not used again: each gets a new one. The same quad of the same picture
     // counts once.
     COPY_VIEWS = "INSERT INTO views (landmark_id, image_sha256, image_kind, width_px, height_px, corners_px, created_ms, \
-                  icon_side, icon_scale, capture, icon) SELECT ?2, v.image_sha256, v.image_kind, v.width_px, v.height_px, \
+                  icon_side, icon_scale, capture, icon) SELECT $2, v.image_sha256, v.image_kind, v.width_px, v.height_px, \
                   v.corners_px, v.created_ms, v.icon_side, v.icon_scale, v.capture, v.icon FROM views v \
-                  WHERE v.landmark_id = ?1 AND NOT EXISTS (SELECT 1 FROM views k WHERE k.landmark_id = ?2 \
+                  WHERE v.landmark_id = $1 AND NOT EXISTS (SELECT 1 FROM views k WHERE k.landmark_id = $2 \
                   AND k.image_sha256 = v.image_sha256 AND k.corners_px = v.corners_px) ORDER BY v.id";
-    COUNT = "SELECT count(*) FROM views WHERE landmark_id = ?1";
+    COUNT = "SELECT count(*) FROM views WHERE landmark_id = $1";
 }
 
 /// Two landmarks of a map to be made one.
@@ -98,8 +98,8 @@ async fn write(tx: &mut Tx, asked: &Merge, prepared: Prepared) -> Result<Landmar
     }
     let at = || StoreError::during("move views");
     let (kept, gone) = (prepared.into.landmark(), prepared.from.landmark());
-    sqlx::query(COPY_VIEWS).bind(gone).bind(kept).execute(&mut tx.conn).await.map_err(at())?;
-    let count = sqlx::query_scalar(COUNT).bind(kept).fetch_one(&mut tx.conn).await.map_err(at())?;
+    db::query(COPY_VIEWS).bind(gone).bind(kept).execute(&mut tx.conn).await.map_err(at())?;
+    let count = db::query_scalar(COUNT).bind(kept).fetch_one(&mut tx.conn).await.map_err(at())?;
     within(count, *max, "views of a landmark")?;
     landmarks::update(tx, map, into, |_| prepared.geometry).await?;
     landmark_placement::put(tx, map, into, prepared.placement).await?;

@@ -4,6 +4,7 @@
 
 use super::{
     StoreError, Tx,
+    db::{self, Executor},
     landmarks::{self, LandmarkGeometry, StoredPlace},
     statements::statements,
     views,
@@ -21,7 +22,6 @@ use map::{
 use nalgebra::{Isometry3, Matrix2, Vector3};
 use protos::{Rejection, api::CaptureMetadata, convert::geometry, v1};
 use serde::{Deserialize, Serialize};
-use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
 use vision::{
     detect::BORDER_SIGMA_PX,
     frame::Intrinsics,
@@ -31,7 +31,7 @@ use vision::{
 };
 
 statements! {
-    CAPTURES = "SELECT corners_px, capture FROM views WHERE landmark_id = ?1 AND capture IS NOT NULL \
+    CAPTURES = "SELECT corners_px, capture FROM views WHERE landmark_id = $1 AND capture IS NOT NULL \
                 ORDER BY id DESC LIMIT 256";
 }
 
@@ -190,13 +190,10 @@ pub(super) enum PlacementOutcome {
 }
 
 /// The views of a landmark with a capture, newest first: at most [`MAX_CAPTURES`].
-pub(super) async fn captures(
-    db: impl SqliteExecutor<'_>,
-    landmark: i64,
-) -> Result<Vec<Captured>, StoreError> {
-    let rows = sqlx::query(CAPTURES).bind(landmark).fetch_all(db).await;
+pub(super) async fn captures(db: impl Executor<'_>, landmark: i64) -> Result<Vec<Captured>, StoreError> {
+    let rows = db::query(CAPTURES).bind(landmark).fetch_all(db).await;
     let rows = rows.map_err(StoreError::during("read captures"))?;
-    let captured = |row: &SqliteRow| {
+    let captured = |row: &db::Row| {
         Ok((views::corners_in(row)?, row.try_get("capture").map_err(StoreError::during("read captures"))?))
     };
     rows.iter().map(captured).collect()

@@ -1,13 +1,12 @@
 //! Landmarks of a map: name, size, place, and a summary of what was learnt.
 
-use super::{StoreError, Tx, jobs, kind::Kind, maps, now_ms, statements::statements, within};
+use super::{StoreError, Tx, db, jobs, kind::Kind, maps, now_ms, statements::statements, within};
 use map::{
     landmark_health::LandmarkHealth,
     place::{LandmarkPlace, PlaceSigmas},
 };
 use nalgebra::{Matrix6, Vector3};
 use protos::api::{Place, Size, SizeAndPlace};
-use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
 use vision::{model::LandmarkId, pose::LandmarkSize};
 
 /// The columns that [`geometry`] reads, with what names their table.
@@ -38,16 +37,16 @@ macro_rules! select {
 }
 
 statements! {
-    COUNT = "SELECT count(*) FROM landmarks WHERE map_id = ?1";
-    INSERT = "INSERT INTO landmarks (map_id, name, created_ms) VALUES (?1, ?2, ?3) RETURNING id";
-    GET = select!("JOIN maps ON maps.id = l.map_id WHERE maps.name = ?1 AND l.name = ?2");
-    PAGE = select!("WHERE l.map_id = ?1 AND l.name > ?2 ORDER BY l.name LIMIT ?3");
-    SET_HEALTH = "UPDATE landmarks SET health = ?2, finding = ?3 WHERE id = ?1";
-    UPDATE = "UPDATE landmarks SET width_m = ?2, height_m = ?3, x_m = ?4, y_m = ?5, z_m = ?6, theta_rad = ?7, \
-              roll_rad = ?8, tilt_rad = ?9, place_covariance = ?10, size_from_views = ?11 WHERE id = ?1";
-    DELETE = "DELETE FROM landmarks WHERE id = ?1";
-    RENAME = "UPDATE landmarks SET name = ?2 WHERE id = ?1";
-    NAME = "SELECT l.name FROM landmarks l JOIN maps m ON m.id = l.map_id WHERE m.name = ?1 AND l.id = ?2";
+    COUNT = "SELECT count(*) FROM landmarks WHERE map_id = $1";
+    INSERT = "INSERT INTO landmarks (map_id, name, created_ms) VALUES ($1, $2, $3) RETURNING id";
+    GET = select!("JOIN maps ON maps.id = l.map_id WHERE maps.name = $1 AND l.name = $2");
+    PAGE = select!("WHERE l.map_id = $1 AND l.name > $2 ORDER BY l.name LIMIT $3");
+    SET_HEALTH = "UPDATE landmarks SET health = $2, finding = $3 WHERE id = $1";
+    UPDATE = "UPDATE landmarks SET width_m = $2, height_m = $3, x_m = $4, y_m = $5, z_m = $6, theta_rad = $7, \
+              roll_rad = $8, tilt_rad = $9, place_covariance = $10, size_from_views = $11 WHERE id = $1";
+    DELETE = "DELETE FROM landmarks WHERE id = $1";
+    RENAME = "UPDATE landmarks SET name = $2 WHERE id = $1";
+    NAME = "SELECT l.name FROM landmarks l JOIN maps m ON m.id = l.map_id WHERE m.name = $1 AND l.id = $2";
 }
 
 /// The place of a landmark, as it is stored: centre (map frame, m) and direction of the outward
@@ -180,7 +179,7 @@ pub(super) fn health_of(word: &str) -> LandmarkHealth {
     }
 }
 
-pub(super) fn geometry(row: &SqliteRow) -> Result<LandmarkGeometry, sqlx::Error> {
+pub(super) fn geometry(row: &db::Row) -> Result<LandmarkGeometry, db::Error> {
     let real = |column: &str| row.try_get::<Option<f64>, _>(column);
     let size = real("width_m")?.zip(real("height_m")?);
     let (xy, zt) = (real("x_m")?.zip(real("y_m")?), real("z_m")?.zip(real("theta_rad")?));
@@ -217,7 +216,7 @@ pub(super) async fn set_geometry(
     geometry: &LandmarkGeometry,
 ) -> Result<(), StoreError> {
     let (size, place) = (geometry.size, geometry.place);
-    sqlx::query(UPDATE)
+    db::query(UPDATE)
         .bind(id)
         .bind(size.map(|s| s.width_m))
         .bind(size.map(|s| s.height_m))
@@ -235,7 +234,7 @@ pub(super) async fn set_geometry(
         .map_err(StoreError::during("measure landmark"))
 }
 
-fn landmark_row(row: &SqliteRow) -> Result<LandmarkRow, sqlx::Error> {
+fn landmark_row(row: &db::Row) -> Result<LandmarkRow, db::Error> {
     let active: Option<bool> = row.try_get("active")?;
     let model = match active {
         None => None,
@@ -273,14 +272,14 @@ pub(crate) async fn create(
     max: usize,
 ) -> Result<LandmarkRow, StoreError> {
     let map = maps::get(&mut tx.conn, map).await?;
-    let id = sqlx::query_scalar(INSERT)
+    let id = db::query_scalar(INSERT)
         .bind(map.id)
         .bind(name)
         .bind(now_ms())
         .fetch_one(&mut tx.conn)
         .await
         .map_err(StoreError::inserting("create landmark", Kind::Landmark, name))?;
-    let count = sqlx::query_scalar(COUNT)
+    let count = db::query_scalar(COUNT)
         .bind(map.id)
         .fetch_one(&mut tx.conn)
         .await
@@ -293,12 +292,8 @@ pub(crate) async fn create(
 
 /// One landmark by the names of its map and itself. A missing map is not told from a missing
 /// landmark.
-pub(crate) async fn get(
-    db: impl SqliteExecutor<'_>,
-    map: &str,
-    name: &str,
-) -> Result<LandmarkRow, StoreError> {
-    let row = sqlx::query(GET)
+pub(crate) async fn get(db: impl db::Executor<'_>, map: &str, name: &str) -> Result<LandmarkRow, StoreError> {
+    let row = db::query(GET)
         .bind(map)
         .bind(name)
         .fetch_optional(db)
@@ -310,12 +305,12 @@ pub(crate) async fn get(
 
 /// Landmarks of a map with names after `after`, in order.
 pub(crate) async fn page(
-    db: impl SqliteExecutor<'_>,
+    db: impl db::Executor<'_>,
     map_id: i64,
     after: &str,
     limit: usize,
 ) -> Result<Vec<LandmarkRow>, StoreError> {
-    let rows = sqlx::query(PAGE).bind(map_id).bind(after).bind(limit as i64).fetch_all(db).await;
+    let rows = db::query(PAGE).bind(map_id).bind(after).bind(limit as i64).fetch_all(db).await;
     let rows = rows.map_err(StoreError::during("list landmarks"))?;
     rows.iter().map(landmark_row).collect::<Result<_, _>>().map_err(StoreError::during("list landmarks"))
 }
@@ -331,7 +326,7 @@ pub(crate) async fn set_health(
 ) -> Result<LandmarkRow, StoreError> {
     let map = maps::get(&mut tx.conn, map).await?;
     let landmark = get(&mut tx.conn, &map.name, name).await?;
-    sqlx::query(SET_HEALTH)
+    db::query(SET_HEALTH)
         .bind(landmark.id)
         .bind(health_word(health))
         .bind(finding)
@@ -367,7 +362,7 @@ pub(crate) async fn update(
 pub(crate) async fn rename(tx: &mut Tx, map: &str, name: &str, new: &str) -> Result<String, StoreError> {
     let map = maps::get(&mut tx.conn, map).await?;
     let landmark = get(&mut tx.conn, &map.name, name).await?;
-    sqlx::query(RENAME)
+    db::query(RENAME)
         .bind(landmark.id)
         .bind(new)
         .execute(&mut tx.conn)
@@ -380,7 +375,7 @@ pub(crate) async fn rename(tx: &mut Tx, map: &str, name: &str, new: &str) -> Res
 
 /// The present name of a landmark by its number.
 pub(crate) async fn name_of(tx: &mut Tx, map: &str, id: LandmarkId) -> Result<String, StoreError> {
-    let name = sqlx::query_scalar(NAME).bind(map).bind(id.0 as i64).fetch_optional(&mut tx.conn).await;
+    let name = db::query_scalar(NAME).bind(map).bind(id.0 as i64).fetch_optional(&mut tx.conn).await;
     let name = name.map_err(StoreError::during("read the name of a landmark"))?;
     name.ok_or_else(|| StoreError::NotFound { what: Kind::Landmark, name: id.0.to_string() })
 }
@@ -389,7 +384,7 @@ pub(crate) async fn name_of(tx: &mut Tx, map: &str, id: LandmarkId) -> Result<St
 pub(crate) async fn delete(tx: &mut Tx, map: &str, name: &str) -> Result<(), StoreError> {
     let map = maps::get(&mut tx.conn, map).await?;
     let landmark = get(&mut tx.conn, &map.name, name).await?;
-    sqlx::query(DELETE)
+    db::query(DELETE)
         .bind(landmark.id)
         .execute(&mut tx.conn)
         .await

@@ -1,18 +1,22 @@
 //! Locations of maps: site, building and floor as words for people, and map links for poses.
 
-use super::{CommittedChange, StoreError, Tx, maps, statements::statements};
+use super::{
+    CommittedChange, StoreError, Tx,
+    db::{self, Executor},
+    maps,
+    statements::statements,
+};
 use map::{
     map_links::{self, MapLink, MapLinks},
     pose2::{Pose2, Pose2Covariance},
 };
 use nalgebra::Matrix3;
-use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
 use std::collections::BTreeMap;
 
 statements! {
     EACH = "SELECT m.name, m.site, m.building, m.floor, p.name AS parent, m.parent_from_map FROM maps m \
             LEFT JOIN maps p ON p.id = m.parent_id ORDER BY m.name";
-    SET = "UPDATE maps SET site = ?2, building = ?3, floor = ?4, parent_id = ?5, parent_from_map = ?6 WHERE id = ?1";
+    SET = "UPDATE maps SET site = $2, building = $3, floor = $4, parent_id = $5, parent_from_map = $6 WHERE id = $1";
 }
 
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -42,9 +46,9 @@ fn link_of(parent: String, bytes: &[u8]) -> Option<MapLink<String>> {
 }
 
 /// The location of every map, by name.
-pub(crate) async fn all(db: impl SqliteExecutor<'_>) -> Result<BTreeMap<String, MapLocation>, StoreError> {
-    let rows = sqlx::query(EACH).fetch_all(db).await.map_err(StoreError::during("list map locations"))?;
-    let one = |row: &SqliteRow| {
+pub(crate) async fn all(db: impl Executor<'_>) -> Result<BTreeMap<String, MapLocation>, StoreError> {
+    let rows = db::query(EACH).fetch_all(db).await.map_err(StoreError::during("list map locations"))?;
+    let one = |row: &db::Row| {
         let parent: Option<String> = row.try_get("parent")?;
         let bytes: Option<Vec<u8>> = row.try_get("parent_from_map")?;
         let location = MapLocation {
@@ -55,7 +59,7 @@ pub(crate) async fn all(db: impl SqliteExecutor<'_>) -> Result<BTreeMap<String, 
         };
         Ok((row.try_get("name")?, location))
     };
-    rows.iter().map(one).collect::<Result<_, sqlx::Error>>().map_err(StoreError::during("list map locations"))
+    rows.iter().map(one).collect::<Result<_, db::Error>>().map_err(StoreError::during("list map locations"))
 }
 
 /// The map links of all maps.
@@ -79,7 +83,7 @@ pub(crate) async fn set(
     };
     locations.insert(map.to_owned(), location.clone());
     map_links::check_all(&links(&locations))?;
-    sqlx::query(SET)
+    db::query(SET)
         .bind(row.id)
         .bind(&location.site)
         .bind(&location.building)

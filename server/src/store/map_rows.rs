@@ -2,24 +2,24 @@
 
 use super::{
     StoreError,
+    db::{self, Conn},
     landmarks::{self, geometry_columns},
     maps::MapPipeline,
     statements::statements,
     visibility_settings,
 };
 use map::{landmark_health::LandmarkHealth, visibility::VisibilitySettings};
-use sqlx::{Row, SqliteConnection};
 use std::collections::BTreeMap;
 use vision::model::LandmarkId;
 
 statements! {
-    MAP = "SELECT name, version, draft_of IS NOT NULL AS is_draft, preset, distance, learning, sight, walls_version FROM maps WHERE id = ?1";
-    NAME = "SELECT name FROM maps WHERE id = ?1";
+    MAP = "SELECT name, version, draft_of IS NOT NULL AS is_draft, preset, distance, learning, sight, walls_version FROM maps WHERE id = $1";
+    NAME = "SELECT name FROM maps WHERE id = $1";
     MAP_IDS = "SELECT id FROM maps ORDER BY id";
-    ROWS = "SELECT coalesce(group_concat(id || ' ' || revision || ' ' || changed_ms || ' ' || health, ';'), '') \
-            FROM landmarks WHERE map_id = ?1";
-    LANDMARKS = concat!("SELECT id, name, learning, ", geometry_columns!(""), " FROM landmarks WHERE map_id = ?1 \
-                AND id IN (SELECT value FROM json_each(?2))");
+    ROWS = "SELECT coalesce(string_agg(id || ' ' || revision || ' ' || changed_ms || ' ' || health, ';'), '') \
+            FROM landmarks WHERE map_id = $1";
+    LANDMARKS = concat!("SELECT id, name, learning, ", geometry_columns!(""), " FROM landmarks WHERE map_id = $1 \
+                AND id IN (SELECT value FROM json_each($2))");
 }
 
 /// A map without what belongs to it.
@@ -57,13 +57,13 @@ pub(crate) struct LandmarkHead {
 }
 
 /// Numbers of all maps.
-pub(crate) async fn ids(conn: &mut SqliteConnection) -> Result<Vec<i64>, StoreError> {
-    sqlx::query_scalar(MAP_IDS).fetch_all(conn).await.map_err(StoreError::during("list maps"))
+pub(crate) async fn ids(conn: &mut Conn) -> Result<Vec<i64>, StoreError> {
+    db::query_scalar(MAP_IDS).fetch_all(conn).await.map_err(StoreError::during("list maps"))
 }
 
 /// The name of a map.
-pub(crate) async fn name(conn: &mut SqliteConnection, id: i64) -> Result<String, StoreError> {
-    sqlx::query_scalar(NAME)
+pub(crate) async fn name(conn: &mut Conn, id: i64) -> Result<String, StoreError> {
+    db::query_scalar(NAME)
         .bind(id)
         .fetch_one(conn)
         .await
@@ -71,9 +71,9 @@ pub(crate) async fn name(conn: &mut SqliteConnection, id: i64) -> Result<String,
 }
 
 /// The map with this number; `None` if it is gone.
-pub(crate) async fn head(conn: &mut SqliteConnection, id: i64) -> Result<Option<MapHead>, StoreError> {
+pub(crate) async fn head(conn: &mut Conn, id: i64) -> Result<Option<MapHead>, StoreError> {
     let at = || StoreError::during("read map");
-    let row = sqlx::query(MAP).bind(id).fetch_optional(conn).await.map_err(at())?;
+    let row = db::query(MAP).bind(id).fetch_optional(conn).await.map_err(at())?;
     let Some(row) = row else { return Ok(None) };
     let name: String = row.try_get("name").map_err(at())?;
     Ok(Some(MapHead {
@@ -92,8 +92,8 @@ pub(crate) async fn head(conn: &mut SqliteConnection, id: i64) -> Result<Option<
 
 /// The state of each of its landmarks. One row for all of them: reading a row costs more than what
 /// is in it, and this is read after every change of the map.
-pub(crate) async fn row_states(conn: &mut SqliteConnection, id: i64) -> Result<Vec<RowState>, StoreError> {
-    let states: String = sqlx::query_scalar(ROWS)
+pub(crate) async fn row_states(conn: &mut Conn, id: i64) -> Result<Vec<RowState>, StoreError> {
+    let states: String = db::query_scalar(ROWS)
         .bind(id)
         .fetch_one(conn)
         .await
@@ -112,15 +112,15 @@ pub(crate) async fn row_states(conn: &mut SqliteConnection, id: i64) -> Result<V
 
 /// Those of its landmarks that are asked for.
 pub(crate) async fn landmarks(
-    conn: &mut SqliteConnection,
+    conn: &mut Conn,
     id: i64,
     wanted: &[LandmarkId],
 ) -> Result<BTreeMap<LandmarkId, LandmarkHead>, StoreError> {
     let at = || StoreError::during("read landmarks of a map");
     let wanted: Vec<_> = wanted.iter().map(|id| id.0.to_string()).collect();
     let wanted = format!("[{}]", wanted.join(","));
-    let rows = sqlx::query(LANDMARKS).bind(id).bind(wanted).fetch_all(conn).await.map_err(at())?;
-    let head = |row: &sqlx::sqlite::SqliteRow| {
+    let rows = db::query(LANDMARKS).bind(id).bind(wanted).fetch_all(conn).await.map_err(at())?;
+    let head = |row: &db::Row| {
         let id = LandmarkId(row.try_get::<i64, _>("id")? as u64);
         let (name, learning) = (row.try_get("name")?, row.try_get("learning")?);
         Ok((id, LandmarkHead { name, geometry: landmarks::geometry(row)?, learning }))

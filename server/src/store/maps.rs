@@ -1,34 +1,38 @@
 //! Maps: named, versioned, with the distance that decides.
 
-use super::{CommittedChange, StoreError, Tx, kind::Kind, now_ms, statements::statements, within};
-use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
+use super::{
+    CommittedChange, StoreError, Tx,
+    db::{self, Executor, Row},
+    kind::Kind,
+    now_ms,
+    statements::statements,
+    within,
+};
 use vision::{params::preset::Preset, recognise::DistanceKind};
 
 statements! {
     // Drafts are no further maps.
     COUNT = "SELECT count(*) FROM maps WHERE draft_of IS NULL";
-    INSERT = "INSERT INTO maps (name, preset, distance, created_ms) VALUES (?1, ?2, ?3, ?4) RETURNING id";
-    SET_LEARNING = "UPDATE maps SET learning = ?2 WHERE id = ?1";
-    SET_PIPELINE = "UPDATE maps SET preset = ?2, distance = ?3, version = version + 1 WHERE id = ?1";
+    INSERT = "INSERT INTO maps (name, preset, distance, created_ms) VALUES ($1, $2, $3, $4) RETURNING id";
+    SET_LEARNING = "UPDATE maps SET learning = $2 WHERE id = $1";
+    SET_PIPELINE = "UPDATE maps SET preset = $2, distance = $3, version = version + 1 WHERE id = $1";
     GET = "SELECT id, name, version, id || '.' || revision AS revision, changed_ms, preset, distance, learning, \
            (SELECT o.name FROM maps o WHERE o.id = maps.draft_of) AS draft_of, (SELECT count(*) FROM landmarks WHERE map_id = maps.id) AS landmarks, \
            EXISTS (SELECT 1 FROM underlays WHERE map_id = maps.id) AS has_underlay \
-           FROM maps WHERE name = ?1";
+           FROM maps WHERE name = $1";
     PAGE = "SELECT id, name, version, id || '.' || revision AS revision, changed_ms, preset, distance, learning, \
            (SELECT o.name FROM maps o WHERE o.id = maps.draft_of) AS draft_of, (SELECT count(*) FROM landmarks WHERE map_id = maps.id) AS landmarks, \
            EXISTS (SELECT 1 FROM underlays WHERE map_id = maps.id) AS has_underlay \
-            FROM maps WHERE name > ?1 ORDER BY name LIMIT ?2";
-    BUMP = "UPDATE maps SET version = version + 1 WHERE id = ?1";
-    DELETE = "DELETE FROM maps WHERE id = ?1";
-    RENAME = "UPDATE maps SET name = ?2, version = version + 1 WHERE id = ?1";
-    RENAME_IN_JOBS = "UPDATE jobs SET map = ?2 WHERE map = ?1";
-    OPEN_JOB = "SELECT id FROM jobs WHERE map = ?1 AND state IN ('queued', 'running') LIMIT 1";
-    OPEN_GATHERING = "SELECT id FROM gatherings WHERE map_id = ?1 AND open = 1 LIMIT 1";
-    LIES_IN = "SELECT name FROM maps WHERE parent_id = ?1 ORDER BY name LIMIT 1";
-    DRAFT_OF = "SELECT name FROM maps WHERE draft_of = ?1 ORDER BY name LIMIT 1";
-    ROBOT_ON = "SELECT name FROM robots WHERE map_id = ?1 ORDER BY name LIMIT 1";
-    FORGET_IN_TOKENS = "UPDATE tokens SET maps = (SELECT json_group_array(value) FROM json_each(tokens.maps) \
-                        WHERE value <> ?1) WHERE maps IS NOT NULL";
+            FROM maps WHERE name > $1 ORDER BY name LIMIT $2";
+    BUMP = "UPDATE maps SET version = version + 1 WHERE id = $1";
+    DELETE = "DELETE FROM maps WHERE id = $1";
+    RENAME = "UPDATE maps SET name = $2, version = version + 1 WHERE id = $1";
+    RENAME_IN_JOBS = "UPDATE jobs SET map = $2 WHERE map = $1";
+    OPEN_JOB = "SELECT id FROM jobs WHERE map = $1 AND state IN ('queued', 'running') LIMIT 1";
+    OPEN_GATHERING = "SELECT id FROM gatherings WHERE map_id = $1 AND open = 1 LIMIT 1";
+    LIES_IN = "SELECT name FROM maps WHERE parent_id = $1 ORDER BY name LIMIT 1";
+    DRAFT_OF = "SELECT name FROM maps WHERE draft_of = $1 ORDER BY name LIMIT 1";
+    ROBOT_ON = "SELECT name FROM robots WHERE map_id = $1 ORDER BY name LIMIT 1";
 }
 
 /// A map without its content.
@@ -69,7 +73,7 @@ impl From<DistanceKind> for MapPipeline {
 
 impl MapPipeline {
     /// From columns `preset` and `distance`; the schema admits no other words.
-    pub(super) fn read(row: &SqliteRow) -> Result<Self, sqlx::Error> {
+    pub(super) fn read(row: &Row) -> Result<Self, db::Error> {
         let preset: Option<&str> = row.try_get("preset")?;
         let distance: &str = row.try_get("distance")?;
         Ok(Self { preset: preset.and_then(|word| word.parse().ok()), distance: distance_of(distance) })
@@ -80,7 +84,7 @@ impl MapPipeline {
     }
 }
 
-fn map_row(row: &SqliteRow) -> Result<MapRow, sqlx::Error> {
+fn map_row(row: &Row) -> Result<MapRow, db::Error> {
     Ok(MapRow {
         id: row.try_get("id")?,
         name: row.try_get("name")?,
@@ -120,7 +124,7 @@ pub(crate) async fn create(
     max: usize,
 ) -> Result<MapRow, StoreError> {
     let (preset, distance) = pipeline.into().words();
-    let id = sqlx::query_scalar(INSERT)
+    let id = db::query_scalar(INSERT)
         .bind(name)
         .bind(preset)
         .bind(distance)
@@ -129,15 +133,15 @@ pub(crate) async fn create(
         .await
         .map_err(StoreError::inserting("create map", Kind::Map, name))?;
     let count =
-        sqlx::query_scalar(COUNT).fetch_one(&mut tx.conn).await.map_err(StoreError::during("count maps"))?;
+        db::query_scalar(COUNT).fetch_one(&mut tx.conn).await.map_err(StoreError::during("count maps"))?;
     within(count, max, "maps")?;
     tx.changed(CommittedChange::Map(id));
     get(&mut tx.conn, name).await
 }
 
 /// One map by name.
-pub(crate) async fn get(db: impl SqliteExecutor<'_>, name: &str) -> Result<MapRow, StoreError> {
-    let row = sqlx::query(GET).bind(name).fetch_optional(db).await.map_err(StoreError::during("read map"))?;
+pub(crate) async fn get(db: impl Executor<'_>, name: &str) -> Result<MapRow, StoreError> {
+    let row = db::query(GET).bind(name).fetch_optional(db).await.map_err(StoreError::during("read map"))?;
     let row = row.ok_or_else(|| StoreError::NotFound { what: Kind::Map, name: name.to_owned() })?;
     map_row(&row).map_err(StoreError::during("read map"))
 }
@@ -149,11 +153,11 @@ pub(crate) async fn of(tx: &mut Tx, name: &str) -> Result<MapRow, StoreError> {
 
 /// Maps with names after `after`, in order.
 pub(crate) async fn page(
-    db: impl SqliteExecutor<'_>,
+    db: impl Executor<'_>,
     after: &str,
     limit: usize,
 ) -> Result<Vec<MapRow>, StoreError> {
-    let rows = sqlx::query(PAGE).bind(after).bind(limit as i64).fetch_all(db).await;
+    let rows = db::query(PAGE).bind(after).bind(limit as i64).fetch_all(db).await;
     let rows = rows.map_err(StoreError::during("list maps"))?;
     rows.iter().map(map_row).collect::<Result<_, _>>().map_err(StoreError::during("list maps"))
 }
@@ -167,11 +171,7 @@ pub(crate) async fn recheck(tx: &mut Tx, map: MapRow) -> Result<MapRow, StoreErr
 
 /// The map's content has changed: a new version, published after the commit.
 pub(crate) async fn bump(tx: &mut Tx, id: i64) -> Result<(), StoreError> {
-    sqlx::query(BUMP)
-        .bind(id)
-        .execute(&mut tx.conn)
-        .await
-        .map_err(StoreError::during("count map version"))?;
+    db::query(BUMP).bind(id).execute(&mut tx.conn).await.map_err(StoreError::during("count map version"))?;
     tx.changed(CommittedChange::Map(id));
     Ok(())
 }
@@ -189,7 +189,7 @@ pub(crate) async fn set_pipeline(
         return Ok(());
     }
     let (preset, distance) = pipeline.words();
-    sqlx::query(SET_PIPELINE)
+    db::query(SET_PIPELINE)
         .bind(map.id)
         .bind(preset)
         .bind(distance)
@@ -210,7 +210,7 @@ pub(crate) async fn set_learning(
 ) -> Result<(), StoreError> {
     tx.author.why = tx.author.why.take().or(reason);
     let map = get(&mut tx.conn, name).await?;
-    let done = sqlx::query(SET_LEARNING).bind(map.id).bind(learning).execute(&mut tx.conn).await;
+    let done = db::query(SET_LEARNING).bind(map.id).bind(learning).execute(&mut tx.conn).await;
     done.map_err(StoreError::during("set weights and gates of a map"))?;
     bump(tx, map.id).await
 }
@@ -223,12 +223,12 @@ pub(crate) async fn rename(tx: &mut Tx, name: &str, new: &str) -> Result<(), Sto
         return Ok(());
     }
     no_robot_on(tx, &map).await?;
-    let job: Option<i64> = sqlx::query_scalar(OPEN_JOB)
+    let job: Option<i64> = db::query_scalar(OPEN_JOB)
         .bind(name)
         .fetch_optional(&mut tx.conn)
         .await
         .map_err(StoreError::during("look for jobs"))?;
-    let gathering: Option<i64> = sqlx::query_scalar(OPEN_GATHERING)
+    let gathering: Option<i64> = db::query_scalar(OPEN_GATHERING)
         .bind(map.id)
         .fetch_optional(&mut tx.conn)
         .await
@@ -238,9 +238,9 @@ pub(crate) async fn rename(tx: &mut Tx, name: &str, new: &str) -> Result<(), Sto
             return Err(StoreError::InUse(format!("{what} {id} works on map `{name}`")));
         }
     }
-    let renamed = sqlx::query(RENAME).bind(map.id).bind(new).execute(&mut tx.conn).await;
+    let renamed = db::query(RENAME).bind(map.id).bind(new).execute(&mut tx.conn).await;
     renamed.map_err(StoreError::inserting("rename map", Kind::Map, new))?;
-    let in_jobs = sqlx::query(RENAME_IN_JOBS).bind(name).bind(new).execute(&mut tx.conn).await;
+    let in_jobs = db::query(RENAME_IN_JOBS).bind(name).bind(new).execute(&mut tx.conn).await;
     in_jobs.map_err(StoreError::during("rename map in jobs"))?;
     tx.changed(CommittedChange::MapRemoved(map.name));
     tx.changed(CommittedChange::Map(map.id));
@@ -250,7 +250,7 @@ pub(crate) async fn rename(tx: &mut Tx, name: &str, new: &str) -> Result<(), Sto
 }
 
 async fn no_robot_on(tx: &mut Tx, map: &MapRow) -> Result<(), StoreError> {
-    let robot: Option<String> = sqlx::query_scalar(ROBOT_ON)
+    let robot: Option<String> = db::query_scalar(ROBOT_ON)
         .bind(map.id)
         .fetch_optional(&mut tx.conn)
         .await
@@ -266,7 +266,7 @@ async fn no_robot_on(tx: &mut Tx, map: &MapRow) -> Result<(), StoreError> {
 pub(crate) async fn delete(tx: &mut Tx, name: &str) -> Result<(), StoreError> {
     let map = get(&mut tx.conn, name).await?;
     no_robot_on(tx, &map).await?;
-    let inner: Option<String> = sqlx::query_scalar(LIES_IN)
+    let inner: Option<String> = db::query_scalar(LIES_IN)
         .bind(map.id)
         .fetch_optional(&mut tx.conn)
         .await
@@ -274,7 +274,7 @@ pub(crate) async fn delete(tx: &mut Tx, name: &str) -> Result<(), StoreError> {
     if let Some(inner) = inner {
         return Err(StoreError::InUse(format!("map `{inner}` lies in map `{name}`")));
     }
-    let draft: Option<String> = sqlx::query_scalar(DRAFT_OF)
+    let draft: Option<String> = db::query_scalar(DRAFT_OF)
         .bind(map.id)
         .fetch_optional(&mut tx.conn)
         .await
@@ -283,10 +283,8 @@ pub(crate) async fn delete(tx: &mut Tx, name: &str) -> Result<(), StoreError> {
         let why = format!("map `{name}` has the draft `{draft}`: publish or discard it first");
         return Err(StoreError::InUse(why));
     }
-    sqlx::query(DELETE).bind(map.id).execute(&mut tx.conn).await.map_err(StoreError::during("delete map"))?;
-    // A token is not for a later map of the same name; one that was for this map alone is for none.
-    let forgotten = sqlx::query(FORGET_IN_TOKENS).bind(map.id).execute(&mut tx.conn).await;
-    forgotten.map_err(StoreError::during("forget map in tokens"))?;
+    db::query(DELETE).bind(map.id).execute(&mut tx.conn).await.map_err(StoreError::during("delete map"))?;
+    // A token that was for this map alone is for none.
     tx.changed(CommittedChange::Tokens);
     tx.changed(CommittedChange::MapRemoved(map.name));
     tx.changed(CommittedChange::Links);

@@ -5,12 +5,10 @@
 //! schema. One listener learns of every commit ([`on_commit`]); the store knows it by its trait
 //! alone.
 
-pub(crate) mod disk_guard;
+pub(crate) mod db;
 mod error;
 pub(crate) mod kind;
-pub(crate) mod migrations;
-pub(crate) mod open;
-mod checkpoint;
+pub(crate) mod sqlite;
 mod derived_schema;
 mod writer;
 mod statements;
@@ -20,10 +18,7 @@ pub(crate) mod maps;
 pub(crate) mod map_locations;
 pub(crate) mod landmarks;
 pub(crate) mod underlays;
-pub(crate) mod copies;
-pub(crate) mod integrity;
 pub(crate) mod schema;
-pub(crate) mod restored;
 pub(crate) mod page_sessions;
 pub(crate) mod pictures;
 pub(crate) mod views;
@@ -55,16 +50,20 @@ pub(crate) mod drafts;
 
 pub(crate) use error::StoreError;
 pub(crate) use on_commit::{CommittedChange, OnCommit};
-pub(crate) use open::OpenError;
+pub(crate) use sqlite::{
+    copies, disk_guard, integrity,
+    open::{self, OpenError},
+    restored,
+};
 pub(crate) use writer::{PART as WRITER, Tx};
 
 use crate::config::Config;
+use db::{Conn, Pool};
 use disk_guard::DiskGuard;
 use engine::{heartbeats::Heartbeat, vitals::Vitals};
 use futures::future::BoxFuture;
 use protos::api::AuditHead;
 use sha2::{Digest as _, Sha256};
-use sqlx::{SqliteConnection, SqlitePool};
 use std::{
     fmt::Write as _,
     sync::{
@@ -79,7 +78,7 @@ use tokio::sync::{Mutex, MutexGuard, Notify, mpsc, oneshot};
 #[derive(Debug, Clone)]
 pub(crate) struct Store {
     commands: mpsc::Sender<writer::Command>,
-    reads: SqlitePool,
+    reads: Pool,
     vitals: Arc<Vitals>,
     jobs: Arc<Notify>,
     commits: Arc<AtomicU64>,
@@ -111,7 +110,7 @@ pub(crate) struct WriteQueue {
 pub(crate) struct WriterTask {
     task: tokio::task::JoinHandle<()>,
     close: oneshot::Sender<()>,
-    reads: SqlitePool,
+    reads: Pool,
     /// Held for as long as the writer runs: a second server on the same directory would be a second
     /// writer.
     _lock: std::fs::File,
@@ -159,7 +158,7 @@ impl Store {
         let commits = Arc::<AtomicU64>::default();
         let parts = (on_commit, vitals.clone(), jobs.clone(), commits.clone());
         let heart = vitals.hearts().begin(WRITER);
-        let with = (heart.clone(), config.log_pages().unwrap_or(checkpoint::LOG_PAGES));
+        let with = (heart.clone(), config.log_pages().unwrap_or(sqlite::checkpoint::LOG_PAGES));
         let writer = writer::Writer::new(conn, received, history, parts, with);
         let (close, closed) = oneshot::channel();
         let task = tokio::spawn(writer.run(closed, vitals.begin(WRITER)));
@@ -245,7 +244,7 @@ impl Store {
     }
 
     /// The read-only pool.
-    pub(crate) fn reads(&self) -> &SqlitePool {
+    pub(crate) fn reads(&self) -> &Pool {
         &self.reads
     }
 
@@ -268,7 +267,7 @@ impl Store {
 
 /// Writes the newest place of the audit log to the server's own log: a note outside of the
 /// database.
-async fn note_head(conn: &mut SqliteConnection, at: &str) -> Result<(), StoreError> {
+async fn note_head(conn: &mut Conn, at: &str) -> Result<(), StoreError> {
     let head = AuditHead::from(audit::head(conn).await?);
     tracing::info!(seq = head.seq, sha256 = head.sha256, at, "audit_head");
     Ok(())

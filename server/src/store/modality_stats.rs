@@ -1,22 +1,28 @@
 //! Modality statistics of a map's reference runs, the areas that people named, and the fusion mode.
 
-use super::{StoreError, Tx, kind::Kind, maps, now_ms, statements::statements, text_revision, within};
+use super::{
+    StoreError, Tx,
+    db::{self, Executor, Row},
+    kind::Kind,
+    maps, now_ms,
+    statements::statements,
+    text_revision, within,
+};
 use map::modality_stats::{FusionMode, MAX_AREAS, NamedArea, PoseCell, StatsByModality};
 use sha2::{Digest as _, Sha256};
-use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
 use std::collections::BTreeMap;
 
 /// Reference runs of a map.
 pub(crate) const MAX_RUNS: usize = 200;
 
 statements! {
-    SETTINGS = "SELECT fusion, areas FROM maps WHERE id = ?1";
-    SET = "UPDATE maps SET fusion = ?2, areas = ?3 WHERE id = ?1";
-    RUNS = "SELECT id, robot, created_ms, way_m, cells FROM runs WHERE map_id = ?1 ORDER BY id";
-    COUNT = "SELECT count(*) FROM runs WHERE map_id = ?1";
-    NUMBERS = "SELECT id FROM runs WHERE map_id = ?1 ORDER BY id";
-    INSERT = "INSERT INTO runs (map_id, robot, created_ms, way_m, cells) VALUES (?1, ?2, ?3, ?4, ?5) RETURNING id";
-    DELETE = "DELETE FROM runs WHERE map_id = ?1 AND id = ?2";
+    SETTINGS = "SELECT fusion, areas FROM maps WHERE id = $1";
+    SET = "UPDATE maps SET fusion = $2, areas = $3 WHERE id = $1";
+    RUNS = "SELECT id, robot, created_ms, way_m, cells FROM runs WHERE map_id = $1 ORDER BY id";
+    COUNT = "SELECT count(*) FROM runs WHERE map_id = $1";
+    NUMBERS = "SELECT id FROM runs WHERE map_id = $1 ORDER BY id";
+    INSERT = "INSERT INTO runs (map_id, robot, created_ms, way_m, cells) VALUES ($1, $2, $3, $4, $5) RETURNING id";
+    DELETE = "DELETE FROM runs WHERE map_id = $1 AND id = $2";
 }
 
 /// A reference run with its modality statistics by pose cell.
@@ -69,7 +75,7 @@ fn cells_of(text: &str) -> BTreeMap<PoseCell, StatsByModality> {
         .collect()
 }
 
-fn run_row(row: &SqliteRow) -> Result<ReferenceRunRow, sqlx::Error> {
+fn run_row(row: &Row) -> Result<ReferenceRunRow, db::Error> {
     Ok(ReferenceRunRow {
         id: row.try_get("id")?,
         robot: row.try_get("robot")?,
@@ -80,12 +86,9 @@ fn run_row(row: &SqliteRow) -> Result<ReferenceRunRow, sqlx::Error> {
 }
 
 /// The settings of a map.
-pub(crate) async fn settings(
-    db: impl SqliteExecutor<'_>,
-    map_id: i64,
-) -> Result<ModalitySettings, StoreError> {
+pub(crate) async fn settings(db: impl Executor<'_>, map_id: i64) -> Result<ModalitySettings, StoreError> {
     let at = || StoreError::during("read areas");
-    let row = sqlx::query(SETTINGS).bind(map_id).fetch_one(db).await.map_err(at())?;
+    let row = db::query(SETTINGS).bind(map_id).fetch_one(db).await.map_err(at())?;
     let mode = mode_of(&row.try_get::<String, _>("fusion").map_err(at())?);
     let named: String = row.try_get("areas").map_err(at())?;
     let named: Vec<NamedArea> = serde_json::from_str(&named).unwrap_or_default();
@@ -106,7 +109,7 @@ pub(crate) async fn set(
     let map = maps::get(&mut tx.conn, map).await?;
     let new = change(settings(&mut tx.conn, map.id).await?);
     within(new.named.len() as i64, MAX_AREAS, "areas")?;
-    sqlx::query(SET)
+    db::query(SET)
         .bind(map.id)
         .bind(mode_word(new.mode))
         .bind(json("areas", &new.named)?)
@@ -117,11 +120,8 @@ pub(crate) async fn set(
 }
 
 /// The runs of a map, oldest first.
-pub(crate) async fn runs(
-    db: impl SqliteExecutor<'_>,
-    map_id: i64,
-) -> Result<Vec<ReferenceRunRow>, StoreError> {
-    let rows = sqlx::query(RUNS).bind(map_id).fetch_all(db).await.map_err(StoreError::during("read runs"))?;
+pub(crate) async fn runs(db: impl Executor<'_>, map_id: i64) -> Result<Vec<ReferenceRunRow>, StoreError> {
+    let rows = db::query(RUNS).bind(map_id).fetch_all(db).await.map_err(StoreError::during("read runs"))?;
     rows.iter().map(run_row).collect::<Result<_, _>>().map_err(StoreError::during("read runs"))
 }
 
@@ -135,7 +135,7 @@ pub(crate) async fn add(
 ) -> Result<ReferenceRunRow, StoreError> {
     let map = maps::get(&mut tx.conn, map).await?;
     let (text, created_ms) = (json("a run", &cells.iter().collect::<Vec<_>>())?, now_ms());
-    let id = sqlx::query_scalar(INSERT)
+    let id = db::query_scalar(INSERT)
         .bind(map.id)
         .bind(robot)
         .bind(created_ms)
@@ -144,7 +144,7 @@ pub(crate) async fn add(
         .fetch_one(&mut tx.conn)
         .await
         .map_err(StoreError::during("store run"))?;
-    let count = sqlx::query_scalar(COUNT).bind(map.id).fetch_one(&mut tx.conn).await;
+    let count = db::query_scalar(COUNT).bind(map.id).fetch_one(&mut tx.conn).await;
     within(count.map_err(StoreError::during("count runs"))?, MAX_RUNS, "runs")?;
     maps::bump(tx, map.id).await?;
     // Through the text: its numbers have fewer digits.
@@ -154,7 +154,7 @@ pub(crate) async fn add(
 /// Deletes a reference run with its statistics.
 pub(crate) async fn delete(tx: &mut Tx, map: &str, id: i64) -> Result<(), StoreError> {
     let map = maps::get(&mut tx.conn, map).await?;
-    let deleted = sqlx::query(DELETE).bind(map.id).bind(id).execute(&mut tx.conn).await;
+    let deleted = db::query(DELETE).bind(map.id).bind(id).execute(&mut tx.conn).await;
     if deleted.map_err(StoreError::during("delete run"))?.rows_affected() == 0 {
         return Err(StoreError::NotFound { what: Kind::ReferenceRun, name: id.to_string() });
     }
@@ -163,12 +163,9 @@ pub(crate) async fn delete(tx: &mut Tx, map: &str, id: i64) -> Result<(), StoreE
 
 /// Count of a map's reference runs, and the beginning of the digest of their numbers: runs never
 /// change and their numbers are never used for others.
-pub(crate) async fn run_numbers(
-    conn: &mut sqlx::SqliteConnection,
-    map_id: i64,
-) -> Result<(i64, i64), StoreError> {
+pub(crate) async fn run_numbers(conn: &mut db::Conn, map_id: i64) -> Result<(i64, i64), StoreError> {
     let at = || StoreError::during("count runs");
-    let numbers: Vec<i64> = sqlx::query_scalar(NUMBERS).bind(map_id).fetch_all(conn).await.map_err(at())?;
+    let numbers: Vec<i64> = db::query_scalar(NUMBERS).bind(map_id).fetch_all(conn).await.map_err(at())?;
     let mut digest = Sha256::new();
     for number in &numbers {
         digest.update(number.to_le_bytes());

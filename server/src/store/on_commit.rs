@@ -1,8 +1,7 @@
 //! How the rest of the program learns what was committed.
 
-use super::error::StoreError;
+use super::{db::Conn, error::StoreError};
 use futures::future::BoxFuture;
-use sqlx::SqliteConnection;
 
 /// What a committed write makes visible.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -32,12 +31,12 @@ pub(crate) enum CommittedChange {
 /// other error stops the store.
 pub(crate) trait OnCommit: Send + Sync + std::fmt::Debug {
     /// The store is open: everything in it is new.
-    fn opened<'c>(&'c self, conn: &'c mut SqliteConnection) -> BoxFuture<'c, Result<(), StoreError>>;
+    fn opened<'c>(&'c self, conn: &'c mut Conn) -> BoxFuture<'c, Result<(), StoreError>>;
 
     /// A write was committed.
     fn committed<'c>(
         &'c self,
-        conn: &'c mut SqliteConnection,
+        conn: &'c mut Conn,
         change: CommittedChange,
     ) -> BoxFuture<'c, Result<(), StoreError>>;
 }

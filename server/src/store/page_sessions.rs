@@ -3,16 +3,21 @@
 //!
 //! [`Sessions`]: crate::identity::Sessions
 
-use super::{StoreError, Tx, statements::statements};
+use super::{
+    StoreError, Tx,
+    db::{self, Executor},
+    statements::statements,
+};
 use crate::identity::{MAX_SESSIONS, TokenId};
-use sqlx::{Row, SqliteExecutor};
 
 statements! {
-    INSERT = "INSERT OR REPLACE INTO page_sessions (sha256, token_id, ends_ms) VALUES (?1, ?2, ?3)";
-    FORGET = "DELETE FROM page_sessions WHERE ends_ms <= ?1 OR sha256 IN \
-              (SELECT sha256 FROM page_sessions ORDER BY ends_ms DESC, sha256 LIMIT -1 OFFSET ?2)";
-    DELETE = "DELETE FROM page_sessions WHERE sha256 = ?1";
-    OPEN = "SELECT sha256, token_id, ends_ms FROM page_sessions WHERE ends_ms > ?1 ORDER BY ends_ms, sha256";
+    INSERT = "INSERT INTO page_sessions (sha256, token_id, ends_ms) VALUES ($1, $2, $3) \
+              ON CONFLICT (sha256) DO UPDATE SET token_id = excluded.token_id, ends_ms = excluded.ends_ms";
+    FORGET = "DELETE FROM page_sessions WHERE ends_ms <= $1 OR sha256 IN \
+              (SELECT sha256 FROM (SELECT sha256, row_number() OVER (ORDER BY ends_ms DESC, sha256) AS n \
+              FROM page_sessions) AS s WHERE n > $2)";
+    DELETE = "DELETE FROM page_sessions WHERE sha256 = $1";
+    OPEN = "SELECT sha256, token_id, ends_ms FROM page_sessions WHERE ends_ms > $1 ORDER BY ends_ms, sha256";
 }
 
 /// A session as it is stored.
@@ -31,26 +36,23 @@ pub(crate) async fn add(tx: &mut Tx, session: PageSessionRow, now_ms: i64) -> Re
         TokenId::Local => None,
         TokenId::Stored(id) => Some(id),
     };
-    let insert = sqlx::query(INSERT).bind(session.sha256.as_slice()).bind(token).bind(session.ends_ms);
+    let insert = db::query(INSERT).bind(session.sha256.as_slice()).bind(token).bind(session.ends_ms);
     insert.execute(&mut tx.conn).await.map_err(StoreError::during("store a session"))?;
-    let forget = sqlx::query(FORGET).bind(now_ms).bind(MAX_SESSIONS as i64);
+    let forget = db::query(FORGET).bind(now_ms).bind(MAX_SESSIONS as i64);
     forget.execute(&mut tx.conn).await.map_err(StoreError::during("forget ended sessions"))?;
     Ok(())
 }
 
 /// Forgets a session. One that is not there is none.
 pub(crate) async fn remove(tx: &mut Tx, sha256: [u8; 32]) -> Result<(), StoreError> {
-    let delete = sqlx::query(DELETE).bind(sha256.as_slice()).execute(&mut tx.conn).await;
+    let delete = db::query(DELETE).bind(sha256.as_slice()).execute(&mut tx.conn).await;
     delete.map_err(StoreError::during("end a session"))?;
     Ok(())
 }
 
 /// The sessions that have not ended, the first to end first.
-pub(crate) async fn open(
-    db: impl SqliteExecutor<'_>,
-    now_ms: i64,
-) -> Result<Vec<PageSessionRow>, StoreError> {
-    let rows = sqlx::query(OPEN).bind(now_ms).fetch_all(db).await;
+pub(crate) async fn open(db: impl Executor<'_>, now_ms: i64) -> Result<Vec<PageSessionRow>, StoreError> {
+    let rows = db::query(OPEN).bind(now_ms).fetch_all(db).await;
     let rows = rows.map_err(StoreError::during("read sessions"))?;
     rows.iter()
         .map(|row| {

@@ -3,21 +3,26 @@
 //! [`StoreError::PictureDamaged`]: the damage is noted, `/readyz` names what shows the picture, and
 //! everything else goes on. The same picture, stored again, mends it.
 
-use super::{Store, StoreError, Tx, error::is_damage, kind::Kind, now_ms, statements::statements};
+use super::{
+    Store, StoreError, Tx,
+    db::{self, Executor},
+    kind::Kind,
+    now_ms,
+    statements::statements,
+};
 use sha2::{Digest as _, Sha256};
-use sqlx::{Row, SqliteExecutor};
 use std::time::Duration;
 use tokio::sync::watch;
 
 statements! {
-    PUT = "INSERT INTO pictures (sha256, bytes) VALUES (?1, ?2) ON CONFLICT DO NOTHING";
-    MEND = "UPDATE pictures SET bytes = ?2 WHERE sha256 = ?1";
-    MENDED = "DELETE FROM damaged_pictures WHERE sha256 = ?1";
-    IS_DAMAGED = "SELECT count(*) FROM damaged_pictures WHERE sha256 = ?1";
-    READ = "SELECT bytes FROM pictures WHERE sha256 = ?1";
-    NEXT = "SELECT sha256 FROM pictures WHERE sha256 > ?1 ORDER BY sha256 LIMIT 1";
-    NOTE = "INSERT INTO damaged_pictures (sha256, reason, found_ms) SELECT ?1, ?2, ?3 \
-            WHERE EXISTS (SELECT 1 FROM pictures WHERE sha256 = ?1) ON CONFLICT DO NOTHING";
+    PUT = "INSERT INTO pictures (sha256, bytes) VALUES ($1, $2) ON CONFLICT DO NOTHING";
+    MEND = "UPDATE pictures SET bytes = $2 WHERE sha256 = $1";
+    MENDED = "DELETE FROM damaged_pictures WHERE sha256 = $1";
+    IS_DAMAGED = "SELECT count(*) FROM damaged_pictures WHERE sha256 = $1";
+    READ = "SELECT bytes FROM pictures WHERE sha256 = $1";
+    NEXT = "SELECT sha256 FROM pictures WHERE sha256 > $1 ORDER BY sha256 LIMIT 1";
+    NOTE = "INSERT INTO damaged_pictures (sha256, reason, found_ms) SELECT $1, $2, $3 \
+            WHERE EXISTS (SELECT 1 FROM pictures WHERE sha256 = $1) ON CONFLICT DO NOTHING";
     DAMAGED = "WITH shown (map, what) AS (\
                SELECT m.name, 'view ' || v.id || ' of landmark ' || l.name || ', map ' || m.name FROM damaged_pictures d \
                JOIN views v ON v.image_sha256 = d.sha256 JOIN landmarks l ON l.id = v.landmark_id \
@@ -28,7 +33,7 @@ statements! {
                UNION ALL SELECT m.name, 'underlay of map ' || m.name FROM damaged_pictures d \
                JOIN underlays u ON u.image_sha256 = d.sha256 JOIN maps m ON m.id = u.map_id) \
                SELECT (SELECT count(*) FROM shown), (SELECT json_group_array(what) FROM (SELECT what FROM shown \
-               WHERE ?2 IS NULL OR map IN (SELECT value FROM json_each(?2)) ORDER BY what LIMIT ?1))";
+               WHERE $2 IS NULL OR map IN (SELECT value FROM json_each($2)) ORDER BY what LIMIT $1))";
 }
 
 /// SHA-256 of a picture.
@@ -54,7 +59,7 @@ pub(crate) fn hex(bytes: &[u8]) -> String {
 
 /// Stores a picture, if it is not there. One that is known to be damaged gets its bytes again.
 pub(crate) async fn put(tx: &mut Tx, sha256: &Digest, bytes: &[u8]) -> Result<(), StoreError> {
-    let done = sqlx::query(PUT).bind(&sha256[..]).bind(bytes).execute(&mut tx.conn).await;
+    let done = db::query(PUT).bind(&sha256[..]).bind(bytes).execute(&mut tx.conn).await;
     let done = done.map_err(|error| not_readable(sha256, error))?;
     if done.rows_affected() == 1 {
         return Ok(());
@@ -67,20 +72,20 @@ pub(crate) async fn put(tx: &mut Tx, sha256: &Digest, bytes: &[u8]) -> Result<()
 pub(super) async fn mend(tx: &mut Tx, sha256: &Digest, bytes: &[u8]) -> Result<(), StoreError> {
     let at = || StoreError::during("mend picture");
     let damaged: i64 =
-        sqlx::query_scalar(IS_DAMAGED).bind(&sha256[..]).fetch_one(&mut tx.conn).await.map_err(at())?;
+        db::query_scalar(IS_DAMAGED).bind(&sha256[..]).fetch_one(&mut tx.conn).await.map_err(at())?;
     if damaged == 0 {
         return Ok(());
     }
-    let mended = sqlx::query(MEND).bind(&sha256[..]).bind(bytes).execute(&mut tx.conn).await;
+    let mended = db::query(MEND).bind(&sha256[..]).bind(bytes).execute(&mut tx.conn).await;
     mended.map_err(|error| not_readable(sha256, error))?;
-    sqlx::query(MENDED).bind(&sha256[..]).execute(&mut tx.conn).await.map_err(at())?;
+    db::query(MENDED).bind(&sha256[..]).execute(&mut tx.conn).await.map_err(at())?;
     tracing::info!(picture = hex(sha256), "picture_mended");
     Ok(())
 }
 
 /// Damage at the place of one picture is not a reason to stop; other errors of the database may be.
-fn not_readable(sha256: &Digest, error: sqlx::Error) -> StoreError {
-    if is_damage(&error) {
+fn not_readable(sha256: &Digest, error: db::Error) -> StoreError {
+    if db::class(&error) == db::ErrorClass::Damaged {
         return StoreError::PictureDamaged { picture: hex(sha256), reason: error.to_string() };
     }
     StoreError::during("read or store a picture")(error)
@@ -97,8 +102,8 @@ pub(crate) async fn read(store: &Store, sha256: &Digest) -> Result<Vec<u8>, Stor
 }
 
 /// The bytes of a picture, if they are those of its digest.
-pub(crate) async fn checked(db: impl SqliteExecutor<'_>, sha256: &Digest) -> Result<Vec<u8>, StoreError> {
-    let found = sqlx::query_scalar::<_, Vec<u8>>(READ).bind(&sha256[..]).fetch_optional(db).await;
+pub(crate) async fn checked(db: impl Executor<'_>, sha256: &Digest) -> Result<Vec<u8>, StoreError> {
+    let found = db::query_scalar::<Vec<u8>>(READ).bind(&sha256[..]).fetch_optional(db).await;
     let found = found.map_err(|error| not_readable(sha256, error))?;
     let bytes = found.ok_or_else(|| StoreError::NotFound { what: Kind::Picture, name: hex(sha256) })?;
     if digest(&bytes) == *sha256 {
@@ -114,7 +119,7 @@ async fn note(store: &Store, sha256: Digest, reason: String) {
     let noted = store.write(move |tx| {
         Box::pin(async move {
             let short: String = reason.chars().take(256).collect();
-            let note = sqlx::query(NOTE).bind(&sha256[..]).bind(short).bind(now_ms());
+            let note = db::query(NOTE).bind(&sha256[..]).bind(short).bind(now_ms());
             note.execute(&mut tx.conn).await.map_err(StoreError::during("note damage")).map(drop)
         })
     });
@@ -126,20 +131,20 @@ async fn note(store: &Store, sha256: Digest, reason: String) {
 /// How many views, tracks and underlays show a damaged picture, and at most [`MAX_NAMED`] of those
 /// of these maps, or of all maps.
 pub(crate) async fn damaged(
-    db: impl SqliteExecutor<'_>,
+    db: impl Executor<'_>,
     maps: Option<&[String]>,
 ) -> Result<(u64, Vec<String>), StoreError> {
     let at = || StoreError::during("list damaged pictures");
     let maps = maps.map(|maps| serde_json::json!(maps).to_string());
-    let row = sqlx::query(DAMAGED).bind(MAX_NAMED).bind(maps).fetch_one(db).await.map_err(at())?;
+    let row = db::query(DAMAGED).bind(MAX_NAMED).bind(maps).fetch_one(db).await.map_err(at())?;
     let (count, named): (i64, String) = (row.try_get(0).map_err(at())?, row.try_get(1).map_err(at())?);
-    let named = serde_json::from_str(&named).map_err(|e| at()(sqlx::Error::Decode(e.into())))?;
+    let named = serde_json::from_str(&named).map_err(|e| at()(db::Error::Decode(e.into())))?;
     Ok((count.unsigned_abs(), named))
 }
 
 /// Digest of the first picture after `after`, in the order of digests.
-pub(crate) async fn next(db: impl SqliteExecutor<'_>, after: &[u8]) -> Result<Option<Digest>, StoreError> {
-    let found = sqlx::query_scalar::<_, Vec<u8>>(NEXT).bind(after).fetch_optional(db).await;
+pub(crate) async fn next(db: impl Executor<'_>, after: &[u8]) -> Result<Option<Digest>, StoreError> {
+    let found = db::query_scalar::<Vec<u8>>(NEXT).bind(after).fetch_optional(db).await;
     let found = found.map_err(StoreError::during("list pictures"))?;
     // The schema says 32 bytes.
     Ok(found.and_then(|bytes| bytes.try_into().ok()))

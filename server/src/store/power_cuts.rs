@@ -2,11 +2,10 @@
 //! that loses what was not synced (`power_cut`); the cut falls into commits and into checkpoints. A
 //! self-check shows that the same test finds a setting that loses commits.
 
-use super::{landmarks, maps};
+use super::{db, landmarks, maps};
 use crate::{config::Config, publication::Catalogue, publication::tests::config};
 use futures::FutureExt as _;
 use power_cut::{Disk, Random};
-use sqlx::{Connection as _, Executor as _};
 use std::{fs, path::Path};
 use tempfile::TempDir;
 use vision::recognise::DistanceKind;
@@ -56,7 +55,7 @@ async fn set(store: &Catalogue, sql: String) {
     let set = store.write(move |tx| {
         Box::pin(async move {
             let sql = format!("COMMIT; {sql}; BEGIN IMMEDIATE");
-            tx.conn().execute(sqlx::raw_sql(sqlx::AssertSqlSafe(sql))).await.expect("settings");
+            db::raw_sql(db::AssertSqlSafe(sql)).execute(tx.conn()).await.expect("settings");
             Ok(())
         })
     });
@@ -115,7 +114,7 @@ pub(super) struct StoredState {
 pub(super) async fn found(data: &Path, what: &str) -> StoredState {
     let (store, task) = Catalogue::open(&config(data)).await.unwrap_or_else(|e| panic!("{what}: {e}"));
     let version = store.snapshots().get("hall").unwrap_or_else(|| panic!("{what}: no map")).version;
-    let rows = sqlx::query_as::<_, (i64, String)>("SELECT id, name FROM landmarks ORDER BY name");
+    let rows = db::query_as::<(i64, String)>("SELECT id, name FROM landmarks ORDER BY name");
     let rows = rows.fetch_all(store.reads()).await.unwrap();
     let names: Vec<String> = rows.iter().map(|(_, name)| name.clone()).collect();
     assert_eq!(names, (0..names.len() as u64).map(name).collect::<Vec<_>>(), "{what}: a gap");
@@ -126,7 +125,7 @@ pub(super) async fn found(data: &Path, what: &str) -> StoredState {
     );
     task.close().await;
     let mut conn = super::copies::open_live(&data.join(super::open::FILE)).await.unwrap();
-    let said: String = sqlx::query_scalar("PRAGMA integrity_check").fetch_one(&mut conn).await.unwrap();
+    let said: String = db::query_scalar("PRAGMA integrity_check").fetch_one(&mut conn).await.unwrap();
     assert_eq!(said, "ok", "{what}");
     conn.close().await.unwrap();
     StoredState { landmarks: names.len() as u64, version }

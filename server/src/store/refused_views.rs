@@ -2,23 +2,28 @@
 //! picture. Only the newest of each landmark stay. They are no part of the map: no history has
 //! them, and no bundle.
 
-use super::{StoreError, Tx, kind::Kind, now_ms, statements::statements};
-use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
+use super::{
+    StoreError, Tx,
+    db::{self, Executor},
+    kind::Kind,
+    now_ms,
+    statements::statements,
+};
 
 statements! {
     INSERT = "INSERT INTO refused_views (landmark_id, refused_ms, refused_by, reason, view_id, width_px, height_px, grey) \
-              SELECT l.id, ?3, 'upload', ?4, ?5, ?6, ?7, ?8 FROM landmarks l JOIN maps m ON m.id = l.map_id \
-              WHERE m.name = ?1 AND l.name = ?2 RETURNING landmark_id";
+              SELECT l.id, $3, 'upload', $4, $5, $6, $7, $8 FROM landmarks l JOIN maps m ON m.id = l.map_id \
+              WHERE m.name = $1 AND l.name = $2 RETURNING landmark_id";
     INSERT_OF_LESSON = "INSERT INTO refused_views (landmark_id, refused_ms, refused_by, reason, view_id) \
-                        SELECT landmark_id, ?2, 'lesson', ?3, id FROM views WHERE id = ?1 AND landmark_id = ?4";
-    FORGET = "DELETE FROM refused_views WHERE landmark_id = ?1 AND id NOT IN \
-              (SELECT id FROM refused_views WHERE landmark_id = ?1 ORDER BY id DESC LIMIT ?2)";
-    FORGET_LESSON = "DELETE FROM refused_views WHERE landmark_id = ?1 AND refused_by = 'lesson'";
+                        SELECT landmark_id, $2, 'lesson', $3, id FROM views WHERE id = $1 AND landmark_id = $4";
+    FORGET = "DELETE FROM refused_views WHERE landmark_id = $1 AND id NOT IN \
+              (SELECT id FROM refused_views WHERE landmark_id = $1 ORDER BY id DESC LIMIT $2)";
+    FORGET_LESSON = "DELETE FROM refused_views WHERE landmark_id = $1 AND refused_by = 'lesson'";
     LIST = "SELECT r.id, r.refused_ms, r.refused_by = 'lesson' AS of_lesson, r.reason, v.id AS view_id, \
             r.grey IS NOT NULL AS has_picture FROM refused_views r LEFT JOIN views v ON v.id = r.view_id \
-            WHERE r.landmark_id = ?1 AND (r.refused_by = 'upload' OR v.id IS NOT NULL) ORDER BY r.id DESC";
+            WHERE r.landmark_id = $1 AND (r.refused_by = 'upload' OR v.id IS NOT NULL) ORDER BY r.id DESC";
     PICTURE = "SELECT r.width_px, r.height_px, r.grey FROM refused_views r JOIN landmarks l ON l.id = r.landmark_id \
-               JOIN maps m ON m.id = l.map_id WHERE m.name = ?1 AND l.name = ?2 AND r.id = ?3 AND r.grey IS NOT NULL";
+               JOIN maps m ON m.id = l.map_id WHERE m.name = $1 AND l.name = $2 AND r.id = $3 AND r.grey IS NOT NULL";
 }
 
 /// Refused photographs of one landmark that stay.
@@ -64,7 +69,7 @@ pub(crate) struct RefusedViewRow {
 }
 
 async fn forget(tx: &mut Tx, landmark: i64) -> Result<(), StoreError> {
-    let oldest = sqlx::query(FORGET).bind(landmark).bind(MAX_REFUSED as i64).execute(&mut tx.conn).await;
+    let oldest = db::query(FORGET).bind(landmark).bind(MAX_REFUSED as i64).execute(&mut tx.conn).await;
     oldest.map_err(StoreError::during("delete old refused views")).map(drop)
 }
 
@@ -75,7 +80,7 @@ pub(crate) async fn add(
     refused: &RefusedUpload,
 ) -> Result<(), StoreError> {
     let size = refused.picture.as_ref().map(|picture| picture.size_px);
-    let row = sqlx::query_scalar::<_, i64>(INSERT)
+    let row = db::query_scalar::<i64>(INSERT)
         .bind(map)
         .bind(landmark)
         .bind(now_ms())
@@ -98,21 +103,18 @@ pub(crate) async fn replace_of_lesson(
     left_out: &[SkippedView],
 ) -> Result<(), StoreError> {
     let at = || StoreError::during("keep what a lesson left out");
-    sqlx::query(FORGET_LESSON).bind(landmark).execute(&mut tx.conn).await.map_err(at())?;
+    db::query(FORGET_LESSON).bind(landmark).execute(&mut tx.conn).await.map_err(at())?;
     for SkippedView { view, reason } in left_out.iter().take(MAX_REFUSED) {
-        let row = sqlx::query(INSERT_OF_LESSON).bind(view).bind(now_ms()).bind(reason).bind(landmark);
+        let row = db::query(INSERT_OF_LESSON).bind(view).bind(now_ms()).bind(reason).bind(landmark);
         row.execute(&mut tx.conn).await.map_err(at())?;
     }
     forget(tx, landmark).await
 }
 
 /// The refused photographs of a landmark, newest first: at most [`MAX_REFUSED`].
-pub(crate) async fn list(
-    db: impl SqliteExecutor<'_>,
-    landmark: i64,
-) -> Result<Vec<RefusedViewRow>, StoreError> {
+pub(crate) async fn list(db: impl Executor<'_>, landmark: i64) -> Result<Vec<RefusedViewRow>, StoreError> {
     let at = || StoreError::during("list refused views");
-    let of = |row: &SqliteRow| -> Result<RefusedViewRow, sqlx::Error> {
+    let of = |row: &db::Row| -> Result<RefusedViewRow, db::Error> {
         Ok(RefusedViewRow {
             id: row.try_get("id")?,
             refused_ms: row.try_get("refused_ms")?,
@@ -122,17 +124,17 @@ pub(crate) async fn list(
             has_picture: row.try_get("has_picture")?,
         })
     };
-    let rows = sqlx::query(LIST).bind(landmark).fetch_all(db).await.map_err(at())?;
+    let rows = db::query(LIST).bind(landmark).fetch_all(db).await.map_err(at())?;
     rows.iter().map(of).collect::<Result<_, _>>().map_err(at())
 }
 
 /// The small picture of a refused photograph.
 pub(crate) async fn picture(
-    db: impl SqliteExecutor<'_>,
+    db: impl Executor<'_>,
     (map, landmark, refused): (&str, &str, i64),
 ) -> Result<SmallPicture, StoreError> {
     let at = || StoreError::during("read refused view");
-    let row = sqlx::query(PICTURE).bind(map).bind(landmark).bind(refused).fetch_optional(db).await;
+    let row = db::query(PICTURE).bind(map).bind(landmark).bind(refused).fetch_optional(db).await;
     let row = row.map_err(at())?;
     let row = row.ok_or_else(|| StoreError::NotFound { what: Kind::View, name: refused.to_string() })?;
     let side = |column: &str| row.try_get::<i64, _>(column).map(|px| px as usize).map_err(at());

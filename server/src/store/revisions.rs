@@ -2,12 +2,17 @@
 //! or lesson, and never comes back for something else of the same name. What robots do by
 //! themselves changes none.
 
-use super::{StoreError, Tx, landmarks, maps, modality_stats, statements::statements, visibility_settings};
-use sqlx::{Row, SqliteConnection};
+use super::{
+    StoreError, Tx,
+    db::{self, Conn},
+    landmarks, maps, modality_stats,
+    statements::statements,
+    visibility_settings,
+};
 
 statements! {
     OF_MAP = "SELECT id || '.' || walls_version AS walls, id || '.' || underlay_revision AS underlay, sight \
-              FROM maps WHERE name = ?1";
+              FROM maps WHERE name = $1";
 }
 
 /// What has a revision.
@@ -34,11 +39,7 @@ pub(crate) enum Precondition {
 }
 
 /// The present revision. Errors: `NotFound`.
-pub(crate) async fn present(
-    conn: &mut SqliteConnection,
-    map: &str,
-    of: &Subject,
-) -> Result<String, StoreError> {
+pub(crate) async fn present(conn: &mut Conn, map: &str, of: &Subject) -> Result<String, StoreError> {
     let row = maps::get(&mut *conn, map).await?;
     match of {
         Subject::Map => return Ok(row.revision),
@@ -49,7 +50,7 @@ pub(crate) async fn present(
         Subject::Walls | Subject::VisibilitySettings | Subject::Underlay => {}
     }
     let at = || StoreError::during("read a revision");
-    let row = sqlx::query(OF_MAP).bind(map).fetch_one(conn).await.map_err(at())?;
+    let row = db::query(OF_MAP).bind(map).fetch_one(conn).await.map_err(at())?;
     if *of == Subject::VisibilitySettings {
         let text: Option<String> = row.try_get("sight").map_err(at())?;
         return Ok(visibility_settings::revision(&visibility_settings::read(map, text.as_deref())));

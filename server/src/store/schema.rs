@@ -1,7 +1,11 @@
 //! The number of a database's schema, and the newest that this program knows.
 
-use super::{StoreError, migrations, statements::statements};
-use sqlx::SqliteConnection;
+use super::{
+    StoreError,
+    db::{self, Conn},
+    sqlite::migrations,
+    statements::statements,
+};
 
 statements! {
     SCHEMA = "SELECT coalesce(max(version), 0) FROM _sqlx_migrations WHERE success";
@@ -13,12 +17,12 @@ pub(crate) fn known_schema() -> i64 {
 }
 
 /// The schema of a database.
-pub(super) async fn schema(conn: &mut SqliteConnection) -> Result<i64, StoreError> {
-    sqlx::query_scalar(SCHEMA).fetch_one(conn).await.map_err(StoreError::during("read the schema"))
+pub(super) async fn schema(conn: &mut Conn) -> Result<i64, StoreError> {
+    db::query_scalar(SCHEMA).fetch_one(conn).await.map_err(StoreError::during("read the schema"))
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::store::open;
     use std::{
@@ -27,17 +31,19 @@ mod tests {
         path::Path,
     };
 
+    /// A statement without comments, one blank between words.
+    pub(in crate::store) fn on_one_line(sql: &str) -> String {
+        let lines = sql.lines().map(|line| line.split("--").next().unwrap_or_default());
+        lines.flat_map(str::split_whitespace).collect::<Vec<_>>().join(" ")
+    }
+
     /// The checksum of every applied file, then every table, index and trigger on a line.
-    async fn dump(conn: &mut SqliteConnection) -> String {
+    async fn dump(conn: &mut Conn) -> String {
         let objects = "SELECT printf('file %04d %s %s', version, description, lower(hex(checksum))) FROM _sqlx_migrations \
                        UNION ALL SELECT type || ' ' || name || ' ' || sql FROM sqlite_schema \
                        WHERE sql IS NOT NULL AND name NOT GLOB 'sqlite_*' AND name <> '_sqlx_migrations' ORDER BY 1";
-        let objects: Vec<String> = sqlx::query_scalar(objects).fetch_all(conn).await.unwrap();
-        let without_comments = |sql: &String| {
-            let lines = sql.lines().map(|line| line.split("--").next().unwrap_or_default());
-            lines.flat_map(str::split_whitespace).collect::<Vec<_>>().join(" ")
-        };
-        objects.iter().map(|sql| without_comments(sql) + "\n").collect()
+        let objects: Vec<String> = db::query_scalar(objects).fetch_all(conn).await.unwrap();
+        objects.iter().map(|sql| on_one_line(sql) + "\n").collect()
     }
 
     #[tokio::test]

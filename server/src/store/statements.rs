@@ -7,7 +7,7 @@ macro_rules! statements {
         $(const $name: &str = $sql;)+
         /// Every statement of this file.
         #[cfg(test)]
-        pub(super) const ALL: &[(&str, &str)] = &[$((stringify!($name), $name)),+];
+        pub(super) const ALL: &[(&str, &str)] = &[$((concat!(module_path!(), "::", stringify!($name)), $name)),+];
     };
 }
 pub(super) use statements;

@@ -1,7 +1,13 @@
 //! Answers to frames as rows: what was said, the icons of the quads with matched points, the pose
 //! before the frame. Only the newest stay.
 
-use super::{StoreError, Tx, kind::Kind, now_ms, statements::statements};
+use super::{
+    StoreError, Tx,
+    db::{self, Executor, Row},
+    kind::Kind,
+    now_ms,
+    statements::statements,
+};
 use engine::{
     answer_records::{AnswerBasis, AnswerRecord, named_landmarks, refusal_of},
     prior_check,
@@ -13,38 +19,37 @@ use protos::{
     prost::Message as _,
     v1,
 };
-use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
 use std::collections::{BTreeMap, BTreeSet};
 use vision::points::shown_matches::ShownMatch;
 
 statements! {
     INSERT = "INSERT INTO stored_answers (map_id, robot, camera, stored_ms, status, has_pose, refusal, landmarks, candidates, \
-              answer, prior_check) SELECT id, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11 FROM maps WHERE name = ?1 \
+              answer, prior_check) SELECT id, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11 FROM maps WHERE name = $1 \
               RETURNING id";
     INSERT_ICON = "INSERT INTO stored_answer_icons (answer_id, quad, icon_side, icon, matched, matches) \
-                   VALUES (?1, ?2, ?3, ?4, ?5, ?6)";
-    FORGET = "DELETE FROM stored_answers WHERE id <= (SELECT max(id) FROM stored_answers) - ?1";
+                   VALUES ($1, $2, $3, $4, $5, $6)";
+    FORGET = "DELETE FROM stored_answers WHERE id <= (SELECT max(id) FROM stored_answers) - $1";
     GET = "SELECT a.id, m.name AS map, a.robot, a.camera, a.stored_ms, a.status, a.has_pose, a.refusal, a.landmarks, \
-           a.candidates, a.answer, a.prior_check FROM stored_answers a JOIN maps m ON m.id = a.map_id WHERE a.id = ?1";
-    MAP_OF = "SELECT m.name FROM stored_answers a JOIN maps m ON m.id = a.map_id WHERE a.id = ?1";
-    ICONS = "SELECT quad, matched, matches FROM stored_answer_icons WHERE answer_id = ?1 ORDER BY quad";
-    ICON = "SELECT icon_side, icon FROM stored_answer_icons WHERE answer_id = ?1 AND quad = ?2";
+           a.candidates, a.answer, a.prior_check FROM stored_answers a JOIN maps m ON m.id = a.map_id WHERE a.id = $1";
+    MAP_OF = "SELECT m.name FROM stored_answers a JOIN maps m ON m.id = a.map_id WHERE a.id = $1";
+    ICONS = "SELECT quad, matched, matches FROM stored_answer_icons WHERE answer_id = $1 ORDER BY quad";
+    ICON = "SELECT icon_side, icon FROM stored_answer_icons WHERE answer_id = $1 AND quad = $2";
     LIST = "SELECT a.id, m.name AS map, a.robot, a.camera, a.stored_ms, a.status, a.has_pose, a.refusal, a.landmarks, \
-            a.candidates FROM stored_answers a JOIN maps m ON m.id = a.map_id WHERE a.id < ?9 \
-            AND (?1 IS NULL OR m.name IN (SELECT value FROM json_each(?1))) AND (?2 IS NULL OR a.robot = ?2) \
-            AND (?3 IS NULL OR a.camera = ?3) AND (?4 IS NULL OR a.status = ?4) AND (?5 IS NULL OR a.refusal = ?5) \
-            AND (?6 IS NULL OR ?6 IN (SELECT value FROM json_each(a.landmarks)) \
-                 OR ?6 IN (SELECT value FROM json_each(a.candidates))) \
-            AND (?7 IS NULL OR a.stored_ms >= ?7) AND (?8 IS NULL OR a.stored_ms < ?8) ORDER BY a.id DESC LIMIT ?10";
-    ABOUT = "SELECT a.answer FROM stored_answers a JOIN maps m ON m.id = a.map_id WHERE m.name = ?1 \
-             AND (?2 IN (SELECT value FROM json_each(a.landmarks)) OR ?2 IN (SELECT value FROM json_each(a.candidates))) \
-             ORDER BY a.id DESC LIMIT ?3";
+            a.candidates FROM stored_answers a JOIN maps m ON m.id = a.map_id WHERE a.id < $9 \
+            AND ($1 IS NULL OR m.name IN (SELECT value FROM json_each($1))) AND ($2 IS NULL OR a.robot = $2) \
+            AND ($3 IS NULL OR a.camera = $3) AND ($4 IS NULL OR a.status = $4) AND ($5 IS NULL OR a.refusal = $5) \
+            AND ($6 IS NULL OR $6 IN (SELECT value FROM json_each(a.landmarks)) \
+                 OR $6 IN (SELECT value FROM json_each(a.candidates))) \
+            AND ($7 IS NULL OR a.stored_ms >= $7) AND ($8 IS NULL OR a.stored_ms < $8) ORDER BY a.id DESC LIMIT $10";
+    ABOUT = "SELECT a.answer FROM stored_answers a JOIN maps m ON m.id = a.map_id WHERE m.name = $1 \
+             AND ($2 IN (SELECT value FROM json_each(a.landmarks)) OR $2 IN (SELECT value FROM json_each(a.candidates))) \
+             ORDER BY a.id DESC LIMIT $3";
     COUNT = "SELECT count(*) FROM stored_answers a JOIN maps m ON m.id = a.map_id \
-             WHERE (?1 IS NULL OR m.name IN (SELECT value FROM json_each(?1))) AND (?2 IS NULL OR a.robot = ?2) \
-             AND (?3 IS NULL OR a.camera = ?3) AND (?4 IS NULL OR a.status = ?4) AND (?5 IS NULL OR a.refusal = ?5) \
-             AND (?6 IS NULL OR ?6 IN (SELECT value FROM json_each(a.landmarks)) \
-                  OR ?6 IN (SELECT value FROM json_each(a.candidates))) \
-             AND (?7 IS NULL OR a.stored_ms >= ?7) AND (?8 IS NULL OR a.stored_ms < ?8)";
+             WHERE ($1 IS NULL OR m.name IN (SELECT value FROM json_each($1))) AND ($2 IS NULL OR a.robot = $2) \
+             AND ($3 IS NULL OR a.camera = $3) AND ($4 IS NULL OR a.status = $4) AND ($5 IS NULL OR a.refusal = $5) \
+             AND ($6 IS NULL OR $6 IN (SELECT value FROM json_each(a.landmarks)) \
+                  OR $6 IN (SELECT value FROM json_each(a.candidates))) \
+             AND ($7 IS NULL OR a.stored_ms >= $7) AND ($8 IS NULL OR a.stored_ms < $8)";
 }
 
 /// Largest message that is stored, bytes; a larger answer is left out.
@@ -89,7 +94,7 @@ fn damaged(reason: String) -> StoreError {
     StoreError::Damaged { what: "a stored answer".into(), reason }
 }
 
-fn answer_row(row: &SqliteRow) -> Result<AnswerRow, StoreError> {
+fn answer_row(row: &Row) -> Result<AnswerRow, StoreError> {
     let at = || StoreError::during("read answer");
     let names = |column: &str| {
         let text: &str = row.try_get(column).map_err(at())?;
@@ -163,7 +168,7 @@ pub(crate) async fn add(tx: &mut Tx, records: &[AnswerRecord], max: usize) -> Re
         let compared = answer.quads.iter().flat_map(|quad| &quad.candidates);
         let others: BTreeSet<&str> =
             compared.map(|c| c.landmark.as_str()).filter(|name| !named.contains(name)).collect();
-        let row = sqlx::query_scalar::<_, i64>(INSERT)
+        let row = db::query_scalar::<i64>(INSERT)
             .bind(&answer.map)
             .bind(key.robot.as_str())
             .bind(key.camera.as_str())
@@ -180,7 +185,7 @@ pub(crate) async fn add(tx: &mut Tx, records: &[AnswerRecord], max: usize) -> Re
         let Some(id) = row.map_err(at())? else { continue };
         for icon in icons {
             let matched = icon.matched.as_ref();
-            let stored = sqlx::query(INSERT_ICON)
+            let stored = db::query(INSERT_ICON)
                 .bind(id)
                 .bind(icon.quad as i64)
                 .bind(icon.size as i64)
@@ -192,21 +197,21 @@ pub(crate) async fn add(tx: &mut Tx, records: &[AnswerRecord], max: usize) -> Re
             stored.map_err(at())?;
         }
     }
-    let oldest = sqlx::query(FORGET).bind(max as i64).execute(&mut tx.conn).await;
+    let oldest = db::query(FORGET).bind(max as i64).execute(&mut tx.conn).await;
     oldest.map_err(StoreError::during("delete old answers")).map(drop)
 }
 
 /// The newest answers on a map that name a landmark or were compared with it.
 pub(crate) async fn about(
-    db: &sqlx::SqlitePool,
+    db: &db::Pool,
     map: &str,
     landmark: &str,
     limit: usize,
 ) -> Result<Vec<v1::Answer>, StoreError> {
     let at = || StoreError::during("read answers");
     let rows =
-        sqlx::query(ABOUT).bind(map).bind(landmark).bind(limit as i64).fetch_all(db).await.map_err(at())?;
-    let answer = |row: &SqliteRow| {
+        db::query(ABOUT).bind(map).bind(landmark).bind(limit as i64).fetch_all(db).await.map_err(at())?;
+    let answer = |row: &Row| {
         let message: &[u8] = row.try_get("answer").map_err(at())?;
         v1::Answer::decode(message).map_err(|e| damaged(e.to_string()))
     };
@@ -224,7 +229,7 @@ pub(crate) struct OpenedAnswer {
 }
 
 /// The matches that are stored with an icon.
-fn matches_in(row: &SqliteRow) -> Result<(usize, Option<QuadMatches>), sqlx::Error> {
+fn matches_in(row: &Row) -> Result<(usize, Option<QuadMatches>), db::Error> {
     let quad: i64 = row.try_get("quad")?;
     let landmark: Option<String> = row.try_get("matched")?;
     let bytes: Option<Vec<u8>> = row.try_get("matches")?;
@@ -236,33 +241,29 @@ fn matches_in(row: &SqliteRow) -> Result<(usize, Option<QuadMatches>), sqlx::Err
 }
 
 /// One answer with what is stored of it.
-pub(crate) async fn get(db: &sqlx::SqlitePool, id: i64) -> Result<OpenedAnswer, StoreError> {
+pub(crate) async fn get(db: &db::Pool, id: i64) -> Result<OpenedAnswer, StoreError> {
     let at = || StoreError::during("read answer");
-    let row = sqlx::query(GET).bind(id).fetch_optional(db).await.map_err(at())?;
+    let row = db::query(GET).bind(id).fetch_optional(db).await.map_err(at())?;
     let row = row.ok_or_else(|| unknown(id))?;
     let message: &[u8] = row.try_get("answer").map_err(at())?;
     let answer = v1::Answer::decode(message).map_err(|e| damaged(e.to_string()))?;
     let check: Option<&str> = row.try_get("prior_check").map_err(at())?;
     let prior_check = check.map(serde_json::from_str).transpose().map_err(|e| damaged(e.to_string()))?;
-    let icons = sqlx::query(ICONS).bind(id).fetch_all(db).await.map_err(at())?;
+    let icons = db::query(ICONS).bind(id).fetch_all(db).await.map_err(at())?;
     let icons = icons.iter().map(matches_in).collect::<Result<_, _>>().map_err(at())?;
     Ok(OpenedAnswer { row: answer_row(&row)?, answer, icons, prior_check })
 }
 
 /// The map of an answer.
-pub(crate) async fn map_of(db: impl SqliteExecutor<'_>, id: i64) -> Result<String, StoreError> {
-    let name = sqlx::query_scalar(MAP_OF).bind(id).fetch_optional(db).await;
+pub(crate) async fn map_of(db: impl Executor<'_>, id: i64) -> Result<String, StoreError> {
+    let name = db::query_scalar(MAP_OF).bind(id).fetch_optional(db).await;
     name.map_err(StoreError::during("read answer"))?.ok_or_else(|| unknown(id))
 }
 
 /// Side and grey levels of the icon of a quad.
-pub(crate) async fn icon(
-    db: impl SqliteExecutor<'_>,
-    id: i64,
-    quad: i64,
-) -> Result<(usize, Vec<u8>), StoreError> {
+pub(crate) async fn icon(db: impl Executor<'_>, id: i64, quad: i64) -> Result<(usize, Vec<u8>), StoreError> {
     let at = || StoreError::during("read icon");
-    let row = sqlx::query(ICON).bind(id).bind(quad).fetch_optional(db).await.map_err(at())?;
+    let row = db::query(ICON).bind(id).bind(quad).fetch_optional(db).await.map_err(at())?;
     let row = row.ok_or_else(|| unknown(id))?;
     let side: i64 = row.try_get("icon_side").map_err(at())?;
     Ok((side as usize, row.try_get("icon").map_err(at())?))
@@ -275,12 +276,12 @@ pub(crate) fn unknown(id: i64) -> StoreError {
 
 /// Answers with numbers below `before`, newest first.
 pub(crate) async fn page(
-    db: impl SqliteExecutor<'_>,
+    db: impl Executor<'_>,
     filter: &AnswerFilter,
     before: i64,
     limit: usize,
 ) -> Result<Vec<AnswerRow>, StoreError> {
-    let rows = sqlx::query(LIST)
+    let rows = db::query(LIST)
         .bind(&filter.maps)
         .bind(&filter.robot)
         .bind(&filter.camera)
@@ -296,8 +297,8 @@ pub(crate) async fn page(
 }
 
 /// How many answers a list has.
-pub(crate) async fn count(db: impl SqliteExecutor<'_>, filter: &AnswerFilter) -> Result<u64, StoreError> {
-    let count = sqlx::query_scalar::<_, i64>(COUNT)
+pub(crate) async fn count(db: impl Executor<'_>, filter: &AnswerFilter) -> Result<u64, StoreError> {
+    let count = db::query_scalar::<i64>(COUNT)
         .bind(&filter.maps)
         .bind(&filter.robot)
         .bind(&filter.camera)

@@ -5,6 +5,7 @@
 
 use super::{
     Store, StoreError, Tx,
+    db::{self, Executor},
     kind::Kind,
     landmark_placement::{self, PlacementOutcome, PlacementReport},
     landmarks::{self, LandmarkGeometry, geometry_columns},
@@ -18,7 +19,6 @@ use engine::{
     threads::{self, Class},
 };
 use map::segments::LaserSegment;
-use sqlx::{Row, SqliteExecutor};
 use std::sync::Arc;
 use vision::{
     learn::near_duplicates::{NoveltyParams, ViewSummary, most_alike},
@@ -27,7 +27,7 @@ use vision::{
 
 statements! {
     STAMP = concat!("SELECT m.id AS map, m.walls_version, l.id AS landmark, l.revision, ", geometry_columns!("l."),
-            " FROM maps m JOIN landmarks l ON l.map_id = m.id WHERE m.name = ?1 AND l.name = ?2");
+            " FROM maps m JOIN landmarks l ON l.map_id = m.id WHERE m.name = $1 AND l.name = $2");
 }
 
 /// Two sizes are the same up to the rounding of their text.
@@ -56,13 +56,12 @@ impl Stamp {
 
 /// The stamp of a landmark; `None` if there is none of that name.
 pub(super) async fn stamp(
-    db: impl SqliteExecutor<'_>,
+    db: impl Executor<'_>,
     map: &str,
     landmark: &str,
 ) -> Result<Option<Stamp>, StoreError> {
     let at = || StoreError::during("read what a view rests on");
-    let Some(row) = sqlx::query(STAMP).bind(map).bind(landmark).fetch_optional(db).await.map_err(at())?
-    else {
+    let Some(row) = db::query(STAMP).bind(map).bind(landmark).fetch_optional(db).await.map_err(at())? else {
         return Ok(None);
     };
     let number = |column: &str| row.try_get::<i64, _>(column).map_err(at());

@@ -1,21 +1,24 @@
 //! The statements against the schema.
 
 use super::*;
-use sqlx::{Executor, SqlSafeStr};
+use sqlx::{Executor as _, SqlSafeStr as _};
+use std::path::{Path, PathBuf};
 
-#[tokio::test]
-async fn every_statement_prepares_on_the_migrated_schema() {
-    let dir = tempfile::tempdir().unwrap();
-    let mut opened = open::open(dir.path(), None).await.unwrap();
-    let all = [
+mod postgres;
+mod postgres_schema;
+mod scenario;
+
+type Statements = &'static [(&'static str, &'static str)];
+
+/// Every statement of the store: its path and its text.
+fn every() -> impl Iterator<Item = &'static (&'static str, &'static str)> {
+    let all: [Statements; 31] = [
         maps::ALL,
         robot_certificates::ALL,
         map_locations::ALL,
         visibility_settings::ALL,
         visibility_areas::ALL,
         landmarks::ALL,
-        copies::ALL,
-        integrity::ALL,
         schema::ALL,
         derived_schema::ALL,
         pictures::ALL,
@@ -42,11 +45,118 @@ async fn every_statement_prepares_on_the_migrated_schema() {
         revisions::ALL,
         map_rows::ALL,
     ];
-    for (name, sql) in
-        all.into_iter().chain(history::EVERY).chain(contents::EVERY).chain(drafts::EVERY).flatten()
-    {
-        if let Err(error) = opened.writer.prepare(sql.into_sql_str()).await {
+    all.into_iter()
+        .chain(sqlite::EVERY)
+        .chain(history::EVERY)
+        .chain(contents::EVERY)
+        .chain(drafts::EVERY)
+        .flatten()
+}
+
+#[tokio::test]
+async fn every_statement_prepares_on_the_migrated_schema() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut opened = open::open(dir.path(), None).await.unwrap();
+    for (name, sql) in every() {
+        if let Err(error) = opened.writer.sqlite().prepare(sql.into_sql_str()).await {
             panic!("{name}: {error}");
         }
     }
+}
+
+/// What SQLite alone takes, outside of its folder: its own tables, and lists in JSON.
+const OF_SQLITE: [&str; 13] = [
+    "audit::TOTAL_CHANGES",
+    "derived_schema::NAMES",
+    "derived_schema::REFERENCES",
+    "derived_schema::TRIGGER",
+    "history::kept_tables::COLUMNS",
+    "jobs::COUNT",
+    "jobs::LIST",
+    "map_rows::LANDMARKS",
+    "models::DIGESTS",
+    "pictures::DAMAGED",
+    "stored_answers::ABOUT",
+    "stored_answers::COUNT",
+    "stored_answers::LIST",
+];
+
+/// What a text has that PostgreSQL does not take, or takes for something else. Words are lower
+/// case, one blank apart.
+fn not_portable(sql: &str) -> Option<&'static str> {
+    const WORDS: [&str; 19] = [
+        "?",
+        "==",
+        "autoincrement",
+        "glob ",
+        "group_concat",
+        " hex(",
+        "ifnull(",
+        "iif(",
+        "insert or",
+        "instr(",
+        "json",
+        "limit -1",
+        "pragma",
+        "printf(",
+        "rowid",
+        "sqlite_",
+        "strftime(",
+        "total_changes",
+        "unixepoch",
+    ];
+    let sql = sql.to_lowercase();
+    let sql = sql.split_whitespace().collect::<Vec<_>>().join(" ");
+    let compares = |is: &str| {
+        let null = ["null", "distinct from ", "not null", "not distinct from "];
+        sql.match_indices(is).any(|(at, _)| !null.iter().any(|word| sql[at + is.len()..].starts_with(word)))
+    };
+    WORDS.into_iter().find(|word| sql.contains(word)).or(compares(" is ").then_some("IS"))
+}
+
+#[test]
+fn texts_are_portable() {
+    let mut others: Vec<&str> = Vec::new();
+    for (name, sql) in every() {
+        let name = name.trim_start_matches("server::store::");
+        if name.starts_with("sqlite::") {
+            continue;
+        }
+        match not_portable(sql) {
+            Some(_) if OF_SQLITE.contains(&name) => others.push(name),
+            Some(word) => panic!("{name} has {word}: {sql}"),
+            None => {}
+        }
+    }
+    others.sort_unstable();
+    assert_eq!(others, OF_SQLITE);
+}
+
+/// The driver of the database is named by the layer over it and by what is of SQLite alone; tests
+/// may open the file beside a server.
+#[test]
+fn sqlx_is_named_in_two_folders() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let (mut folders, mut others) = (vec![root.clone()], Vec::new());
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            let within = path.strip_prefix(&root).unwrap();
+            if within == Path::new("store/db") || within == Path::new("store/sqlite") {
+                continue;
+            }
+            if path.is_dir() {
+                folders.push(path);
+                continue;
+            }
+            let text = std::fs::read_to_string(&path).unwrap_or_default();
+            let product = text.split("#[cfg(test)]\nmod tests").next().unwrap_or_default();
+            let is_test =
+                ["tests", "tests.rs", "io_errors.rs"].iter().any(|part| within.iter().any(|p| p == *part));
+            if !is_test && product.contains("sqlx::") {
+                others.push(within.to_owned());
+            }
+        }
+    }
+    assert_eq!(others, [] as [PathBuf; 0]);
 }

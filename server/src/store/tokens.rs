@@ -1,22 +1,37 @@
 //! Tokens: whom each is for, what it may do, and the digest of its secret.
 
-use super::{CommittedChange, StoreError, Tx, kind::Kind, maps, now_ms, statements::statements, within};
+use super::{
+    CommittedChange, StoreError, Tx,
+    db::{self, Executor, Row},
+    kind::Kind,
+    maps, now_ms,
+    statements::statements,
+    within,
+};
 use protos::api::{Role, Token};
-use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
+
+/// The columns of [`token_row`]. A map's drafts belong to it; no name has a slash.
+macro_rules! select {
+    ($tail:literal) => {
+        concat!(
+            "SELECT id, name, role, everywhere, sha256, created_ms, expires_ms, revoked_ms, \
+             (SELECT string_agg(m.name, '/') FROM token_maps t \
+             JOIN maps m ON m.id = t.map_id OR m.draft_of = t.map_id WHERE t.token_id = tokens.id) AS names FROM tokens ",
+            $tail
+        )
+    };
+}
 
 statements! {
     COUNT = "SELECT count(*) FROM tokens";
-    INSERT = "INSERT INTO tokens (name, role, maps, sha256, created_ms, expires_ms) VALUES (?1, ?2, ?3, ?4, ?5, ?6) \
-              RETURNING id";
-    GET = "SELECT id, name, role, (SELECT json_group_array(m.name) FROM json_each(tokens.maps) e \
-           JOIN maps m ON e.value IN (m.id, m.draft_of)) AS names, maps IS NULL AS everywhere, sha256, created_ms, expires_ms, revoked_ms \
-           FROM tokens WHERE id = ?1";
-    PAGE = "SELECT id, name, role, (SELECT json_group_array(m.name) FROM json_each(tokens.maps) e \
-            JOIN maps m ON e.value IN (m.id, m.draft_of)) AS names, maps IS NULL AS everywhere, sha256, created_ms, expires_ms, revoked_ms \
-            FROM tokens WHERE id > ?1 ORDER BY id LIMIT ?2";
-    REVOKE = "UPDATE tokens SET revoked_ms = ?2 WHERE id = ?1 AND revoked_ms IS NULL";
+    INSERT = "INSERT INTO tokens (name, role, everywhere, sha256, created_ms, expires_ms) \
+              VALUES ($1, $2, $3, $4, $5, $6) RETURNING id";
+    INSERT_MAP = "INSERT INTO token_maps (token_id, map_id) VALUES ($1, $2) ON CONFLICT DO NOTHING";
+    GET = select!("WHERE id = $1");
+    PAGE = select!("WHERE id > $1 ORDER BY id LIMIT $2");
+    REVOKE = "UPDATE tokens SET revoked_ms = $2 WHERE id = $1 AND revoked_ms IS NULL";
     FORGET_ENDED = "DELETE FROM tokens WHERE id = (SELECT id FROM tokens \
-                    WHERE revoked_ms IS NOT NULL OR expires_ms <= ?1 ORDER BY id LIMIT 1)";
+                    WHERE revoked_ms IS NOT NULL OR expires_ms <= $1 ORDER BY id LIMIT 1)";
 }
 
 /// Most tokens stored, with those that were revoked or have expired; of these the oldest make room.
@@ -44,13 +59,13 @@ fn damaged(id: i64, reason: &impl ToString) -> StoreError {
     StoreError::Damaged { what: format!("token {id}"), reason: reason.to_string() }
 }
 
-fn token_row(row: &SqliteRow) -> Result<TokenRow, StoreError> {
+fn token_row(row: &Row) -> Result<TokenRow, StoreError> {
     let read = StoreError::during;
     let id: i64 = row.try_get("id").map_err(read("read token"))?;
     let role: String = row.try_get("role").map_err(read("read token"))?;
-    let names: String = row.try_get("names").map_err(read("read token"))?;
+    let names: Option<String> = row.try_get("names").map_err(read("read token"))?;
     let everywhere: bool = row.try_get("everywhere").map_err(read("read token"))?;
-    let mut names: Vec<String> = serde_json::from_str(&names).map_err(|e| damaged(id, &e))?;
+    let mut names: Vec<String> = names.iter().flat_map(|names| names.split('/')).map(str::to_owned).collect();
     names.sort_unstable();
     let sha256: Vec<u8> = row.try_get("sha256").map_err(read("read token"))?;
     let token = Token {
@@ -68,66 +83,59 @@ fn token_row(row: &SqliteRow) -> Result<TokenRow, StoreError> {
 
 /// Stores a token. Errors: a map that does not exist; more than [`MAX_TOKENS`] in use.
 pub(crate) async fn create(tx: &mut Tx, new: TokenInsert) -> Result<Token, StoreError> {
-    let numbers = match &new.maps {
-        None => None,
-        Some(names) => {
-            let mut numbers = Vec::new();
-            for name in names {
-                numbers.push(maps::get(&mut tx.conn, name).await?.id);
-            }
-            numbers.sort_unstable();
-            numbers.dedup();
-            Some(serde_json::to_string(&numbers).map_err(|e| damaged(0, &e))?)
-        }
-    };
     let now = now_ms();
     if count(&mut tx.conn).await? as usize >= MAX_TOKENS {
-        let forgotten = sqlx::query(FORGET_ENDED).bind(now).execute(&mut tx.conn).await;
+        let forgotten = db::query(FORGET_ENDED).bind(now).execute(&mut tx.conn).await;
         forgotten.map_err(StoreError::during("forget an ended token"))?;
     }
-    let id: i64 = sqlx::query_scalar(INSERT)
+    let id: i64 = db::query_scalar(INSERT)
         .bind(&new.name)
         .bind(new.role.as_str())
-        .bind(numbers)
+        .bind(new.maps.is_none())
         .bind(new.sha256.as_slice())
         .bind(now)
         .bind(new.expires_ms)
         .fetch_one(&mut tx.conn)
         .await
         .map_err(StoreError::during("create token"))?;
+    for name in new.maps.iter().flatten() {
+        let map = maps::get(&mut tx.conn, name).await?.id;
+        let inserted = db::query(INSERT_MAP).bind(id).bind(map).execute(&mut tx.conn).await;
+        inserted.map_err(StoreError::during("store the map of a token"))?;
+    }
     within(count(&mut tx.conn).await? as i64, MAX_TOKENS, "tokens")?;
     tx.changed(CommittedChange::Tokens);
     get(&mut tx.conn, id).await
 }
 
 /// How many there are.
-pub(crate) async fn count(db: impl SqliteExecutor<'_>) -> Result<u64, StoreError> {
+pub(crate) async fn count(db: impl Executor<'_>) -> Result<u64, StoreError> {
     let count: i64 =
-        sqlx::query_scalar(COUNT).fetch_one(db).await.map_err(StoreError::during("count tokens"))?;
+        db::query_scalar(COUNT).fetch_one(db).await.map_err(StoreError::during("count tokens"))?;
     Ok(count as u64)
 }
 
 /// One token.
-pub(crate) async fn get(db: impl SqliteExecutor<'_>, id: i64) -> Result<Token, StoreError> {
-    let row = sqlx::query(GET).bind(id).fetch_optional(db).await.map_err(StoreError::during("read token"))?;
+pub(crate) async fn get(db: impl Executor<'_>, id: i64) -> Result<Token, StoreError> {
+    let row = db::query(GET).bind(id).fetch_optional(db).await.map_err(StoreError::during("read token"))?;
     let row = row.ok_or_else(|| StoreError::NotFound { what: Kind::Token, name: id.to_string() })?;
     Ok(token_row(&row)?.token)
 }
 
 /// Tokens with numbers after `after`, in order.
 pub(crate) async fn page(
-    db: impl SqliteExecutor<'_>,
+    db: impl Executor<'_>,
     after: i64,
     limit: usize,
 ) -> Result<Vec<TokenRow>, StoreError> {
-    let rows = sqlx::query(PAGE).bind(after).bind(limit as i64).fetch_all(db).await;
+    let rows = db::query(PAGE).bind(after).bind(limit as i64).fetch_all(db).await;
     rows.map_err(StoreError::during("list tokens"))?.iter().map(token_row).collect()
 }
 
 /// Revokes a token; one that was revoked before keeps its time.
 pub(crate) async fn revoke(tx: &mut Tx, id: i64) -> Result<(), StoreError> {
     get(&mut tx.conn, id).await?;
-    let revoked = sqlx::query(REVOKE).bind(id).bind(now_ms()).execute(&mut tx.conn).await;
+    let revoked = db::query(REVOKE).bind(id).bind(now_ms()).execute(&mut tx.conn).await;
     revoked.map_err(StoreError::during("revoke token"))?;
     tx.changed(CommittedChange::Tokens);
     Ok(())

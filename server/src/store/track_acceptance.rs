@@ -4,7 +4,7 @@
 //! an added view ([`super::teaching`]).
 
 use super::{
-    Store, StoreError, Tx,
+    Store, StoreError, Tx, db,
     gatherings::{self, TrackView},
     jobs::{self, JobRow},
     kind::Kind,
@@ -17,20 +17,19 @@ use super::{
     views, walls, within,
 };
 use map::segments::LaserSegment;
-use sqlx::{Row, sqlite::SqliteRow};
 use std::{collections::BTreeMap, sync::Arc};
 use vision::geometry::Corners;
 
 statements! {
     MOVE = "INSERT INTO views (landmark_id, image_sha256, image_kind, width_px, height_px, corners_px, icon_side, \
-            icon, icon_scale, created_ms, capture) SELECT ?3, image_sha256, image_kind, width_px, height_px, corners_px, \
+            icon, icon_scale, created_ms, capture) SELECT $3, image_sha256, image_kind, width_px, height_px, corners_px, \
             icon_side, icon, icon_scale, created_ms, capture FROM track_views \
-            WHERE gathering_id = ?1 AND track = ?2 ORDER BY id ON CONFLICT DO NOTHING";
-    COUNT = "SELECT count(*) FROM views WHERE landmark_id = ?1";
-    HELD = "SELECT image_sha256, corners_px, capture FROM views WHERE landmark_id = ?1 ORDER BY id";
-    DROP_VIEWS = "DELETE FROM track_views WHERE gathering_id = ?1 AND track = ?2";
-    DROP_VIEW = "DELETE FROM track_views WHERE id = ?1";
-    ACCEPTED = "UPDATE tracks SET state = 'accepted', landmark_id = ?3 WHERE gathering_id = ?1 AND number = ?2";
+            WHERE gathering_id = $1 AND track = $2 ORDER BY id ON CONFLICT DO NOTHING";
+    COUNT = "SELECT count(*) FROM views WHERE landmark_id = $1";
+    HELD = "SELECT image_sha256, corners_px, capture FROM views WHERE landmark_id = $1 ORDER BY id";
+    DROP_VIEWS = "DELETE FROM track_views WHERE gathering_id = $1 AND track = $2";
+    DROP_VIEW = "DELETE FROM track_views WHERE id = $1";
+    ACCEPTED = "UPDATE tracks SET state = 'accepted', landmark_id = $3 WHERE gathering_id = $1 AND number = $2";
 }
 
 /// A track that is accepted, and under which name.
@@ -162,9 +161,9 @@ async fn prepare(store: &Store, decision: &Decision) -> Result<Prepared, StoreEr
 
 /// The stored views of a landmark, oldest first.
 async fn held(store: &Store, landmark: i64) -> Result<Vec<PlacementView>, StoreError> {
-    let rows = sqlx::query(HELD).bind(landmark).fetch_all(store.reads()).await;
+    let rows = db::query(HELD).bind(landmark).fetch_all(store.reads()).await;
     let rows = rows.map_err(StoreError::during("read views"))?;
-    let view = |row: &SqliteRow| {
+    let view = |row: &db::Row| {
         let capture = row.try_get("capture").map_err(StoreError::during("read views"))?;
         Ok(PlacementView { image_sha256: views::digest_of(row)?, corners: views::corners_in(row)?, capture })
     };
@@ -224,16 +223,16 @@ async fn write(tx: &mut Tx, decision: &Decision, prepared: Prepared) -> Result<A
     for chosen in tracks {
         let (name, landmark) = landmark_of(tx, (map, id), chosen, &taken, limits.landmarks).await?;
         for view in prepared.tracks.get(&chosen.number).iter().flat_map(|(_, left_out)| left_out) {
-            let dropped = sqlx::query(DROP_VIEW).bind(view).execute(&mut tx.conn).await;
+            let dropped = db::query(DROP_VIEW).bind(view).execute(&mut tx.conn).await;
             dropped.map_err(StoreError::during("leave out view"))?;
         }
-        let moved = sqlx::query(MOVE).bind(id).bind(chosen.number).bind(landmark).execute(&mut tx.conn).await;
+        let moved = db::query(MOVE).bind(id).bind(chosen.number).bind(landmark).execute(&mut tx.conn).await;
         let moved = moved.map_err(StoreError::during("accept views"))?.rows_affected();
-        let count = sqlx::query_scalar(COUNT).bind(landmark).fetch_one(&mut tx.conn).await;
+        let count = db::query_scalar(COUNT).bind(landmark).fetch_one(&mut tx.conn).await;
         within(count.map_err(StoreError::during("count views"))?, limits.views, "views of a landmark")?;
-        let dropped = sqlx::query(DROP_VIEWS).bind(id).bind(chosen.number).execute(&mut tx.conn).await;
+        let dropped = db::query(DROP_VIEWS).bind(id).bind(chosen.number).execute(&mut tx.conn).await;
         dropped.map_err(StoreError::during("accept track"))?;
-        let decided = sqlx::query(ACCEPTED).bind(id).bind(chosen.number).bind(landmark);
+        let decided = db::query(ACCEPTED).bind(id).bind(chosen.number).bind(landmark);
         decided.execute(&mut tx.conn).await.map_err(StoreError::during("accept track"))?;
         taken.entry(name).or_insert((landmark, 0)).1 += moved;
     }

@@ -2,23 +2,23 @@
 
 use super::{
     StoreError, Tx,
+    db::{self, Executor},
     kind::Kind,
     maps, now_ms,
     pictures::{self, Digest},
     statements::statements,
     views,
 };
-use sqlx::{Row, SqliteExecutor};
 
 statements! {
     PUT = "INSERT INTO underlays (map_id, image_sha256, image_kind, width_px, height_px, metres_per_pixel, x_m, y_m, \
-           theta_rad, created_ms) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10) ON CONFLICT (map_id) DO UPDATE SET \
+           theta_rad, created_ms) VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10) ON CONFLICT (map_id) DO UPDATE SET \
            image_sha256 = excluded.image_sha256, image_kind = excluded.image_kind, width_px = excluded.width_px, \
            height_px = excluded.height_px, metres_per_pixel = excluded.metres_per_pixel, x_m = excluded.x_m, \
            y_m = excluded.y_m, theta_rad = excluded.theta_rad, created_ms = excluded.created_ms";
     GET = "SELECT image_sha256, image_kind, width_px, height_px, metres_per_pixel, x_m, y_m, theta_rad, created_ms FROM underlays \
-           WHERE map_id = ?1";
-    DELETE = "DELETE FROM underlays WHERE map_id = ?1";
+           WHERE map_id = $1";
+    DELETE = "DELETE FROM underlays WHERE map_id = $1";
 }
 
 /// An underlay without its picture.
@@ -58,7 +58,7 @@ pub(crate) async fn put(
 /// Stores the row of an underlay whose picture is there.
 pub(super) async fn insert(tx: &mut Tx, map: i64, row: &UnderlayRow) -> Result<(), StoreError> {
     let ([width_px, height_px], [x_m, y_m, theta_rad]) = (row.size_px, row.map_from_picture);
-    let done = sqlx::query(PUT)
+    let done = db::query(PUT)
         .bind(map)
         .bind(&row.image_sha256[..])
         .bind(&row.image_kind)
@@ -75,12 +75,9 @@ pub(super) async fn insert(tx: &mut Tx, map: i64, row: &UnderlayRow) -> Result<(
 }
 
 /// The underlay of a map.
-pub(crate) async fn get(
-    db: impl SqliteExecutor<'_>,
-    (map, name): (i64, &str),
-) -> Result<UnderlayRow, StoreError> {
+pub(crate) async fn get(db: impl Executor<'_>, (map, name): (i64, &str)) -> Result<UnderlayRow, StoreError> {
     let at = || StoreError::during("read underlay");
-    let row = sqlx::query(GET).bind(map).fetch_optional(db).await.map_err(at())?;
+    let row = db::query(GET).bind(map).fetch_optional(db).await.map_err(at())?;
     let row = row.ok_or_else(|| none_of(name))?;
     let image_sha256 = views::digest_of(&row)?;
     let read = || {
@@ -99,7 +96,7 @@ pub(crate) async fn get(
 /// Deletes the underlay of a map.
 pub(crate) async fn delete(tx: &mut Tx, map: &str) -> Result<(), StoreError> {
     let map = maps::get(&mut tx.conn, map).await?;
-    let done = sqlx::query(DELETE).bind(map.id).execute(&mut tx.conn).await;
+    let done = db::query(DELETE).bind(map.id).execute(&mut tx.conn).await;
     if done.map_err(StoreError::during("delete underlay"))?.rows_affected() == 0 {
         return Err(none_of(&map.name));
     }

@@ -3,43 +3,45 @@
 
 use super::{
     StoreError, Tx,
+    db::{self, Executor, Row},
     kind::Kind,
     landmarks, now_ms,
     pictures::{self, Digest},
     statements::statements,
     within,
 };
-use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
 use vision::{geometry::Corners, icon::Icon, model::LandmarkId};
 
 statements! {
-    COUNT = "SELECT count(*) FROM views WHERE landmark_id = ?1";
+    COUNT = "SELECT count(*) FROM views WHERE landmark_id = $1";
     SAME = "SELECT id, image_kind, width_px, height_px, corners_px, created_ms FROM views \
-            WHERE landmark_id = ?1 AND image_sha256 = ?2 AND corners_px = ?3";
+            WHERE landmark_id = $1 AND image_sha256 = $2 AND corners_px = $3";
     INSERT = "INSERT INTO views (landmark_id, image_sha256, image_kind, width_px, height_px, corners_px, \
               icon_side, icon, icon_scale, created_ms, capture) \
-              VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11) \
+              VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11) \
               RETURNING id";
     PAGE = "SELECT id, image_kind, width_px, height_px, corners_px, created_ms FROM views \
-            WHERE landmark_id = ?1 AND id > ?2 AND id < ?3 AND (?4 IS NULL OR (capture IS NOT NULL) = ?4) \
-            AND (?5 IS NULL OR created_ms >= ?5) AND (?6 IS NULL OR created_ms < ?6) \
-            ORDER BY CASE WHEN ?7 THEN -id ELSE id END LIMIT ?8";
-    COUNT_FILTERED = "SELECT count(*) FROM views WHERE landmark_id = ?1 AND (?2 IS NULL OR (capture IS NOT NULL) = ?2) \
-                      AND (?3 IS NULL OR created_ms >= ?3) AND (?4 IS NULL OR created_ms < ?4)";
+            WHERE landmark_id = $1 AND id > $2 AND id < $3 AND (CAST($4 AS BIGINT) IS NULL OR (capture IS NOT NULL) = ($4 = 1)) \
+            AND (CAST($5 AS BIGINT) IS NULL OR created_ms >= $5) \
+            AND (CAST($6 AS BIGINT) IS NULL OR created_ms < $6) ORDER BY CASE WHEN $7 = 1 THEN -id ELSE id END LIMIT $8";
+    COUNT_FILTERED = "SELECT count(*) FROM views WHERE landmark_id = $1 \
+                      AND (CAST($2 AS BIGINT) IS NULL OR (capture IS NOT NULL) = ($2 = 1)) \
+                      AND (CAST($3 AS BIGINT) IS NULL OR created_ms >= $3) \
+                      AND (CAST($4 AS BIGINT) IS NULL OR created_ms < $4)";
     ICON = "SELECT v.icon_side, v.icon, v.icon_scale FROM views v JOIN landmarks l ON l.id = v.landmark_id \
-            JOIN maps m ON m.id = l.map_id WHERE m.name = ?1 AND l.name = ?2 AND v.id = ?3";
-    DELETE = "DELETE FROM views WHERE id = ?1 AND landmark_id = ?2";
-    GET = "SELECT id, image_kind, width_px, height_px, corners_px, created_ms FROM views WHERE id = ?1";
-    CROPS = "SELECT id, corners_px, icon_side, icon, icon_scale FROM views WHERE landmark_id = ?1 ORDER BY id";
+            JOIN maps m ON m.id = l.map_id WHERE m.name = $1 AND l.name = $2 AND v.id = $3";
+    DELETE = "DELETE FROM views WHERE id = $1 AND landmark_id = $2";
+    GET = "SELECT id, image_kind, width_px, height_px, corners_px, created_ms FROM views WHERE id = $1";
+    CROPS = "SELECT id, corners_px, icon_side, icon, icon_scale FROM views WHERE landmark_id = $1 ORDER BY id";
     OF_MAP = "SELECT v.id, v.landmark_id, v.image_sha256, v.width_px, v.height_px, v.corners_px, v.icon_side, v.icon, \
-              v.icon_scale FROM views v JOIN landmarks l ON l.id = v.landmark_id WHERE l.map_id = ?1 ORDER BY v.id";
+              v.icon_scale FROM views v JOIN landmarks l ON l.id = v.landmark_id WHERE l.map_id = $1 ORDER BY v.id";
     PICTURE = "SELECT v.image_sha256, v.image_kind FROM views v JOIN landmarks l ON l.id = v.landmark_id \
-               JOIN maps m ON m.id = l.map_id WHERE m.name = ?1 AND l.name = ?2 AND v.id = ?3";
-    COUNT_DISTRACTORS = "SELECT count(*) FROM strangers WHERE map_id = ?1";
+               JOIN maps m ON m.id = l.map_id WHERE m.name = $1 AND l.name = $2 AND v.id = $3";
+    COUNT_DISTRACTORS = "SELECT count(*) FROM strangers WHERE map_id = $1";
     INSERT_DISTRACTOR = "INSERT INTO strangers (map_id, image_sha256, corners_px, icon_side, icon, icon_scale) \
-                       VALUES (?1, ?2, ?3, ?4, ?5, ?6) ON CONFLICT DO NOTHING";
+                       VALUES ($1, $2, $3, $4, $5, $6) ON CONFLICT DO NOTHING";
     DISTRACTORS = "SELECT image_sha256, corners_px, icon_side, icon, icon_scale FROM strangers \
-                 WHERE map_id = ?1 ORDER BY id";
+                 WHERE map_id = $1 ORDER BY id";
 }
 
 /// Distractors of one map; further ones are not stored.
@@ -112,17 +114,17 @@ fn damaged(what: &str) -> impl Fn(String) -> StoreError {
 }
 
 /// The corners of a view.
-pub(super) fn corners_in(row: &SqliteRow) -> Result<Corners, StoreError> {
+pub(super) fn corners_in(row: &Row) -> Result<Corners, StoreError> {
     let bytes: &[u8] = row.try_get("corners_px").map_err(StoreError::during("read corners"))?;
     let corners = corners_of(bytes).ok_or_else(|| damaged("corners")("not four points".into()))?;
     Corners::try_from(corners).map_err(|e| damaged("corners")(e.to_string()))
 }
 
-pub(super) fn crop_of(row: &SqliteRow) -> Result<QuadCrop, StoreError> {
+pub(super) fn crop_of(row: &Row) -> Result<QuadCrop, StoreError> {
     Ok(QuadCrop { corners_px: corners_in(row)?, icon: icon_of(row)? })
 }
 
-fn icon_of(row: &SqliteRow) -> Result<Icon, StoreError> {
+fn icon_of(row: &Row) -> Result<Icon, StoreError> {
     let at = || StoreError::during("read icon");
     let side: i64 = row.try_get("icon_side").map_err(at())?;
     let bytes: &[u8] = row.try_get("icon").map_err(at())?;
@@ -131,12 +133,12 @@ fn icon_of(row: &SqliteRow) -> Result<Icon, StoreError> {
     Icon::new(side as usize, pixels, scale).map_err(|e| damaged("icon")(e.to_string()))
 }
 
-pub(super) fn digest_of(row: &SqliteRow) -> Result<Digest, StoreError> {
+pub(super) fn digest_of(row: &Row) -> Result<Digest, StoreError> {
     let bytes: &[u8] = row.try_get("image_sha256").map_err(StoreError::during("read digest"))?;
     bytes.try_into().map_err(|_length| damaged("digest")("not 32 bytes".into()))
 }
 
-fn view_row(row: &SqliteRow) -> Result<ViewRow, StoreError> {
+fn view_row(row: &Row) -> Result<ViewRow, StoreError> {
     let at = || StoreError::during("read view");
     let corners: &[u8] = row.try_get("corners_px").map_err(at())?;
     Ok(ViewRow {
@@ -162,27 +164,22 @@ pub(crate) enum UploadOutcome {
 /// The view of a landmark that shows the same quad of the same picture.
 pub(super) async fn same(tx: &mut Tx, landmark: i64, new: &NewView) -> Result<Option<ViewRow>, StoreError> {
     let corners = corners_bytes(&new.crop.corners_px);
-    let same = sqlx::query(SAME).bind(landmark).bind(&new.image_sha256[..]).bind(&corners);
+    let same = db::query(SAME).bind(landmark).bind(&new.image_sha256[..]).bind(&corners);
     let row = same.fetch_optional(&mut tx.conn).await.map_err(StoreError::during("look for view"))?;
     row.as_ref().map(view_row).transpose()
 }
 
 /// One view.
-pub(super) async fn get(db: impl SqliteExecutor<'_>, view: i64) -> Result<ViewRow, StoreError> {
-    let row =
-        sqlx::query(GET).bind(view).fetch_optional(db).await.map_err(StoreError::during("read view"))?;
+pub(super) async fn get(db: impl Executor<'_>, view: i64) -> Result<ViewRow, StoreError> {
+    let row = db::query(GET).bind(view).fetch_optional(db).await.map_err(StoreError::during("read view"))?;
     view_row(&row.ok_or_else(|| StoreError::NotFound { what: Kind::View, name: view.to_string() })?)
 }
 
 /// The crops of a landmark's views, by number.
-pub(super) async fn crops(
-    db: impl SqliteExecutor<'_>,
-    landmark: i64,
-) -> Result<Vec<(i64, QuadCrop)>, StoreError> {
-    let rows = sqlx::query(CROPS).bind(landmark).fetch_all(db).await;
+pub(super) async fn crops(db: impl Executor<'_>, landmark: i64) -> Result<Vec<(i64, QuadCrop)>, StoreError> {
+    let rows = db::query(CROPS).bind(landmark).fetch_all(db).await;
     let rows = rows.map_err(StoreError::during("read views"))?;
-    let crop =
-        |row: &SqliteRow| Ok((row.try_get("id").map_err(StoreError::during("read views"))?, crop_of(row)?));
+    let crop = |row: &Row| Ok((row.try_get("id").map_err(StoreError::during("read views"))?, crop_of(row)?));
     rows.iter().map(crop).collect()
 }
 
@@ -196,7 +193,7 @@ pub(super) async fn add(
     pictures::put(tx, &new.image_sha256, &new.image).await?;
     let corners = corners_bytes(&new.crop.corners_px);
     let created_ms = now_ms();
-    let id = sqlx::query_scalar(INSERT)
+    let id = db::query_scalar(INSERT)
         .bind(landmark)
         .bind(&new.image_sha256[..])
         .bind(new.image_kind)
@@ -211,7 +208,7 @@ pub(super) async fn add(
         .fetch_one(&mut tx.conn)
         .await
         .map_err(StoreError::during("store view"))?;
-    let count = sqlx::query_scalar(COUNT).bind(landmark).fetch_one(&mut tx.conn).await;
+    let count = db::query_scalar(COUNT).bind(landmark).fetch_one(&mut tx.conn).await;
     within(count.map_err(StoreError::during("count views"))?, max, "views of a landmark")?;
     add_distractors(tx, map, new).await?;
     Ok(ViewRow {
@@ -224,13 +221,13 @@ pub(super) async fn add(
 }
 
 async fn add_distractors(tx: &mut Tx, map_id: i64, new: &NewView) -> Result<(), StoreError> {
-    let count: i64 = sqlx::query_scalar(COUNT_DISTRACTORS)
+    let count: i64 = db::query_scalar(COUNT_DISTRACTORS)
         .bind(map_id)
         .fetch_one(&mut tx.conn)
         .await
         .map_err(StoreError::during("count distractors"))?;
     for distractor in new.distractors.iter().take(MAX_DISTRACTORS.saturating_sub(count as usize)) {
-        sqlx::query(INSERT_DISTRACTOR)
+        db::query(INSERT_DISTRACTOR)
             .bind(map_id)
             .bind(&new.image_sha256[..])
             .bind(corners_bytes(&distractor.corners_px))
@@ -257,14 +254,14 @@ pub(crate) struct ViewFilter {
 
 /// Views of a landmark after the one with the number `last`, in order or the newest first.
 pub(crate) async fn page(
-    db: impl SqliteExecutor<'_>,
+    db: impl Executor<'_>,
     landmark_id: i64,
     filter: ViewFilter,
     (last, newest_first): (Option<i64>, bool),
     limit: usize,
 ) -> Result<Vec<ViewRow>, StoreError> {
     let (above, below) = if newest_first { (None, last) } else { (last, None) };
-    let rows = sqlx::query(PAGE)
+    let rows = db::query(PAGE)
         .bind(landmark_id)
         .bind(above.unwrap_or(0))
         .bind(below.unwrap_or(i64::MAX))
@@ -279,11 +276,11 @@ pub(crate) async fn page(
 
 /// How many views a list has.
 pub(crate) async fn count(
-    db: impl SqliteExecutor<'_>,
+    db: impl Executor<'_>,
     landmark_id: i64,
     filter: ViewFilter,
 ) -> Result<u64, StoreError> {
-    let count = sqlx::query_scalar::<_, i64>(COUNT_FILTERED)
+    let count = db::query_scalar::<i64>(COUNT_FILTERED)
         .bind(landmark_id)
         .bind(filter.has_capture)
         .bind(filter.since_ms)
@@ -293,12 +290,12 @@ pub(crate) async fn count(
 
 /// The icon of a view.
 pub(crate) async fn icon(
-    db: impl SqliteExecutor<'_>,
+    db: impl Executor<'_>,
     map: &str,
     landmark: &str,
     view: i64,
 ) -> Result<Icon, StoreError> {
-    let row = sqlx::query(ICON).bind(map).bind(landmark).bind(view).fetch_optional(db).await;
+    let row = db::query(ICON).bind(map).bind(landmark).bind(view).fetch_optional(db).await;
     let row = row.map_err(StoreError::during("read icon"))?;
     icon_of(&row.ok_or_else(|| StoreError::NotFound { what: Kind::View, name: view.to_string() })?)
 }
@@ -306,7 +303,7 @@ pub(crate) async fn icon(
 /// Deletes a view. What was learnt from it stays until the landmark is learnt again.
 pub(crate) async fn delete(tx: &mut Tx, map: &str, landmark: &str, view: i64) -> Result<(), StoreError> {
     let landmark = landmarks::get(&mut tx.conn, map, landmark).await?;
-    let done = sqlx::query(DELETE).bind(view).bind(landmark.id).execute(&mut tx.conn).await;
+    let done = db::query(DELETE).bind(view).bind(landmark.id).execute(&mut tx.conn).await;
     match done.map_err(StoreError::during("delete view"))?.rows_affected() {
         0 => Err(StoreError::NotFound { what: Kind::View, name: view.to_string() }),
         _ => Ok(()),
@@ -314,13 +311,10 @@ pub(crate) async fn delete(tx: &mut Tx, map: &str, landmark: &str, view: i64) ->
 }
 
 /// Every view of a map, without pictures.
-pub(crate) async fn of_map(
-    db: impl SqliteExecutor<'_>,
-    map_id: i64,
-) -> Result<Vec<TrainingViewRow>, StoreError> {
+pub(crate) async fn of_map(db: impl Executor<'_>, map_id: i64) -> Result<Vec<TrainingViewRow>, StoreError> {
     let at = || StoreError::during("read views");
-    let rows = sqlx::query(OF_MAP).bind(map_id).fetch_all(db).await.map_err(at())?;
-    let view = |row: &SqliteRow| {
+    let rows = db::query(OF_MAP).bind(map_id).fetch_all(db).await.map_err(at())?;
+    let view = |row: &Row| {
         let pixels = |column: &str| row.try_get::<i64, _>(column).map(|s| s as usize).map_err(at());
         Ok(TrainingViewRow {
             view: row.try_get("id").map_err(at())?,
@@ -335,13 +329,13 @@ pub(crate) async fn of_map(
 
 /// Digest and kind (`png` or `jpeg`) of the picture of a view.
 pub(crate) async fn picture(
-    db: impl SqliteExecutor<'_>,
+    db: impl Executor<'_>,
     map: &str,
     landmark: &str,
     view: i64,
 ) -> Result<(Digest, String), StoreError> {
     let at = || StoreError::during("read view");
-    let row = sqlx::query(PICTURE).bind(map).bind(landmark).bind(view).fetch_optional(db).await;
+    let row = db::query(PICTURE).bind(map).bind(landmark).bind(view).fetch_optional(db).await;
     let row = row.map_err(at())?;
     let row = row.ok_or_else(|| StoreError::NotFound { what: Kind::View, name: view.to_string() })?;
     Ok((digest_of(&row)?, row.try_get("image_kind").map_err(at())?))
@@ -349,10 +343,10 @@ pub(crate) async fn picture(
 
 /// The distractors of a map, each with the digest of its picture.
 pub(crate) async fn distractors(
-    db: impl SqliteExecutor<'_>,
+    db: impl Executor<'_>,
     map_id: i64,
 ) -> Result<Vec<(Digest, QuadCrop)>, StoreError> {
-    let rows = sqlx::query(DISTRACTORS)
+    let rows = db::query(DISTRACTORS)
         .bind(map_id)
         .fetch_all(db)
         .await

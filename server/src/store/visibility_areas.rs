@@ -2,14 +2,17 @@
 //! again. In: digests of inputs, areas as bytes. Out: the bytes of the areas whose inputs are the
 //! same.
 
-use super::{Store, StoreError, statements::statements};
-use sqlx::{Row, SqlitePool};
+use super::{
+    Store, StoreError,
+    db::{self, Pool},
+    statements::statements,
+};
 use vision::model::LandmarkId;
 
 statements! {
-    GET = "SELECT area FROM visibility_areas WHERE landmark_id = ?1 AND inputs_sha256 = ?2";
-    PUT = "INSERT INTO visibility_areas (landmark_id, inputs_sha256, area) SELECT ?1, ?2, ?3 \
-           WHERE EXISTS (SELECT 1 FROM landmarks WHERE id = ?1) \
+    GET = "SELECT area FROM visibility_areas WHERE landmark_id = $1 AND inputs_sha256 = $2";
+    PUT = "INSERT INTO visibility_areas (landmark_id, inputs_sha256, area) SELECT $1, $2, $3 \
+           WHERE EXISTS (SELECT 1 FROM landmarks WHERE id = $1) \
            ON CONFLICT (landmark_id) DO UPDATE SET inputs_sha256 = excluded.inputs_sha256, area = excluded.area";
 }
 
@@ -30,14 +33,11 @@ pub(crate) struct StoredArea {
 }
 
 /// The areas of these landmarks that are stored for these inputs.
-pub(crate) async fn get(
-    db: &SqlitePool,
-    wanted: &[(LandmarkId, [u8; 32])],
-) -> Result<Vec<StoredArea>, StoreError> {
+pub(crate) async fn get(db: &Pool, wanted: &[(LandmarkId, [u8; 32])]) -> Result<Vec<StoredArea>, StoreError> {
     let at = || StoreError::during("read visibility areas");
     let (mut found, mut bytes) = (Vec::new(), 0);
     for (landmark, inputs) in wanted {
-        let row = sqlx::query(GET).bind(landmark.0 as i64).bind(inputs.as_slice()).fetch_optional(db).await;
+        let row = db::query(GET).bind(landmark.0 as i64).bind(inputs.as_slice()).fetch_optional(db).await;
         let Some(row) = row.map_err(at())? else { continue };
         let area: Vec<u8> = row.try_get("area").map_err(at())?;
         bytes += area.len();
@@ -60,7 +60,7 @@ pub(crate) async fn put(store: &Store, areas: Vec<StoredArea>) -> Result<(), Sto
         let write = store.write(move |tx| {
             Box::pin(async move {
                 for StoredArea { landmark, inputs, area } in batch {
-                    let put = sqlx::query(PUT).bind(landmark.0 as i64).bind(inputs.to_vec()).bind(area);
+                    let put = db::query(PUT).bind(landmark.0 as i64).bind(inputs.to_vec()).bind(area);
                     put.execute(&mut tx.conn).await.map_err(StoreError::during("store visibility areas"))?;
                 }
                 Ok(())

@@ -1,10 +1,10 @@
 //! Visibility settings: the camera and the limits that define "visible", one set for each map.
 
-use super::{StoreError, Tx, maps, statements::statements, text_revision};
+use super::{StoreError, Tx, db, maps, statements::statements, text_revision};
 use map::visibility::VisibilitySettings;
 
 statements! {
-    SET = "UPDATE maps SET sight = ?2 WHERE id = ?1";
+    SET = "UPDATE maps SET sight = $2 WHERE id = $1";
 }
 
 /// Sets the visibility settings of a map; the defaults are stored as NULL. The map gets a new
@@ -15,7 +15,7 @@ pub(crate) async fn set(tx: &mut Tx, map: &str, settings: &VisibilitySettings) -
     let text = (!is_default).then(|| serde_json::to_string(settings)).transpose();
     let text = text
         .map_err(|e| StoreError::Damaged { what: "visibility settings".to_owned(), reason: e.to_string() })?;
-    sqlx::query(SET)
+    db::query(SET)
         .bind(map.id)
         .bind(text)
         .execute(&mut tx.conn)

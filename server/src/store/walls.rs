@@ -1,17 +1,22 @@
 //! The walls of a map (laser segments in the map frame): replaced as a whole, read as a whole.
 
-use super::{StoreError, Tx, kind::Kind, maps, statements::statements};
+use super::{
+    StoreError, Tx,
+    db::{self, Executor, Row},
+    kind::Kind,
+    maps,
+    statements::statements,
+};
 use map::{check::OutOfRange, segments::LaserSegment};
 use nalgebra::{Matrix2, Point2};
-use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
 
 statements! {
-    CLEAR = "DELETE FROM laser_segments WHERE map_id = ?1";
+    CLEAR = "DELETE FROM laser_segments WHERE map_id = $1";
     INSERT = "INSERT INTO laser_segments (map_id, ordinal, ax_m, ay_m, bx_m, by_m, covariance) \
-              VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)";
-    WALLS = "UPDATE maps SET walls_version = walls_version + 1 WHERE id = ?1";
-    VERSION = "SELECT walls_version FROM maps WHERE id = ?1";
-    ALL_OF = "SELECT ax_m, ay_m, bx_m, by_m, covariance FROM laser_segments WHERE map_id = ?1 ORDER BY ordinal";
+              VALUES ($1, $2, $3, $4, $5, $6, $7)";
+    WALLS = "UPDATE maps SET walls_version = walls_version + 1 WHERE id = $1";
+    VERSION = "SELECT walls_version FROM maps WHERE id = $1";
+    ALL_OF = "SELECT ax_m, ay_m, bx_m, by_m, covariance FROM laser_segments WHERE map_id = $1 ORDER BY ordinal";
 }
 
 /// Ends of a wall: a.x, a.y, b.x, b.y (map frame, m), free side on the left.
@@ -49,7 +54,7 @@ impl StoredWall {
     }
 
     /// Of the columns `ax_m, ay_m, bx_m, by_m, covariance`.
-    pub(super) fn of(row: &SqliteRow) -> Result<Self, sqlx::Error> {
+    pub(super) fn of(row: &Row) -> Result<Self, db::Error> {
         let ends = [row.try_get("ax_m")?, row.try_get("ay_m")?, row.try_get("bx_m")?, row.try_get("by_m")?];
         let covariance = row.try_get::<Option<&[u8]>, _>("covariance")?.map(numbers).transpose()?;
         Ok(Self { ends, covariance })
@@ -61,11 +66,11 @@ fn bytes(covariance: &[f64; 3]) -> Vec<u8> {
     covariance.iter().flat_map(|v| v.to_le_bytes()).collect()
 }
 
-fn numbers(bytes: &[u8]) -> Result<[f64; 3], sqlx::Error> {
+fn numbers(bytes: &[u8]) -> Result<[f64; 3], db::Error> {
     let (numbers, rest) = bytes.as_chunks::<8>();
     match (numbers, rest) {
         (&[a, b, c], []) => Ok([a, b, c].map(f64::from_le_bytes)),
-        _ => Err(sqlx::Error::Decode("a covariance of a wall has 24 bytes".into())),
+        _ => Err(db::Error::Decode("a covariance of a wall has 24 bytes".into())),
     }
 }
 
@@ -76,10 +81,10 @@ pub(crate) async fn replace<W: Copy + Into<StoredWall>>(
     segments: &[W],
 ) -> Result<(), StoreError> {
     let map = maps::get(&mut tx.conn, map).await?;
-    sqlx::query(CLEAR).bind(map.id).execute(&mut tx.conn).await.map_err(StoreError::during("clear walls"))?;
+    db::query(CLEAR).bind(map.id).execute(&mut tx.conn).await.map_err(StoreError::during("clear walls"))?;
     for (ordinal, wall) in segments.iter().enumerate() {
         let StoredWall { ends: [ax, ay, bx, by], covariance } = (*wall).into();
-        sqlx::query(INSERT)
+        db::query(INSERT)
             .bind(map.id)
             .bind(ordinal as i64)
             .bind(ax)
@@ -91,21 +96,21 @@ pub(crate) async fn replace<W: Copy + Into<StoredWall>>(
             .await
             .map_err(StoreError::during("store wall"))?;
     }
-    sqlx::query(WALLS).bind(map.id).execute(&mut tx.conn).await.map_err(StoreError::during("count walls"))?;
+    db::query(WALLS).bind(map.id).execute(&mut tx.conn).await.map_err(StoreError::during("count walls"))?;
     maps::bump(tx, map.id).await
 }
 
 /// Version of a map's walls: it counts up with every replacement.
-pub(super) async fn version(db: impl SqliteExecutor<'_>, map_id: i64) -> Result<i64, StoreError> {
-    let version = sqlx::query_scalar(VERSION).bind(map_id).fetch_optional(db).await;
+pub(super) async fn version(db: impl Executor<'_>, map_id: i64) -> Result<i64, StoreError> {
+    let version = db::query_scalar(VERSION).bind(map_id).fetch_optional(db).await;
     let version = version.map_err(StoreError::during("read the version of walls"))?;
     version.ok_or_else(|| StoreError::NotFound { what: Kind::Map, name: map_id.to_string() })
 }
 
 /// The walls of a map, in the order they were given.
-pub(crate) async fn all_of(db: impl SqliteExecutor<'_>, map_id: i64) -> Result<Vec<StoredWall>, StoreError> {
+pub(crate) async fn all_of(db: impl Executor<'_>, map_id: i64) -> Result<Vec<StoredWall>, StoreError> {
     let rows =
-        sqlx::query(ALL_OF).bind(map_id).fetch_all(db).await.map_err(StoreError::during("read walls"))?;
+        db::query(ALL_OF).bind(map_id).fetch_all(db).await.map_err(StoreError::during("read walls"))?;
     rows.iter().map(StoredWall::of).collect::<Result<_, _>>().map_err(StoreError::during("read walls"))
 }
 

@@ -14,12 +14,13 @@
 use super::{
     actor::Actor,
     audit,
-    checkpoint::{empty_log, move_long_log},
+    db::{self, Conn},
     error::StoreError,
     history::{self, Author, HistoryLimits},
     kept_answers::IdempotencyRecord,
     note_head,
     on_commit::{CommittedChange, OnCommit},
+    sqlite::checkpoint::{empty_log, move_long_log},
 };
 use engine::{
     heartbeats::Heartbeat,
@@ -27,7 +28,6 @@ use engine::{
     vitals::{Pulse, Vitals},
 };
 use futures::{FutureExt, future::BoxFuture};
-use sqlx::SqliteConnection;
 use std::{
     any::Any,
     panic::AssertUnwindSafe,
@@ -44,7 +44,7 @@ type PostCommit = Box<dyn FnOnce() + Send>;
 /// An open transaction and what it will make visible.
 pub(crate) struct Tx {
     /// The writer's connection, inside a transaction.
-    pub(super) conn: SqliteConnection,
+    pub(super) conn: Conn,
     /// In whose name it writes.
     pub(super) author: Author,
     pub(super) history: HistoryLimits,
@@ -61,7 +61,7 @@ impl std::fmt::Debug for Tx {
 impl Tx {
     /// The connection, for tests that damage what is stored.
     #[cfg(test)]
-    pub(crate) fn conn(&mut self) -> &mut SqliteConnection {
+    pub(crate) fn conn(&mut self) -> &mut Conn {
         &mut self.conn
     }
 
@@ -200,7 +200,7 @@ pub(crate) const PART: &str = "the writer of the store";
 
 impl Writer {
     pub(super) fn new(
-        conn: SqliteConnection,
+        conn: Conn,
         commands: mpsc::Receiver<Command>,
         history: HistoryLimits,
         (on_commit, vitals, jobs, commits): (Arc<dyn OnCommit>, Arc<Vitals>, Arc<Notify>, Arc<AtomicU64>),
@@ -240,11 +240,11 @@ impl Writer {
         if let Err(error) = note_head(&mut self.tx.conn, "stop").await {
             tracing::warn!(%error, "audit_head_not_read");
         }
-        let emptied = empty_log(&mut self.tx.conn).await.map_err(|error| error.to_string());
+        let emptied = empty_log(self.tx.conn.sqlite()).await.map_err(|error| error.to_string());
         if let Err(error) = emptied.and_then(|is_empty| is_empty.then_some(()).ok_or(READ.to_owned())) {
             tracing::warn!(%error, follows = "the write-ahead log holds data: copy it with the file", "checkpoint_failed");
         }
-        if let Err(error) = sqlx::Connection::close(self.tx.conn).await {
+        if let Err(error) = self.tx.conn.close().await {
             tracing::warn!(%error, "store_close_failed");
         }
     }
@@ -321,7 +321,7 @@ impl Writer {
     /// here, too: the log would grow without an end, and the sync that has failed cannot be
     /// repeated.
     async fn move_log(&mut self) -> Result<(), StoreError> {
-        match move_long_log(&mut self.tx.conn, self.log_pages).await {
+        match move_long_log(self.tx.conn.sqlite(), self.log_pages).await {
             Err(error) if error.is_fatal() => Err(error),
             Err(error) => {
                 tracing::warn!(%error, follows = "the log grows; the next commit tries again", "log_not_moved");
@@ -348,15 +348,15 @@ impl Writer {
     }
 
     async fn execute(&mut self, sql: &'static str, operation: &'static str) -> Result<(), StoreError> {
-        sqlx::raw_sql(sql).execute(&mut self.tx.conn).await.map_err(StoreError::during(operation))?;
+        db::raw_sql(sql).execute(&mut self.tx.conn).await.map_err(StoreError::during(operation))?;
         Ok(())
     }
 }
 
 /// Has a long statement beat: it is at work, and not stuck.
-async fn beat_with(conn: &mut SqliteConnection, heart: &Arc<Heartbeat>) -> Result<(), StoreError> {
+async fn beat_with(conn: &mut Conn, heart: &Arc<Heartbeat>) -> Result<(), StoreError> {
     let heart = heart.clone();
-    let mut handle = conn.lock_handle().await.map_err(StoreError::during("watch"))?;
+    let mut handle = conn.sqlite().lock_handle().await.map_err(StoreError::during("watch"))?;
     handle.set_progress_handler(STEPS_A_BEAT, move || {
         heart.beat();
         true

@@ -28,10 +28,10 @@ pub(super) const FIRST_POSTER: u64 = 40_000;
 /// The server's database in its data directory.
 const DATABASE: &str = "waymark.sqlite";
 const LANDMARK: &str = "INSERT INTO landmarks (id, map_id, name, width_m, height_m, x_m, y_m, z_m, theta_rad, created_ms) \
-                        SELECT ?1, id, ?3, 0.6, 0.84, ?4, ?5, ?6, ?7, 0 FROM maps WHERE name = ?2";
-const MODEL_BYTES: &str = "INSERT INTO model_contents (sha256, bytes) VALUES (?1, ?2)";
+                        SELECT $1, id, $3, 0.6, 0.84, $4, $5, $6, $7, 0 FROM maps WHERE name = $2";
+const MODEL_BYTES: &str = "INSERT INTO model_contents (sha256, bytes) VALUES ($1, $2)";
 const MODEL: &str = "INSERT INTO models (landmark_id, sha256, params_hash, active, reasons, facts, views, generated_views, \
-                     learnt_ms) VALUES (?1, ?2, ?3, 1, '[]', '{}', 3, 0, 0)";
+                     learnt_ms) VALUES ($1, $2, $3, 1, '[]', '{}', 3, 0, 0)";
 /// Distance of landmarks along their wall, and of one wall from the next, metres.
 const SPACING_M: f64 = 2.0;
 const ROW_M: f64 = 4.0;

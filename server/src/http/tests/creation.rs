@@ -6,6 +6,7 @@ use super::{
     *,
 };
 use crate::http::creation::CREATIONS;
+use crate::store::db;
 use axum::http::HeaderMap;
 use serde_json::json;
 use std::collections::BTreeMap;
@@ -36,7 +37,7 @@ impl Service {
             ("robot_certificates", "SELECT count(*) FROM robot_certificates"),
             ("kept_answers", "SELECT count(*) FROM kept_answers"),
         ] {
-            rows.insert(table, sqlx::query_scalar(count).fetch_one(self.store.reads()).await.unwrap());
+            rows.insert(table, db::query_scalar(count).fetch_one(self.store.reads()).await.unwrap());
         }
         rows
     }

@@ -4,6 +4,7 @@
 
 use super::{openapi::prepared, *};
 use crate::http::router::parts;
+use crate::store::db;
 use serde_json::json;
 use std::collections::BTreeSet;
 
@@ -84,14 +85,14 @@ fn marked(example: &Value, at: &[String]) -> Option<Value> {
 /// Rows of every table.
 async fn rows(service: &Service) -> Vec<(String, i64)> {
     let names: Vec<String> =
-        sqlx::query_scalar("SELECT name FROM sqlite_master WHERE type = 'table' ORDER BY name")
+        db::query_scalar("SELECT name FROM sqlite_master WHERE type = 'table' ORDER BY name")
             .fetch_all(service.store.reads())
             .await
             .unwrap();
     let mut all = Vec::new();
     for name in names {
-        let sql = sqlx::AssertSqlSafe(format!("SELECT count(*) FROM \"{name}\""));
-        all.push((name, sqlx::query_scalar(sql).fetch_one(service.store.reads()).await.unwrap()));
+        let sql = db::AssertSqlSafe(format!("SELECT count(*) FROM \"{name}\""));
+        all.push((name, db::query_scalar(sql).fetch_one(service.store.reads()).await.unwrap()));
     }
     all
 }

@@ -6,7 +6,7 @@ use super::{
     *,
 };
 use crate::store::{
-    pictures,
+    db, pictures,
     underlays::{self, UnderlayRow},
 };
 use protos::api::Role;
@@ -52,7 +52,7 @@ async fn broken() -> Service {
         "INSERT INTO damaged_pictures (sha256, reason, found_ms) SELECT sha256, 'planted', 0 FROM pictures";
     let damaged = store.write(move |tx| {
         Box::pin(async move {
-            sqlx::raw_sql(damage).execute(tx.conn()).await.map_err(StoreError::during("damage")).map(drop)
+            db::raw_sql(damage).execute(tx.conn()).await.map_err(StoreError::during("damage")).map(drop)
         })
     });
     damaged.await.unwrap();
@@ -154,7 +154,7 @@ async fn a_part_that_has_ended_makes_the_server_not_ready() {
 async fn a_writer_that_has_ended_makes_the_server_not_ready() {
     let service = Service::start(Limits::default()).await;
     let fatal = service.store.write(|_| {
-        let source = sqlx::Error::WorkerCrashed;
+        let source = db::Error::WorkerCrashed;
         Box::pin(async move { Err::<(), _>(StoreError::Database { operation: "planted", source }) })
     });
     assert!(fatal.await.is_err());

@@ -1,7 +1,7 @@
 //! Photographs that were not taken for a landmark: kept with the reason, shown, bounded.
 
 use super::{teaching::blocks, *};
-use crate::store::{StoreError, refused_views::MAX_REFUSED};
+use crate::store::{StoreError, db, refused_views::MAX_REFUSED};
 use engine::picture;
 use serde_json::json;
 
@@ -72,7 +72,7 @@ async fn a_photograph_that_a_lesson_cannot_read_is_shown_until_the_next_one_can(
     let write = service.store.write(|tx| {
         Box::pin(async move {
             let sql = "UPDATE pictures SET bytes = x'00'";
-            sqlx::raw_sql(sql).execute(tx.conn()).await.map(drop).map_err(StoreError::during("damage"))
+            db::raw_sql(sql).execute(tx.conn()).await.map(drop).map_err(StoreError::during("damage"))
         })
     });
     write.await.unwrap();

@@ -1,3 +1,4 @@
+use crate::store::db;
 use crate::{
     config::{Config, RawConfig},
     jobs::{Jobs, request::Request},
@@ -237,7 +238,7 @@ async fn stored_models(school: &School) -> Vec<String> {
     let sql = "SELECT quote(m.landmark_id) || quote(m.sha256) || quote(m.params_hash) || m.active || m.reasons || m.facts || \
                m.views || m.generated_views || m.learnt_ms || quote(m.looks_like) || quote(c.bytes) FROM models m \
                JOIN model_contents c ON c.sha256 = m.sha256 ORDER BY m.landmark_id";
-    sqlx::query_scalar(sql).fetch_all(school.store.reads()).await.unwrap()
+    db::query_scalar(sql).fetch_all(school.store.reads()).await.unwrap()
 }
 
 #[tokio::test]

@@ -1,7 +1,7 @@
 //! Derived data: when it is there, and what is computed.
 
 use super::super::{tests::config, *};
-use crate::store::{StoreError, landmarks, maps, walls};
+use crate::store::{StoreError, db, landmarks, maps, walls};
 use engine::snapshot::MapSnapshot;
 use vision::recognise::DistanceKind;
 
@@ -139,7 +139,7 @@ async fn visibility_areas_that_fail_are_absent_until_the_next_version() {
 
 /// Landmarks with their stored areas.
 async fn stored_areas(store: &Catalogue) -> Vec<(i64, Vec<u8>)> {
-    sqlx::query_as("SELECT landmark_id, area FROM visibility_areas ORDER BY landmark_id")
+    db::query_as("SELECT landmark_id, area FROM visibility_areas ORDER BY landmark_id")
         .fetch_all(store.reads())
         .await
         .unwrap()
@@ -194,7 +194,7 @@ async fn a_start_computes_no_area_again_and_an_edit_only_what_it_changed() {
         .write(|tx| {
             Box::pin(async move {
                 let damage = "UPDATE visibility_areas SET area = x'0102'";
-                sqlx::query(damage).execute(tx.conn()).await.map_err(StoreError::during("damage"))?;
+                db::query(damage).execute(tx.conn()).await.map_err(StoreError::during("damage"))?;
                 Ok(())
             })
         })

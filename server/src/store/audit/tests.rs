@@ -4,7 +4,6 @@ use crate::{
     publication::{Catalogue, CatalogueTasks},
     store::maps,
 };
-use sqlx::Executor as _;
 use vision::recognise::DistanceKind;
 
 async fn catalogue(data: &std::path::Path, audit_entries: usize) -> (Catalogue, CatalogueTasks) {
@@ -41,8 +40,8 @@ async fn tamper(store: &Catalogue, sql: &'static str) {
         "DROP TRIGGER IF EXISTS audit_is_not_changed; DROP TRIGGER IF EXISTS audit_is_not_removed";
     let write = store.write(move |tx| {
         Box::pin(async move {
-            tx.conn().execute(drop_guards).await.unwrap();
-            tx.conn().execute(sql).await.unwrap();
+            db::raw_sql(drop_guards).execute(tx.conn()).await.unwrap();
+            db::raw_sql(sql).execute(tx.conn()).await.unwrap();
             Ok(())
         })
     });
@@ -166,7 +165,7 @@ async fn the_database_refuses_to_change_or_remove_entries() {
     for sql in ["UPDATE audit SET actor = 'sam'", "DELETE FROM audit"] {
         let write = store.write(move |tx| {
             Box::pin(async move {
-                let refused = tx.conn().execute(sql).await.unwrap_err().to_string();
+                let refused = db::raw_sql(sql).execute(tx.conn()).await.unwrap_err().to_string();
                 assert!(refused.contains("audit log are not"), "{refused}");
                 Ok(())
             })

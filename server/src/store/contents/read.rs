@@ -6,6 +6,7 @@ use super::{
 };
 use crate::store::{
     StoreError,
+    db::{self, Conn, Row},
     landmarks::{self, ModelSummary, geometry_columns},
     map_locations, maps,
     maps::MapRow,
@@ -14,37 +15,33 @@ use crate::store::{
     underlays, views, walls, within,
 };
 use futures::TryStreamExt as _;
-use sqlx::{Row, SqliteConnection, sqlite::SqliteRow};
 use std::collections::BTreeMap;
 use vision::model::LandmarkId;
 
 statements! {
-    SETTINGS = "SELECT fusion, areas, sight FROM maps WHERE id = ?1";
+    SETTINGS = "SELECT fusion, areas, sight FROM maps WHERE id = $1";
     LANDMARKS = concat!("SELECT id, name, health, finding, learning, created_ms, ", geometry_columns!(""), " FROM landmarks \
-                WHERE map_id = ?1 ORDER BY id");
+                WHERE map_id = $1 ORDER BY id");
     VIEWS = "SELECT v.landmark_id, v.image_sha256, v.image_kind, v.width_px, v.height_px, v.corners_px, v.created_ms, \
              v.icon_side, v.icon_scale, v.capture, v.icon FROM views v JOIN landmarks l ON l.id = v.landmark_id \
-             WHERE l.map_id = ?1 ORDER BY v.id";
+             WHERE l.map_id = $1 ORDER BY v.id";
     MODELS = "SELECT m.landmark_id, m.params_hash, m.active, m.reasons, m.facts, m.views, m.generated_views, \
               m.learnt_ms, m.looks_like, c.bytes FROM models m \
-              JOIN model_contents c ON c.sha256 = m.sha256 JOIN landmarks l ON l.id = m.landmark_id WHERE l.map_id = ?1";
-    DISTRACTORS = "SELECT image_sha256, corners_px, icon_side, icon, icon_scale FROM strangers WHERE map_id = ?1 ORDER BY id";
-    RUNS = "SELECT robot, created_ms, way_m, cells FROM runs WHERE map_id = ?1 ORDER BY id";
+              JOIN model_contents c ON c.sha256 = m.sha256 JOIN landmarks l ON l.id = m.landmark_id WHERE l.map_id = $1";
+    DISTRACTORS = "SELECT image_sha256, corners_px, icon_side, icon, icon_scale FROM strangers WHERE map_id = $1 ORDER BY id";
+    RUNS = "SELECT robot, created_ms, way_m, cells FROM runs WHERE map_id = $1 ORDER BY id";
     BYTES = "SELECT (SELECT coalesce(sum(length(v.icon)), 0) FROM views v JOIN landmarks l ON l.id = v.landmark_id \
-             WHERE l.map_id = ?1) + (SELECT coalesce(sum(length(c.bytes)), 0) FROM models m \
-             JOIN model_contents c ON c.sha256 = m.sha256 JOIN landmarks l ON l.id = m.landmark_id WHERE l.map_id = ?1) \
-             + (SELECT coalesce(sum(length(icon)), 0) FROM strangers WHERE map_id = ?1) \
-             + (SELECT coalesce(sum(length(cells)), 0) FROM runs WHERE map_id = ?1)";
+             WHERE l.map_id = $1) + (SELECT coalesce(sum(length(c.bytes)), 0) FROM models m \
+             JOIN model_contents c ON c.sha256 = m.sha256 JOIN landmarks l ON l.id = m.landmark_id WHERE l.map_id = $1) \
+             + (SELECT coalesce(sum(length(icon)), 0) FROM strangers WHERE map_id = $1) \
+             + (SELECT coalesce(sum(length(cells)), 0) FROM runs WHERE map_id = $1)";
 }
 
 /// A map and its contents. The connection is inside of a transaction, so that all is of one state.
 /// Errors: `NotFound`; `Limit` beyond [`MAX_CONTENTS_BYTES`].
-pub(crate) async fn read(
-    conn: &mut SqliteConnection,
-    map: &str,
-) -> Result<(MapRow, MapContents), StoreError> {
+pub(crate) async fn read(conn: &mut Conn, map: &str) -> Result<(MapRow, MapContents), StoreError> {
     let row = maps::get(&mut *conn, map).await?;
-    let bytes: i64 = sqlx::query_scalar(BYTES)
+    let bytes: i64 = db::query_scalar(BYTES)
         .bind(row.id)
         .fetch_one(&mut *conn)
         .await
@@ -65,10 +62,10 @@ pub(crate) async fn read(
     Ok((row, contents))
 }
 
-async fn settings(conn: &mut SqliteConnection, map: &MapRow) -> Result<MapSettings, StoreError> {
+async fn settings(conn: &mut Conn, map: &MapRow) -> Result<MapSettings, StoreError> {
     let at = || StoreError::during("read the settings of a map");
     let location = map_locations::all(&mut *conn).await?.remove(&map.name).unwrap_or_default();
-    let row = sqlx::query(SETTINGS).bind(map.id).fetch_one(conn).await.map_err(at())?;
+    let row = db::query(SETTINGS).bind(map.id).fetch_one(conn).await.map_err(at())?;
     Ok(MapSettings {
         pipeline: map.pipeline,
         learning: map.learning.clone(),
@@ -79,16 +76,16 @@ async fn settings(conn: &mut SqliteConnection, map: &MapRow) -> Result<MapSettin
     })
 }
 
-async fn landmarks(conn: &mut SqliteConnection, map: i64) -> Result<Vec<LandmarkContents>, StoreError> {
+async fn landmarks(conn: &mut Conn, map: i64) -> Result<Vec<LandmarkContents>, StoreError> {
     let at = || StoreError::during("read the landmarks of a map");
     let mut all = BTreeMap::new();
-    let mut rows = sqlx::query(LANDMARKS).bind(map).fetch(&mut *conn);
+    let mut rows = db::query(LANDMARKS).bind(map).fetch(&mut *conn);
     while let Some(row) = rows.try_next().await.map_err(at())? {
         let (number, landmark) = landmark(&row).map_err(at())?;
         all.insert(number, landmark);
     }
     drop(rows);
-    let mut rows = sqlx::query(VIEWS).bind(map).fetch(&mut *conn);
+    let mut rows = db::query(VIEWS).bind(map).fetch(&mut *conn);
     while let Some(row) = rows.try_next().await.map_err(at())? {
         let of: i64 = row.try_get("landmark_id").map_err(at())?;
         let view = view(&row)?;
@@ -97,7 +94,7 @@ async fn landmarks(conn: &mut SqliteConnection, map: i64) -> Result<Vec<Landmark
         }
     }
     drop(rows);
-    let mut rows = sqlx::query(MODELS).bind(map).fetch(&mut *conn);
+    let mut rows = db::query(MODELS).bind(map).fetch(&mut *conn);
     while let Some(row) = rows.try_next().await.map_err(at())? {
         let of: i64 = row.try_get("landmark_id").map_err(at())?;
         let model = model(&row).map_err(at())?;
@@ -109,7 +106,7 @@ async fn landmarks(conn: &mut SqliteConnection, map: i64) -> Result<Vec<Landmark
     Ok(all.into_values().collect())
 }
 
-fn landmark(row: &SqliteRow) -> Result<(i64, LandmarkContents), sqlx::Error> {
+fn landmark(row: &Row) -> Result<(i64, LandmarkContents), db::Error> {
     let number: i64 = row.try_get("id")?;
     Ok((
         number,
@@ -127,7 +124,7 @@ fn landmark(row: &SqliteRow) -> Result<(i64, LandmarkContents), sqlx::Error> {
     ))
 }
 
-fn view(row: &SqliteRow) -> Result<ViewContents, StoreError> {
+fn view(row: &Row) -> Result<ViewContents, StoreError> {
     let at = || StoreError::during("read a view");
     Ok(ViewContents {
         crop: crop(row)?,
@@ -138,7 +135,7 @@ fn view(row: &SqliteRow) -> Result<ViewContents, StoreError> {
     })
 }
 
-fn crop(row: &SqliteRow) -> Result<CropContents, StoreError> {
+fn crop(row: &Row) -> Result<CropContents, StoreError> {
     let at = || StoreError::during("read an icon");
     Ok(CropContents {
         image_sha256: views::digest_of(row)?,
@@ -149,7 +146,7 @@ fn crop(row: &SqliteRow) -> Result<CropContents, StoreError> {
     })
 }
 
-fn model(row: &SqliteRow) -> Result<ModelContents, sqlx::Error> {
+fn model(row: &Row) -> Result<ModelContents, db::Error> {
     let params_hash: &[u8] = row.try_get("params_hash")?;
     Ok(ModelContents {
         bytes: row.try_get("bytes")?,
@@ -167,17 +164,17 @@ fn model(row: &SqliteRow) -> Result<ModelContents, sqlx::Error> {
     })
 }
 
-async fn distractors(conn: &mut SqliteConnection, map: i64) -> Result<Vec<DistractorContents>, StoreError> {
-    let rows = sqlx::query(DISTRACTORS).bind(map).fetch_all(conn).await;
+async fn distractors(conn: &mut Conn, map: i64) -> Result<Vec<DistractorContents>, StoreError> {
+    let rows = db::query(DISTRACTORS).bind(map).fetch_all(conn).await;
     let rows = rows.map_err(StoreError::during("read distractors"))?;
     rows.iter().map(|row| Ok(DistractorContents { crop: crop(row)? })).collect()
 }
 
-async fn reference_runs(conn: &mut SqliteConnection, map: i64) -> Result<Vec<RunContents>, StoreError> {
+async fn reference_runs(conn: &mut Conn, map: i64) -> Result<Vec<RunContents>, StoreError> {
     let at = || StoreError::during("read runs");
-    let rows = sqlx::query(RUNS).bind(map).fetch_all(conn).await.map_err(at())?;
-    let run = |row: &SqliteRow| {
-        Ok::<_, sqlx::Error>(RunContents {
+    let rows = db::query(RUNS).bind(map).fetch_all(conn).await.map_err(at())?;
+    let run = |row: &Row| {
+        Ok::<_, db::Error>(RunContents {
             robot: row.try_get("robot")?,
             created_ms: row.try_get("created_ms")?,
             way_m: row.try_get("way_m")?,

@@ -1,6 +1,7 @@
 //! A copy of a map has all that the map has, with numbers of its own.
 
 use super::*;
+use crate::store::db;
 use crate::{
     config::Limits,
     publication::{Catalogue, tests::config},
@@ -38,14 +39,14 @@ use vision::{
 
 /// Tables of a map, with what says whose row it is.
 const TABLES: [(&str, &str); 8] = [
-    ("maps", "id = ?1"),
-    ("landmarks", "map_id = ?1"),
-    ("views", "landmark_id IN (SELECT id FROM landmarks WHERE map_id = ?1)"),
-    ("models", "landmark_id IN (SELECT id FROM landmarks WHERE map_id = ?1)"),
-    ("strangers", "map_id = ?1"),
-    ("laser_segments", "map_id = ?1"),
-    ("runs", "map_id = ?1"),
-    ("underlays", "map_id = ?1"),
+    ("maps", "id = $1"),
+    ("landmarks", "map_id = $1"),
+    ("views", "landmark_id IN (SELECT id FROM landmarks WHERE map_id = $1)"),
+    ("models", "landmark_id IN (SELECT id FROM landmarks WHERE map_id = $1)"),
+    ("strangers", "map_id = $1"),
+    ("laser_segments", "map_id = $1"),
+    ("runs", "map_id = $1"),
+    ("underlays", "map_id = $1"),
 ];
 
 /// Columns that number rows or count changes, and the name; `sha256` of a model and what names
@@ -161,8 +162,8 @@ pub(crate) async fn filled(store: &Catalogue) {
 }
 
 async fn columns(store: &Catalogue, table: &str) -> Vec<(String, Option<String>)> {
-    let sql = "SELECT name, dflt_value FROM pragma_table_info(?1) ORDER BY cid";
-    sqlx::query_as(sql).bind(table).fetch_all(store.reads()).await.unwrap()
+    let sql = "SELECT name, dflt_value FROM pragma_table_info($1) ORDER BY cid";
+    db::query_as(sql).bind(table).fetch_all(store.reads()).await.unwrap()
 }
 
 /// The rows of a table that belong to a map, as text, to the last bit; without these columns.
@@ -179,7 +180,7 @@ pub(crate) async fn rows(
     let exact = exact.collect::<Vec<_>>().join(" || ',' || ");
     let sql = format!("SELECT {exact} FROM {table} WHERE {of} ORDER BY rowid");
     let sql = if table == "laser_segments" { sql.replace("rowid", "ordinal") } else { sql };
-    sqlx::query_scalar(sqlx::AssertSqlSafe(sql)).bind(map).fetch_all(store.reads()).await.unwrap()
+    db::query_scalar(db::AssertSqlSafe(sql)).bind(map).fetch_all(store.reads()).await.unwrap()
 }
 
 #[tokio::test]
@@ -202,7 +203,7 @@ async fn a_copy_has_every_column_of_the_map() {
             assert!(!is_unfilled, "{table}.{column}: fill it above, so that the copy of it is tested");
         }
     }
-    let history: i64 = sqlx::query_scalar("SELECT count(*) FROM commits WHERE map_id = ?1")
+    let history: i64 = db::query_scalar("SELECT count(*) FROM commits WHERE map_id = $1")
         .bind(b)
         .fetch_one(store.reads())
         .await
@@ -255,6 +256,6 @@ async fn a_copy_keeps_the_bounds_of_maps_and_the_pictures_of_a_deleted_one() {
     copy(&store, "a", "b", &default()).await.unwrap();
     store.write(|tx| Box::pin(maps::delete(tx, "a"))).await.unwrap();
     let pictures = "SELECT count(*) FROM pictures";
-    let count: i64 = sqlx::query_scalar(pictures).fetch_one(store.reads()).await.unwrap();
+    let count: i64 = db::query_scalar(pictures).fetch_one(store.reads()).await.unwrap();
     assert_eq!(count, 2, "the photograph and the floor plan");
 }

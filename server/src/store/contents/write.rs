@@ -4,6 +4,7 @@ use super::{
     CropContents, LandmarkContents, MapContents, MapSettings, ModelContents, RunContents, ViewContents,
     numbers::{self, Numbers},
 };
+use crate::store::db;
 use crate::{
     config::Limits,
     store::{
@@ -21,21 +22,21 @@ use crate::{
 use vision::model::LandmarkId;
 
 statements! {
-    SETTINGS = "UPDATE maps SET fusion = ?2, areas = ?3, sight = ?4, preset = ?5, distance = ?6, learning = ?7 WHERE id = ?1";
+    SETTINGS = "UPDATE maps SET fusion = $2, areas = $3, sight = $4, preset = $5, distance = $6, learning = $7 WHERE id = $1";
     LANDMARK = "INSERT INTO landmarks (map_id, name, created_ms, health, finding, learning) \
-                VALUES (?1, ?2, ?3, ?4, ?5, ?6) RETURNING id";
+                VALUES ($1, $2, $3, $4, $5, $6) RETURNING id";
     VIEW = "INSERT INTO views (landmark_id, image_sha256, image_kind, width_px, height_px, corners_px, created_ms, icon_side, \
-            icon_scale, capture, icon) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11)";
-    MODEL_BYTES = "INSERT INTO model_contents (sha256, bytes) VALUES (?1, ?2) ON CONFLICT (sha256) DO NOTHING";
+            icon_scale, capture, icon) VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11)";
+    MODEL_BYTES = "INSERT INTO model_contents (sha256, bytes) VALUES ($1, $2) ON CONFLICT (sha256) DO NOTHING";
     MODEL = "INSERT INTO models (landmark_id, sha256, params_hash, active, reasons, facts, views, generated_views, learnt_ms, \
-             looks_like) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10) \
+             looks_like) VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10) \
              ON CONFLICT (landmark_id) DO UPDATE SET sha256 = excluded.sha256, params_hash = excluded.params_hash, \
              active = excluded.active, reasons = excluded.reasons, facts = excluded.facts, views = excluded.views, \
              generated_views = excluded.generated_views, learnt_ms = excluded.learnt_ms, \
              looks_like = excluded.looks_like";
     DISTRACTOR = "INSERT INTO strangers (map_id, image_sha256, corners_px, icon_side, icon, icon_scale) \
-                  VALUES (?1, ?2, ?3, ?4, ?5, ?6) ON CONFLICT DO NOTHING";
-    RUN = "INSERT INTO runs (map_id, robot, created_ms, way_m, cells) VALUES (?1, ?2, ?3, ?4, ?5)";
+                  VALUES ($1, $2, $3, $4, $5, $6) ON CONFLICT DO NOTHING";
+    RUN = "INSERT INTO runs (map_id, robot, created_ms, way_m, cells) VALUES ($1, $2, $3, $4, $5)";
 }
 
 /// A map that was written.
@@ -105,7 +106,7 @@ pub(in crate::store) async fn settings(
     settings: &MapSettings,
 ) -> Result<(), StoreError> {
     let (preset, distance) = settings.pipeline.words();
-    let done = sqlx::query(SETTINGS)
+    let done = db::query(SETTINGS)
         .bind(map)
         .bind(modality_stats::mode_word(settings.fusion_mode))
         .bind(&settings.areas)
@@ -124,7 +125,7 @@ pub(in crate::store) async fn landmark(
     map: i64,
     new: &LandmarkContents,
 ) -> Result<LandmarkId, StoreError> {
-    let id: i64 = sqlx::query_scalar(LANDMARK)
+    let id: i64 = db::query_scalar(LANDMARK)
         .bind(map)
         .bind(&new.name)
         .bind(new.created_ms)
@@ -143,7 +144,7 @@ pub(in crate::store) async fn view(
     of: LandmarkId,
     new: &ViewContents,
 ) -> Result<(), StoreError> {
-    let done = sqlx::query(VIEW)
+    let done = db::query(VIEW)
         .bind(of.0 as i64)
         .bind(&new.crop.image_sha256[..])
         .bind(&new.image_kind)
@@ -168,9 +169,9 @@ pub(in crate::store) async fn model(
 ) -> Result<(), StoreError> {
     let at = || StoreError::during("store model");
     let sha256 = models::digest(&new.bytes);
-    let bytes = sqlx::query(MODEL_BYTES).bind(&sha256[..]).bind(&new.bytes).execute(&mut tx.conn).await;
+    let bytes = db::query(MODEL_BYTES).bind(&sha256[..]).bind(&new.bytes).execute(&mut tx.conn).await;
     bytes.map_err(at())?;
-    let done = sqlx::query(MODEL)
+    let done = db::query(MODEL)
         .bind(of.0 as i64)
         .bind(&sha256[..])
         .bind(&new.params_hash[..])
@@ -191,7 +192,7 @@ pub(in crate::store) async fn distractor(
     map: i64,
     new: &CropContents,
 ) -> Result<(), StoreError> {
-    let done = sqlx::query(DISTRACTOR)
+    let done = db::query(DISTRACTOR)
         .bind(map)
         .bind(&new.image_sha256[..])
         .bind(views::point_bytes(&new.corners_px))
@@ -204,7 +205,7 @@ pub(in crate::store) async fn distractor(
 }
 
 pub(in crate::store) async fn run(tx: &mut Tx, map: i64, new: &RunContents) -> Result<(), StoreError> {
-    let done = sqlx::query(RUN)
+    let done = db::query(RUN)
         .bind(map)
         .bind(&new.robot)
         .bind(new.created_ms)

@@ -24,20 +24,20 @@ use super::{
     within,
 };
 use crate::config::Limits;
+use crate::store::db::{self, Conn, Executor, Row};
 use rows::{Base, Owner, RowDigest};
-use sqlx::{Row, SqliteConnection, SqliteExecutor, sqlite::SqliteRow};
 use std::collections::BTreeMap;
 use vision::model::LandmarkId;
 
 statements! {
-    MARK = "UPDATE maps SET draft_of = ?2, draft_from = ?3 WHERE id = ?1";
-    COUNT = "SELECT count(*) FROM maps WHERE draft_of = ?1";
-    PUT_LANDMARK = "INSERT INTO draft_landmarks (draft_id, landmark_id, of_landmark) VALUES (?1, ?2, ?3)";
-    PUT_ROW = "INSERT INTO draft_rows (draft_id, row, in_map, in_draft) VALUES (?1, ?2, ?3, ?4)";
+    MARK = "UPDATE maps SET draft_of = $2, draft_from = $3 WHERE id = $1";
+    COUNT = "SELECT count(*) FROM maps WHERE draft_of = $1";
+    PUT_LANDMARK = "INSERT INTO draft_landmarks (draft_id, landmark_id, of_landmark) VALUES ($1, $2, $3)";
+    PUT_ROW = "INSERT INTO draft_rows (draft_id, row, in_map, in_draft) VALUES ($1, $2, $3, $4)";
     LIST = "SELECT id, name, draft_from, created_ms, id || '.' || revision AS revision, \
-            (SELECT count(*) FROM landmarks WHERE map_id = maps.id) AS landmarks FROM maps WHERE draft_of = ?1 ORDER BY name";
-    OF = "SELECT landmark_id, of_landmark FROM draft_landmarks WHERE draft_id = ?1";
-    ROWS = "SELECT row, in_map, in_draft FROM draft_rows WHERE draft_id = ?1";
+            (SELECT count(*) FROM landmarks WHERE map_id = maps.id) AS landmarks FROM maps WHERE draft_of = $1 ORDER BY name";
+    OF = "SELECT landmark_id, of_landmark FROM draft_landmarks WHERE draft_id = $1";
+    ROWS = "SELECT row, in_map, in_draft FROM draft_rows WHERE draft_id = $1";
 }
 
 /// Every statement of this folder.
@@ -58,7 +58,7 @@ pub(crate) struct DraftRow {
     pub(crate) landmarks: u64,
 }
 
-fn draft_row(row: &SqliteRow) -> Result<DraftRow, sqlx::Error> {
+fn draft_row(row: &Row) -> Result<DraftRow, db::Error> {
     Ok(DraftRow {
         id: row.try_get("id")?,
         name: row.try_get("name")?,
@@ -70,14 +70,14 @@ fn draft_row(row: &SqliteRow) -> Result<DraftRow, sqlx::Error> {
 }
 
 /// The drafts of a map, by name.
-pub(crate) async fn list(db: impl SqliteExecutor<'_>, map: i64) -> Result<Vec<DraftRow>, StoreError> {
+pub(crate) async fn list(db: impl Executor<'_>, map: i64) -> Result<Vec<DraftRow>, StoreError> {
     let at = || StoreError::during("list drafts");
-    let rows = sqlx::query(LIST).bind(map).fetch_all(db).await.map_err(at())?;
+    let rows = db::query(LIST).bind(map).fetch_all(db).await.map_err(at())?;
     rows.iter().map(draft_row).collect::<Result<_, _>>().map_err(at())
 }
 
 /// One draft of a map. Errors: `NotFound`.
-pub(crate) async fn get(db: impl SqliteExecutor<'_>, map: i64, draft: &str) -> Result<DraftRow, StoreError> {
+pub(crate) async fn get(db: impl Executor<'_>, map: i64, draft: &str) -> Result<DraftRow, StoreError> {
     let found = list(db, map).await?.into_iter().find(|row| row.name == draft);
     found.ok_or_else(|| StoreError::NotFound { what: Kind::Draft, name: draft.to_owned() })
 }
@@ -102,29 +102,29 @@ impl Both {
 async fn both(store: &Store, map: &str, draft: &str) -> Result<Both, StoreError> {
     let mut reading = store.reads().begin().await.map_err(StoreError::during("read a draft"))?;
     let map = contents::read(&mut reading, map).await?;
-    let row = get(&mut *reading, map.0.id, draft).await?;
+    let row = get(&mut reading, map.0.id, draft).await?;
     let draft = contents::read(&mut reading, draft).await?;
     let (base, of) = (base(&mut reading, row.id).await?, of(&mut reading, row.id).await?);
     Ok(Both { map, draft, from_commit: row.from_commit, base, of })
 }
 
-async fn of(conn: &mut SqliteConnection, draft: i64) -> Result<BTreeMap<LandmarkId, LandmarkId>, StoreError> {
-    let pairs = sqlx::query_as::<_, (i64, i64)>(OF).bind(draft).fetch_all(conn).await;
+async fn of(conn: &mut Conn, draft: i64) -> Result<BTreeMap<LandmarkId, LandmarkId>, StoreError> {
+    let pairs = db::query_as::<(i64, i64)>(OF).bind(draft).fetch_all(conn).await;
     let pairs = pairs.map_err(StoreError::during("read the landmarks of a draft"))?;
     Ok(pairs.into_iter().map(|(own, of)| (LandmarkId(own as u64), LandmarkId(of as u64))).collect())
 }
 
-async fn base(conn: &mut SqliteConnection, draft: i64) -> Result<Base, StoreError> {
+async fn base(conn: &mut Conn, draft: i64) -> Result<Base, StoreError> {
     let at = || StoreError::during("read what a draft began with");
-    let rows = sqlx::query(ROWS).bind(draft).fetch_all(conn).await.map_err(at())?;
-    let one = |row: &SqliteRow| {
+    let rows = db::query(ROWS).bind(draft).fetch_all(conn).await.map_err(at())?;
+    let one = |row: &Row| {
         // The schema says 32 bytes.
-        let digest = |column: &str| -> Result<RowDigest, sqlx::Error> {
+        let digest = |column: &str| -> Result<RowDigest, db::Error> {
             Ok(row.try_get::<&[u8], _>(column)?.try_into().unwrap_or_default())
         };
         Ok((row.try_get("row")?, (digest("in_map")?, digest("in_draft")?)))
     };
-    rows.iter().map(one).collect::<Result<_, sqlx::Error>>().map_err(at())
+    rows.iter().map(one).collect::<Result<_, db::Error>>().map_err(at())
 }
 
 /// Begins a draft. Errors: `NotFound`, `Exists`, `Limit`; `InUse` of a draft; `Busy` while others
@@ -167,20 +167,20 @@ async fn write(
     let commit = history::newest(&mut tx.conn, map.id).await?;
     let written = contents::write(tx, name, &contents, limits).await?;
     let draft = written.map.id;
-    let marked = sqlx::query(MARK).bind(draft).bind(map.id).bind(commit).execute(&mut tx.conn).await;
+    let marked = db::query(MARK).bind(draft).bind(map.id).bind(commit).execute(&mut tx.conn).await;
     marked.map_err(StoreError::during("mark a draft"))?;
-    let count = sqlx::query_scalar(COUNT).bind(map.id).fetch_one(&mut tx.conn).await;
+    let count = db::query_scalar(COUNT).bind(map.id).fetch_one(&mut tx.conn).await;
     within(count.map_err(StoreError::during("count drafts"))?, MAX_DRAFTS, "drafts of a map")?;
     let of: BTreeMap<_, _> = written.landmarks.iter().map(|(of, own)| (*own, *of)).collect();
     for (own, of) in &of {
-        let put = sqlx::query(PUT_LANDMARK).bind(draft).bind(own.0 as i64).bind(of.0 as i64);
+        let put = db::query(PUT_LANDMARK).bind(draft).bind(own.0 as i64).bind(of.0 as i64);
         put.execute(&mut tx.conn).await.map_err(StoreError::during("note a landmark of a draft"))?;
     }
     let (_, copied) = contents::read(&mut tx.conn, name).await?;
     let in_draft = rows::rows(&copied, |own| of.get(&own).map_or(Owner::New(own), |of| Owner::Of(*of)));
     for (key, in_map) in rows::rows(&contents, Owner::Of) {
         let Some(own) = in_draft.get(&key) else { continue };
-        let put = sqlx::query(PUT_ROW).bind(draft).bind(key.text()).bind(&in_map[..]).bind(&own[..]);
+        let put = db::query(PUT_ROW).bind(draft).bind(key.text()).bind(&in_map[..]).bind(&own[..]);
         put.execute(&mut tx.conn).await.map_err(StoreError::during("note a row of a draft"))?;
     }
     // Tokens that are for the map are for its drafts.

@@ -7,6 +7,7 @@ use super::{
     merge::{Merge, merge},
     rows::{Owner, RowKey, crop_key, rows, run_key},
 };
+use crate::store::db;
 use crate::{
     config::Limits,
     store::{
@@ -28,21 +29,21 @@ use std::collections::{BTreeMap, BTreeSet};
 use vision::model::LandmarkId;
 
 statements! {
-    REMOVE_LANDMARK = "DELETE FROM landmarks WHERE id = ?1";
+    REMOVE_LANDMARK = "DELETE FROM landmarks WHERE id = $1";
     // Names may have been exchanged; no name begins so.
-    SET_ASIDE = "UPDATE landmarks SET name = '~' || id WHERE id = ?1";
-    RENAME = "UPDATE landmarks SET name = ?2 WHERE id = ?1";
-    HEALTH = "UPDATE landmarks SET health = ?2, finding = ?3 WHERE id = ?1";
-    REMOVE_VIEW = "DELETE FROM views WHERE landmark_id = ?1 AND image_sha256 = ?2 AND corners_px = ?3";
-    REMOVE_MODEL = "DELETE FROM models WHERE landmark_id = ?1";
-    REMOVE_DISTRACTOR = "DELETE FROM strangers WHERE map_id = ?1 AND image_sha256 = ?2 AND corners_px = ?3";
-    REMOVE_RUN = "DELETE FROM runs WHERE id = (SELECT id FROM runs WHERE map_id = ?1 AND robot = ?2 AND created_ms = ?3 \
-                  AND cells = ?4 ORDER BY id LIMIT 1)";
-    REMOVE_UNDERLAY = "DELETE FROM underlays WHERE map_id = ?1";
-    COUNT_LANDMARKS = "SELECT count(*) FROM landmarks WHERE map_id = ?1";
+    SET_ASIDE = "UPDATE landmarks SET name = '~' || id WHERE id = $1";
+    RENAME = "UPDATE landmarks SET name = $2 WHERE id = $1";
+    HEALTH = "UPDATE landmarks SET health = $2, finding = $3 WHERE id = $1";
+    REMOVE_VIEW = "DELETE FROM views WHERE landmark_id = $1 AND image_sha256 = $2 AND corners_px = $3";
+    REMOVE_MODEL = "DELETE FROM models WHERE landmark_id = $1";
+    REMOVE_DISTRACTOR = "DELETE FROM strangers WHERE map_id = $1 AND image_sha256 = $2 AND corners_px = $3";
+    REMOVE_RUN = "DELETE FROM runs WHERE id = (SELECT id FROM runs WHERE map_id = $1 AND robot = $2 AND created_ms = $3 \
+                  AND cells = $4 ORDER BY id LIMIT 1)";
+    REMOVE_UNDERLAY = "DELETE FROM underlays WHERE map_id = $1";
+    COUNT_LANDMARKS = "SELECT count(*) FROM landmarks WHERE map_id = $1";
     MOST_VIEWS = "SELECT coalesce(max(n), 0) FROM (SELECT count(*) AS n FROM views v JOIN landmarks l ON l.id = v.landmark_id \
-                  WHERE l.map_id = ?1 GROUP BY l.id)";
-    COUNT_RUNS = "SELECT count(*) FROM runs WHERE map_id = ?1";
+                  WHERE l.map_id = $1 GROUP BY l.id) AS c";
+    COUNT_RUNS = "SELECT count(*) FROM runs WHERE map_id = $1";
 }
 
 /// Publishes a draft; says whether that changed anything of the map. `is` is the revision of the
@@ -106,7 +107,7 @@ async fn check(tx: &mut Tx, map: &MapRow, limits: &Limits) -> Result<(), StoreEr
         (MOST_VIEWS, limits.views, "views of a landmark"),
         (COUNT_RUNS, modality_stats::MAX_RUNS, "runs"),
     ] {
-        let count = sqlx::query_scalar(sql).bind(map.id).fetch_one(&mut tx.conn).await;
+        let count = db::query_scalar(sql).bind(map.id).fetch_one(&mut tx.conn).await;
         within(count.map_err(StoreError::during("count what is published"))?, max, what)?;
     }
     Ok(())
@@ -161,7 +162,7 @@ impl<'a> Publication<'a> {
     }
 
     async fn run(&self, tx: &mut Tx, sql: &'static str) -> Result<(), StoreError> {
-        let done = sqlx::query(sql).bind(self.map.id).execute(&mut tx.conn).await;
+        let done = db::query(sql).bind(self.map.id).execute(&mut tx.conn).await;
         done.map_err(StoreError::during("publish")).map(drop)
     }
 
@@ -181,7 +182,7 @@ impl<'a> Publication<'a> {
                 Some(new) if new.name != old.name => SET_ASIDE,
                 Some(_) => continue,
             };
-            sqlx::query(sql).bind(old.number.0 as i64).execute(&mut tx.conn).await.map_err(at())?;
+            db::query(sql).bind(old.number.0 as i64).execute(&mut tx.conn).await.map_err(at())?;
         }
         for (old, new) in pairs {
             match (old, new) {
@@ -212,7 +213,7 @@ impl<'a> Publication<'a> {
             };
             let Some(number) = self.number(*owner) else { continue };
             if let Some(old) = find(self.in_map.get(owner)) {
-                let removed = sqlx::query(REMOVE_VIEW)
+                let removed = db::query(REMOVE_VIEW)
                     .bind(number.0 as i64)
                     .bind(&old.crop.image_sha256[..])
                     .bind(views::point_bytes(&old.crop.corners_px));
@@ -233,7 +234,7 @@ impl<'a> Publication<'a> {
                 let model = contents::in_other_map(model, number, &self.numbers);
                 contents::model(tx, number, &model).await?;
             } else {
-                let done = sqlx::query(REMOVE_MODEL).bind(number.0 as i64).execute(&mut tx.conn).await;
+                let done = db::query(REMOVE_MODEL).bind(number.0 as i64).execute(&mut tx.conn).await;
                 done.map_err(StoreError::during("publish a model"))?;
             }
         }
@@ -251,7 +252,7 @@ impl<'a> Publication<'a> {
         let key = |d: &contents::DistractorContents| RowKey::Distractor(crop_key(&d.crop));
         let (gone, new) = self.moved(&self.old.distractors, &self.new.distractors, key);
         for each in gone {
-            let removed = sqlx::query(REMOVE_DISTRACTOR)
+            let removed = db::query(REMOVE_DISTRACTOR)
                 .bind(self.map.id)
                 .bind(&each.crop.image_sha256[..])
                 .bind(views::point_bytes(&each.crop.corners_px));
@@ -267,7 +268,7 @@ impl<'a> Publication<'a> {
         let key = |run: &contents::RunContents| RowKey::Run(run_key(run));
         let (gone, new) = self.moved(&self.old.reference_runs, &self.new.reference_runs, key);
         for run in gone {
-            let removed = sqlx::query(REMOVE_RUN)
+            let removed = db::query(REMOVE_RUN)
                 .bind(self.map.id)
                 .bind(&run.robot)
                 .bind(run.created_ms)
@@ -324,9 +325,9 @@ async fn change(tx: &mut Tx, old: &LandmarkContents, new: &LandmarkContents) -> 
     landmark_learning::put(tx, id, new.learning.as_deref()).await?;
     if old.geometry != new.geometry {
         let health = landmarks::health_word(new.health);
-        let done = sqlx::query(HEALTH).bind(id).bind(health).bind(&new.finding).execute(&mut tx.conn).await;
+        let done = db::query(HEALTH).bind(id).bind(health).bind(&new.finding).execute(&mut tx.conn).await;
         done.map_err(StoreError::during("publish a landmark"))?;
     }
-    let renamed = sqlx::query(RENAME).bind(id).bind(&new.name).execute(&mut tx.conn).await;
+    let renamed = db::query(RENAME).bind(id).bind(&new.name).execute(&mut tx.conn).await;
     renamed.map_err(StoreError::inserting("publish a landmark", Kind::Landmark, &new.name)).map(drop)
 }

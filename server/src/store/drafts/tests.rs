@@ -19,24 +19,24 @@ use vision::pose::LandmarkSize;
 
 /// Tables of a map with all their columns but those that count changes.
 const TABLES: [(&str, &str); 7] = [
-    ("landmarks", "map_id = ?1"),
-    ("views", "landmark_id IN (SELECT id FROM landmarks WHERE map_id = ?1)"),
-    ("models", "landmark_id IN (SELECT id FROM landmarks WHERE map_id = ?1)"),
-    ("strangers", "map_id = ?1"),
-    ("laser_segments", "map_id = ?1"),
-    ("runs", "map_id = ?1"),
-    ("underlays", "map_id = ?1"),
+    ("landmarks", "map_id = $1"),
+    ("views", "landmark_id IN (SELECT id FROM landmarks WHERE map_id = $1)"),
+    ("models", "landmark_id IN (SELECT id FROM landmarks WHERE map_id = $1)"),
+    ("strangers", "map_id = $1"),
+    ("laser_segments", "map_id = $1"),
+    ("runs", "map_id = $1"),
+    ("underlays", "map_id = $1"),
 ];
 
 async fn state(store: &Catalogue) -> BTreeMap<&'static str, Vec<String>> {
     let counters = ["revision", "changed_ms", "version", "walls_version", "underlay_revision"];
     let mut all = BTreeMap::new();
-    for (table, of) in TABLES.into_iter().chain([("maps", "id = ?1")]) {
+    for (table, of) in TABLES.into_iter().chain([("maps", "id = $1")]) {
         all.insert(table, rows(store, (table, of), 1, &counters).await);
     }
     let bytes = "SELECT quote(c.bytes) FROM models m JOIN model_contents c ON c.sha256 = m.sha256 \
                  JOIN landmarks l ON l.id = m.landmark_id WHERE l.map_id = 1 ORDER BY m.landmark_id";
-    all.insert("bytes", sqlx::query_scalar(bytes).fetch_all(store.reads()).await.unwrap());
+    all.insert("bytes", db::query_scalar(bytes).fetch_all(store.reads()).await.unwrap());
     all
 }
 
@@ -284,13 +284,13 @@ async fn a_finding_ends_with_the_geometry_that_it_is_about() {
     let (_dir, store, _task) = open().await;
     let health = async || {
         let sql = "SELECT name || ' ' || health FROM landmarks WHERE map_id = 1 AND name IN ('p1', 'p2') ORDER BY name";
-        sqlx::query_scalar::<_, String>(sql).fetch_all(store.reads()).await.unwrap()
+        db::query_scalar::<String>(sql).fetch_all(store.reads()).await.unwrap()
     };
     let flag = "UPDATE landmarks SET health = 'flagged', finding = '{}' WHERE map_id = 1";
     draft(&store, "d").await;
     let write = store.write(move |tx| {
         Box::pin(async move {
-            sqlx::query(flag).execute(&mut tx.conn).await.map_err(StoreError::during("flag"))?;
+            db::query(flag).execute(&mut tx.conn).await.map_err(StoreError::during("flag"))?;
             landmarks::update(tx, "d", "p1", |_| sized()).await.map(drop)
         })
     });

@@ -1,46 +1,40 @@
 //! What differs between a map at one commit and at a later one. A row that was changed and changed
 //! back does not differ. Distractors are left out: nobody edits them.
 
-use super::before;
+use super::{before, oldest};
 use crate::store::{
     StoreError,
+    db::{self, Conn, Row},
     landmarks::{LandmarkGeometry, geometry, geometry_columns},
     statements::statements,
     walls::StoredWall,
 };
 use protos::api::{ChangeSummary, SizeAndPlace, WallsDifference};
-use sqlx::{Row, SqliteConnection, sqlite::SqliteRow};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// How much of a row there is at ?3: as the oldest later commit has stored it, or as it is.
+/// How much of a row there is at $3: as the oldest later commit has stored it, or as it is.
 macro_rules! is_present {
     ($table:literal) => {
         concat!(
             "coalesce((SELECT l.present FROM past_",
             $table,
-            " l WHERE l.id = f.id AND l.commit_id > ?3 \
-             ORDER BY l.commit_id LIMIT 1), EXISTS (SELECT 1 FROM ",
+            " l WHERE l.id = f.id AND l.commit_id > $3 \
+             ORDER BY l.commit_id LIMIT 1), (SELECT count(*) FROM ",
             $table,
             " t WHERE t.id = f.id))"
         )
     };
 }
 
-/// The columns of a row before, and of the same row at ?3.
+/// The columns of a row before, and of the same row at $3.
 macro_rules! with_later {
     ($table:literal, $key:literal, $columns:expr) => {
         concat!(
             "WITH f AS ",
             before!($table, $key),
-            ", later AS (SELECT *, min(commit_id) FROM past_",
-            $table,
-            " WHERE commit_id > ?3 AND ",
-            $key,
-            " IN (SELECT ",
-            $key,
-            " FROM f) GROUP BY ",
-            $key,
-            "), n AS (SELECT ",
+            ", later AS ",
+            oldest!($table, $key, concat!("commit_id > $3 AND ", $key, " IN (SELECT ", $key, " FROM f)")),
+            ", n AS (SELECT ",
             $key,
             ", present, ",
             $columns,
@@ -64,40 +58,42 @@ macro_rules! with_later {
 }
 
 statements! {
-    // The row before and the row at ?3, as far as they are there, under each other.
+    // The row before and the row at $3, as far as they are there, under each other.
     LANDMARKS = concat!(with_later!("landmarks", "id", concat!("name, ", geometry_columns!(""))),
                 "SELECT id, 0 AS side, present, name, ", geometry_columns!(""), " FROM f \
                 UNION ALL SELECT id, 1, present, name, ", geometry_columns!(""), " FROM n ORDER BY id");
-    VIEWS = concat!("SELECT landmark_id, sum(was = 0 AND is_now = 1) AS added, sum(was = 1 AND is_now = 0) AS removed FROM \
+    VIEWS = concat!("SELECT landmark_id, sum(CASE WHEN was < is_now THEN 1 ELSE 0 END) AS added, \
+            sum(CASE WHEN was > is_now THEN 1 ELSE 0 END) AS removed FROM \
             (SELECT f.landmark_id, f.present AS was, ", is_present!("views"), " AS is_now FROM ",
-            before!("views", "id"), " f) GROUP BY landmark_id HAVING added + removed > 0");
+            before!("views", "id"), " AS f) AS c WHERE was <> is_now GROUP BY landmark_id");
     MODELS = concat!(with_later!("models", "landmark_id", "sha256, active"),
              "SELECT f.landmark_id FROM f LEFT JOIN n ON n.landmark_id = f.landmark_id \
-             WHERE f.sha256 IS NOT n.sha256 OR f.active IS NOT n.active");
+             WHERE f.sha256 IS DISTINCT FROM n.sha256 OR f.active IS DISTINCT FROM n.active");
     LEARNING = concat!(with_later!("landmarks", "id", "learning"),
                "SELECT f.id FROM f JOIN n ON n.id = f.id WHERE f.present = 1 AND n.present = 1 \
-               AND f.learning IS NOT n.learning");
-    RUNS = concat!("SELECT coalesce(sum(was = 0 AND is_now = 1), 0) AS added, coalesce(sum(was = 1 AND is_now = 0), 0) AS removed \
+               AND f.learning IS DISTINCT FROM n.learning");
+    RUNS = concat!("SELECT coalesce(sum(CASE WHEN was < is_now THEN 1 ELSE 0 END), 0) AS added, \
+           coalesce(sum(CASE WHEN was > is_now THEN 1 ELSE 0 END), 0) AS removed \
            FROM (SELECT f.present AS was, ", is_present!("runs"), " AS is_now FROM ",
-           before!("runs", "id"), " f)");
+           before!("runs", "id"), " AS f) AS c");
     UNDERLAY = concat!(with_later!("underlays", "map_id", "image_sha256, metres_per_pixel, x_m, y_m, \
                theta_rad"),
-               "SELECT count(*) FROM f LEFT JOIN n ON n.map_id = f.map_id WHERE f.image_sha256 IS NOT n.image_sha256 \
-               OR f.metres_per_pixel IS NOT n.metres_per_pixel OR f.x_m IS NOT n.x_m OR f.y_m IS NOT n.y_m \
-               OR f.theta_rad IS NOT n.theta_rad");
+               "SELECT count(*) FROM f LEFT JOIN n ON n.map_id = f.map_id WHERE f.image_sha256 IS DISTINCT FROM n.image_sha256 \
+               OR f.metres_per_pixel IS DISTINCT FROM n.metres_per_pixel OR f.x_m IS DISTINCT FROM n.x_m OR f.y_m IS DISTINCT FROM n.y_m \
+               OR f.theta_rad IS DISTINCT FROM n.theta_rad");
     SETTINGS = concat!(with_later!("maps", "id", "name, site, building, floor, parent_id, parent_from_map, \
                preset, distance, learning, fusion, areas, sight"),
-               "SELECT f.name IS NOT n.name AS name, f.site IS NOT n.site AS site, f.building IS NOT n.building AS building, \
-               f.floor IS NOT n.floor AS floor, f.parent_id IS NOT n.parent_id OR f.parent_from_map IS NOT \
-               n.parent_from_map AS parent, f.preset IS NOT n.preset OR f.distance IS NOT n.distance AS pipeline, f.learning IS NOT n.learning AS learning, f.fusion IS NOT n.fusion AS fusion_mode, f.areas IS NOT n.areas AS areas, \
-               f.sight IS NOT n.sight AS visibility_settings FROM f JOIN n ON n.id = f.id");
-    WALLS_BEFORE = "SELECT min(id) FROM commits WHERE map_id = ?1 AND walls = 1 AND id > ?2 AND id <= ?3";
-    WALLS_AFTER = "SELECT min(id) FROM commits WHERE map_id = ?1 AND walls = 1 AND id > ?2";
-    PAST_WALLS = "SELECT ax_m, ay_m, bx_m, by_m, covariance FROM past_walls WHERE commit_id = ?1";
-    NOW_WALLS = "SELECT ax_m, ay_m, bx_m, by_m, covariance FROM laser_segments WHERE map_id = ?1";
+               "SELECT f.name IS DISTINCT FROM n.name AS name, f.site IS DISTINCT FROM n.site AS site, f.building IS DISTINCT FROM n.building AS building, \
+               f.floor IS DISTINCT FROM n.floor AS floor, f.parent_id IS DISTINCT FROM n.parent_id OR f.parent_from_map IS DISTINCT FROM \
+               n.parent_from_map AS parent, f.preset IS DISTINCT FROM n.preset OR f.distance IS DISTINCT FROM n.distance AS pipeline, f.learning IS DISTINCT FROM n.learning AS learning, f.fusion IS DISTINCT FROM n.fusion AS fusion_mode, f.areas IS DISTINCT FROM n.areas AS areas, \
+               f.sight IS DISTINCT FROM n.sight AS visibility_settings FROM f JOIN n ON n.id = f.id");
+    WALLS_BEFORE = "SELECT min(id) FROM commits WHERE map_id = $1 AND walls = 1 AND id > $2 AND id <= $3";
+    WALLS_AFTER = "SELECT min(id) FROM commits WHERE map_id = $1 AND walls = 1 AND id > $2";
+    PAST_WALLS = "SELECT ax_m, ay_m, bx_m, by_m, covariance FROM past_walls WHERE commit_id = $1";
+    NOW_WALLS = "SELECT ax_m, ay_m, bx_m, by_m, covariance FROM laser_segments WHERE map_id = $1";
     ROW_AT = concat!("SELECT * FROM (SELECT commit_id, name, ", geometry_columns!(""), " FROM past_landmarks \
-             WHERE id = ?1 AND commit_id > ?2 AND present = 1 UNION ALL SELECT 9223372036854775807, name, ",
-             geometry_columns!(""), " FROM landmarks WHERE id = ?1) ORDER BY commit_id LIMIT 1");
+             WHERE id = $1 AND commit_id > $2 AND present = 1 UNION ALL SELECT 9223372036854775807, name, ",
+             geometry_columns!(""), " FROM landmarks WHERE id = $1) AS r ORDER BY commit_id LIMIT 1");
 }
 
 /// Words for settings; also the columns of `SETTINGS`.
@@ -192,7 +188,7 @@ pub(crate) struct Difference {
 /// What differs between the states after the commits `from` and `to` of a map; `from` is less than
 /// `to`.
 pub(crate) async fn between(
-    conn: &mut SqliteConnection,
+    conn: &mut Conn,
     map: i64,
     (from, to): (i64, i64),
 ) -> Result<Difference, StoreError> {
@@ -239,29 +235,29 @@ pub(crate) async fn between(
 }
 
 async fn rows(
-    conn: &mut SqliteConnection,
+    conn: &mut Conn,
     sql: &'static str,
     map: i64,
     (from, to): (i64, i64),
-) -> Result<Vec<SqliteRow>, StoreError> {
-    let rows = sqlx::query(sql).bind(map).bind(from).bind(to).fetch_all(conn).await;
+) -> Result<Vec<Row>, StoreError> {
+    let rows = db::query(sql).bind(map).bind(from).bind(to).fetch_all(conn).await;
     rows.map_err(StoreError::during("compare versions"))
 }
 
 /// Number, side (before or after), and name and geometry where it is there.
-fn landmark_at(row: &SqliteRow) -> Result<(i64, usize, Option<NamedGeometry>), sqlx::Error> {
+fn landmark_at(row: &Row) -> Result<(i64, usize, Option<NamedGeometry>), db::Error> {
     let is_present: bool = row.try_get("present")?;
-    let landmark = is_present.then(|| Ok::<_, sqlx::Error>((row.try_get("name")?, geometry(row)?)));
+    let landmark = is_present.then(|| Ok::<_, db::Error>((row.try_get("name")?, geometry(row)?)));
     Ok((row.try_get("id")?, usize::from(row.try_get::<bool, _>("side")?), landmark.transpose()?))
 }
 
 async fn walls(
-    conn: &mut SqliteConnection,
+    conn: &mut Conn,
     map: i64,
     (from, to): (i64, i64),
 ) -> Result<Option<WallsDifference>, StoreError> {
     let at = || StoreError::during("compare walls");
-    let first: Option<i64> = sqlx::query_scalar(WALLS_BEFORE)
+    let first: Option<i64> = db::query_scalar(WALLS_BEFORE)
         .bind(map)
         .bind(from)
         .bind(to)
@@ -270,7 +266,7 @@ async fn walls(
         .map_err(at())?;
     let Some(first) = first else { return Ok(None) };
     let later: Option<i64> =
-        sqlx::query_scalar(WALLS_AFTER).bind(map).bind(to).fetch_one(&mut *conn).await.map_err(at())?;
+        db::query_scalar(WALLS_AFTER).bind(map).bind(to).fetch_one(&mut *conn).await.map_err(at())?;
     let before = segments(&mut *conn, PAST_WALLS, first).await?;
     let after = match later {
         Some(later) => segments(&mut *conn, PAST_WALLS, later).await?,
@@ -279,13 +275,9 @@ async fn walls(
     Ok(walls_difference(&before, &after))
 }
 
-async fn segments(
-    conn: &mut SqliteConnection,
-    sql: &'static str,
-    of: i64,
-) -> Result<Vec<StoredWall>, StoreError> {
+async fn segments(conn: &mut Conn, sql: &'static str, of: i64) -> Result<Vec<StoredWall>, StoreError> {
     let at = || StoreError::during("compare walls");
-    let rows = sqlx::query(sql).bind(of).fetch_all(conn).await.map_err(at())?;
+    let rows = db::query(sql).bind(of).fetch_all(conn).await.map_err(at())?;
     rows.iter().map(StoredWall::of).collect::<Result<_, _>>().map_err(at())
 }
 
@@ -319,11 +311,7 @@ pub(in crate::store) fn walls_difference(
 }
 
 /// Counts of a difference, with the names of its first landmarks, as they are at commit `to`.
-pub(crate) async fn summary(
-    conn: &mut SqliteConnection,
-    of: &Difference,
-    to: i64,
-) -> Result<ChangeSummary, StoreError> {
+pub(crate) async fn summary(conn: &mut Conn, of: &Difference, to: i64) -> Result<ChangeSummary, StoreError> {
     let count =
         |test: &dyn Fn(&LandmarkChange) -> bool| of.landmarks.values().filter(|c| test(c)).count() as u64;
     let mut named: Vec<(i64, LandmarkChange)> =
@@ -347,13 +335,13 @@ pub(crate) async fn summary(
 
 /// Fills in name, size and place of landmarks of which only views or the model have changed.
 pub(crate) async fn fill_unchanged(
-    conn: &mut SqliteConnection,
+    conn: &mut Conn,
     changes: &mut [(i64, LandmarkChange)],
     to: i64,
 ) -> Result<(), StoreError> {
     let at = || StoreError::during("read a landmark");
     for (id, change) in changes.iter_mut().filter(|(_, change)| change.names == [None, None]) {
-        let row = sqlx::query(ROW_AT).bind(*id).bind(to).fetch_optional(&mut *conn).await.map_err(at())?;
+        let row = db::query(ROW_AT).bind(*id).bind(to).fetch_optional(&mut *conn).await.map_err(at())?;
         let Some(row) = row else { continue };
         let name: String = row.try_get("name").map_err(at())?;
         change.names = [Some(name.clone()), Some(name)];

@@ -3,8 +3,8 @@
 //! these tables have.
 
 use super::before;
+use crate::store::db::{self, Conn};
 use crate::store::statements::statements;
-use sqlx::{Row as _, SqliteConnection};
 
 /// A table of rows of a map.
 pub(in crate::store) struct KeptTable {
@@ -57,7 +57,7 @@ macro_rules! kept {
 const BY_LANDMARK: &str = "coalesce((SELECT map_id FROM landmarks WHERE id = ROW.landmark_id), (SELECT c.map_id FROM commits c \
                            JOIN past_landmarks p ON p.commit_id = c.id WHERE c.open = 1 AND p.id = ROW.landmark_id))";
 const BY_MAP: &str = "ROW.map_id";
-const SAME_MAP: &[(&str, &str)] = &[("map_id", "?1")];
+const SAME_MAP: &[(&str, &str)] = &[("map_id", "$1")];
 
 /// The map itself. It keeps its name, and goes with its history.
 pub(in crate::store) const MAPS: KeptTable = KeptTable {
@@ -79,7 +79,7 @@ pub(in crate::store) const LANDMARKS: KeptTable = KeptTable {
     left_out: &["map_id"],
     unversioned: &["health", "finding", "created_ms", "revision", "changed_ms"],
     restored_as: &[
-        ("map_id", "?1"),
+        ("map_id", "$1"),
         // Beyond every revision that it ever had.
         ("revision", "(SELECT max(p.revision) + 1 FROM past_landmarks p WHERE p.id = f.id)"),
         ("changed_ms", "CAST(unixepoch('subsec') * 1000 AS INTEGER)"),
@@ -103,17 +103,14 @@ pub(in crate::store) const PARTS: [KeptTable; 6] = [
 pub(in crate::store) const CONTENTS: [&str; 2] = ["pictures", "model_contents"];
 
 statements! {
-    COLUMNS = "SELECT c.name, c.type, c.dflt_value, (SELECT k.\"table\" FROM pragma_foreign_key_list(?1) k \
-               WHERE k.\"from\" = c.name) AS refers_to FROM pragma_table_info(?1) c ORDER BY c.cid";
+    COLUMNS = "SELECT c.name, c.type, c.dflt_value, (SELECT k.\"table\" FROM pragma_foreign_key_list($1) k \
+               WHERE k.\"from\" = c.name) AS refers_to FROM pragma_table_info($1) c ORDER BY c.cid";
 }
 
 impl KeptTable {
     /// The columns that are kept, without the key.
-    pub(in crate::store) async fn columns(
-        &self,
-        conn: &mut SqliteConnection,
-    ) -> Result<Vec<KeptColumn>, sqlx::Error> {
-        let rows = sqlx::query(COLUMNS).bind(self.name).fetch_all(conn).await?;
+    pub(in crate::store) async fn columns(&self, conn: &mut Conn) -> Result<Vec<KeptColumn>, db::Error> {
+        let rows = db::query(COLUMNS).bind(self.name).fetch_all(conn).await?;
         let mut columns = Vec::with_capacity(rows.len());
         for row in rows {
             let name: String = row.try_get("name")?;

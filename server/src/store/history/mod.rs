@@ -20,17 +20,20 @@ pub(in crate::store) use difference::{SETTINGS_OF_MAP, walls_difference};
 pub(in crate::store) use kept_tables::{CONTENTS, KeptColumn, KeptTable, MAPS, PARTS};
 
 use super::{StoreError, actor::Actor, kind::Kind, statements::statements};
+use crate::store::db::{self, Executor, Row};
 use protos::api::ChangeSummary;
-use sqlx::{Row, SqliteExecutor, sqlite::SqliteRow};
 
 statements! {
     PAGE = "SELECT id, parent_id, created_ms, author, job, operation, why, summary FROM commits \
-            WHERE map_id = ?1 AND open = 0 AND id < ?2 ORDER BY id DESC LIMIT ?3";
-    COUNT = "SELECT count(*) FROM commits WHERE map_id = ?1 AND open = 0";
+            WHERE map_id = $1 AND open = 0 AND id < $2 ORDER BY id DESC LIMIT $3";
+    COUNT = "SELECT count(*) FROM commits WHERE map_id = $1 AND open = 0";
     GET = "SELECT id, parent_id, created_ms, author, job, operation, why, summary FROM commits \
-           WHERE map_id = ?1 AND open = 0 AND id = ?2";
-    NEWEST = "SELECT coalesce(max(id), 0) FROM commits WHERE map_id = ?1 AND open = 0";
+           WHERE map_id = $1 AND open = 0 AND id = $2";
+    NEWEST = "SELECT coalesce(max(id), 0) FROM commits WHERE map_id = $1 AND open = 0";
 }
+
+#[cfg(test)]
+pub(super) use apply::every_step;
 
 /// Every statement of this folder.
 #[cfg(test)]
@@ -78,7 +81,7 @@ pub(crate) struct CommitRow {
     pub(crate) summary: ChangeSummary,
 }
 
-fn commit_row(row: &SqliteRow) -> Result<CommitRow, sqlx::Error> {
+fn commit_row(row: &Row) -> Result<CommitRow, db::Error> {
     Ok(CommitRow {
         id: row.try_get("id")?,
         parent: row.try_get("parent_id")?,
@@ -96,49 +99,69 @@ fn commit_row(row: &SqliteRow) -> Result<CommitRow, sqlx::Error> {
 
 /// Kept commits of a map with numbers below `before`, newest first.
 pub(crate) async fn page(
-    db: impl SqliteExecutor<'_>,
+    db: impl Executor<'_>,
     map: i64,
     before: i64,
     limit: usize,
 ) -> Result<Vec<CommitRow>, StoreError> {
     let at = || StoreError::during("list commits");
-    let rows = sqlx::query(PAGE).bind(map).bind(before).bind(limit as i64).fetch_all(db).await;
+    let rows = db::query(PAGE).bind(map).bind(before).bind(limit as i64).fetch_all(db).await;
     rows.map_err(at())?.iter().map(commit_row).collect::<Result<_, _>>().map_err(at())
 }
 
 /// How many commits of a map are kept.
-pub(crate) async fn count(db: impl SqliteExecutor<'_>, map: i64) -> Result<u64, StoreError> {
-    let count = sqlx::query_scalar::<_, i64>(COUNT).bind(map).fetch_one(db).await;
+pub(crate) async fn count(db: impl Executor<'_>, map: i64) -> Result<u64, StoreError> {
+    let count = db::query_scalar::<i64>(COUNT).bind(map).fetch_one(db).await;
     count.map(|n| n as u64).map_err(StoreError::during("count commits"))
 }
 
 /// A kept commit of a map. Errors: `NotFound`.
-pub(crate) async fn get(db: impl SqliteExecutor<'_>, map: i64, id: i64) -> Result<CommitRow, StoreError> {
+pub(crate) async fn get(db: impl Executor<'_>, map: i64, id: i64) -> Result<CommitRow, StoreError> {
     let at = || StoreError::during("read commit");
-    let row = sqlx::query(GET).bind(map).bind(id).fetch_optional(db).await.map_err(at())?;
+    let row = db::query(GET).bind(map).bind(id).fetch_optional(db).await.map_err(at())?;
     let row = row.ok_or_else(|| StoreError::NotFound { what: Kind::Commit, name: id.to_string() })?;
     commit_row(&row).map_err(at())
 }
 
 /// The number of a map's newest commit.
-pub(crate) async fn newest(db: impl SqliteExecutor<'_>, map: i64) -> Result<i64, StoreError> {
-    let newest = sqlx::query_scalar(NEWEST).bind(map).fetch_one(db).await;
+pub(crate) async fn newest(db: impl Executor<'_>, map: i64) -> Result<i64, StoreError> {
+    let newest = db::query_scalar(NEWEST).bind(map).fetch_one(db).await;
     newest.map_err(StoreError::during("read the newest commit"))
 }
 
-/// The rows before the commits of map ?1 after ?2, up to ?3: of each row the oldest.
+/// The rows before the commits of map $1 after $2, up to $3: of each row the oldest.
 macro_rules! before {
     ($table:literal, $key:literal) => {
-        concat!(
-            "(SELECT *, min(commit_id) FROM past_",
+        $crate::store::history::oldest!(
             $table,
-            " WHERE commit_id IN (SELECT id FROM commits WHERE map_id = ?1 AND id > ?2 AND id <= ?3) GROUP BY ",
             $key,
-            ")"
+            "commit_id IN (SELECT id FROM commits WHERE map_id = $1 AND id > $2 AND id <= $3)"
         )
     };
 }
 use before;
+
+/// Of each row that of `$rows`, the oldest.
+macro_rules! oldest {
+    ($table:literal, $key:literal, $rows:expr) => {
+        concat!(
+            "(SELECT * FROM past_",
+            $table,
+            " WHERE (commit_id, ",
+            $key,
+            ") IN (SELECT min(commit_id), ",
+            $key,
+            " FROM past_",
+            $table,
+            " WHERE ",
+            $rows,
+            " GROUP BY ",
+            $key,
+            "))"
+        )
+    };
+}
+use oldest;
 
 #[cfg(test)]
 mod tests;

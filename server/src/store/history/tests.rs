@@ -55,8 +55,8 @@ const TABLES: [(&str, &str); 8] = [
 ];
 
 async fn columns(store: &Catalogue, table: &str) -> Vec<String> {
-    let sql = "SELECT name FROM pragma_table_info(?1) ORDER BY cid";
-    sqlx::query_scalar(sql).bind(table).fetch_all(store.reads()).await.unwrap()
+    let sql = "SELECT name FROM pragma_table_info($1) ORDER BY cid";
+    db::query_scalar(sql).bind(table).fetch_all(store.reads()).await.unwrap()
 }
 
 /// All rows of all maps, as text; REAL numbers to the last bit. Without what only counts, and
@@ -74,11 +74,11 @@ async fn state(store: &Catalogue) -> BTreeMap<&'static str, Vec<String>> {
             .map(|c| format!("CASE typeof({c}) WHEN 'real' THEN printf('%!.20g', {c}) ELSE quote({c}) END"));
         let sql = format!("SELECT {} FROM {table} ORDER BY 1", exact.collect::<Vec<_>>().join(" || ',' || "));
         let rows: Vec<String> =
-            sqlx::query_scalar(sqlx::AssertSqlSafe(sql)).fetch_all(store.reads()).await.unwrap();
+            db::query_scalar(db::AssertSqlSafe(sql)).fetch_all(store.reads()).await.unwrap();
         all.insert(table, rows);
     }
     let bytes = "SELECT quote(c.bytes) FROM models m JOIN model_contents c ON c.sha256 = m.sha256 ORDER BY m.landmark_id";
-    all.insert("bytes", sqlx::query_scalar(bytes).fetch_all(store.reads()).await.unwrap());
+    all.insert("bytes", db::query_scalar(bytes).fetch_all(store.reads()).await.unwrap());
     all
 }
 
@@ -242,14 +242,14 @@ async fn every_change_is_one_commit_and_every_commit_can_be_gone_back_to() {
             assert!(&now[table] == rows, "{table} at commit {to}");
         }
         let mut conn = store.reads().acquire().await.unwrap();
-        let newest = newest(&mut *conn, 1).await.unwrap();
+        let newest = newest(&mut conn, 1).await.unwrap();
         let mut left = between(&mut conn, 1, (to, newest)).await.unwrap();
         left.settings.retain(|word| *word != "name");
         assert_eq!(left, Difference::default(), "nothing differs from commit {to}");
     }
     let unreferenced = "SELECT count(*) FROM model_contents c WHERE NOT EXISTS (SELECT 1 FROM models m WHERE m.sha256 = c.sha256) \
                         AND NOT EXISTS (SELECT 1 FROM past_models p WHERE p.sha256 = c.sha256)";
-    let lost: i64 = sqlx::query_scalar(unreferenced).fetch_one(store.reads()).await.unwrap();
+    let lost: i64 = db::query_scalar(unreferenced).fetch_one(store.reads()).await.unwrap();
     assert_eq!(lost, 0);
 }
 
@@ -270,17 +270,17 @@ async fn every_column_of_a_map_is_in_its_history() {
     }
     let referring = "SELECT m.name FROM sqlite_schema m JOIN pragma_foreign_key_list(m.name) f WHERE m.type = 'table' \
                      AND f.\"table\" IN ('maps', 'landmarks') ORDER BY 1";
-    let mut tables: Vec<String> = sqlx::query_scalar(referring).fetch_all(store.reads()).await.unwrap();
+    let mut tables: Vec<String> = db::query_scalar(referring).fetch_all(store.reads()).await.unwrap();
     tables.dedup();
-    // Not of what the map knows: where robots are, what they were answered, what was refused, what
-    // waits for a decision, and what is computed.
+    // Not of what the map knows: where robots are, what they were answered, who may see it, what was
+    // refused, what waits for a decision, and what is computed.
     let others = [
         "commits",
         "robots",
         "gatherings",
         "tracks",
         "stored_answers",
-        "page_sessions",
+        "token_maps",
         "refused_views",
         "visibility_areas",
         "draft_landmarks",

@@ -32,7 +32,7 @@ async fn create(store: &Catalogue, key: &str, map: &str) -> Result<Option<Answer
 }
 
 async fn kept(store: &Catalogue) -> Vec<String> {
-    sqlx::query_scalar("SELECT key FROM kept_answers ORDER BY id").fetch_all(store.reads()).await.unwrap()
+    db::query_scalar("SELECT key FROM kept_answers ORDER BY id").fetch_all(store.reads()).await.unwrap()
 }
 
 #[tokio::test]
@@ -91,7 +91,7 @@ async fn the_oldest_answers_go() {
     // A day later an answer is none any more, and makes room.
     let late = "UPDATE kept_answers SET created_ms = created_ms - 86400000 WHERE key IN ('k2', 'k3')";
     let aged = store.write(move |tx| {
-        Box::pin(async move { sqlx::query(late).execute(tx.conn()).await.map_err(StoreError::during("age")) })
+        Box::pin(async move { db::query(late).execute(tx.conn()).await.map_err(StoreError::during("age")) })
     });
     aged.await.unwrap();
     assert!(matches!(create(&store, "k2", "b").await, Err(StoreError::Exists { .. })), "taken for a repeat");

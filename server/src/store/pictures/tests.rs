@@ -57,7 +57,7 @@ async fn forget(store: &Catalogue) {
 }
 
 async fn count(store: &Catalogue) -> i64 {
-    sqlx::query_scalar("SELECT count(*) FROM pictures").fetch_one(store.reads()).await.unwrap()
+    db::query_scalar("SELECT count(*) FROM pictures").fetch_one(store.reads()).await.unwrap()
 }
 
 #[tokio::test]
@@ -90,7 +90,7 @@ async fn a_damaged_picture_is_named_and_mended_by_the_same_one() {
     store
         .write(move |tx| {
             Box::pin(async move {
-                sqlx::raw_sql(damage).execute(tx.conn()).await.map_err(StoreError::during("damage")).map(drop)
+                db::raw_sql(damage).execute(tx.conn()).await.map_err(StoreError::during("damage")).map(drop)
             })
         })
         .await

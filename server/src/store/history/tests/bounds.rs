@@ -13,7 +13,7 @@ fn bounded(dir: &Path, commits: usize, bytes: usize) -> Config {
 async fn history_is_bounded_by_commits_and_by_bytes() {
     let count = async |store: &Catalogue, table: &str| -> i64 {
         let sql = format!("SELECT count(*) FROM {table}");
-        sqlx::query_scalar(sqlx::AssertSqlSafe(sql)).fetch_one(store.reads()).await.unwrap()
+        db::query_scalar(db::AssertSqlSafe(sql)).fetch_one(store.reads()).await.unwrap()
     };
     let dir = tempfile::tempdir().unwrap();
     let (store, _task) = open(&bounded(dir.path(), 3, usize::MAX >> 1)).await;

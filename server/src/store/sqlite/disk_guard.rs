@@ -5,10 +5,14 @@
 //! Reading, recognition, deletions, revocations and small edits go on. Pages of the database that
 //! deletions have freed count as room, since the file does not shrink and new data take them first.
 
-use super::StoreError;
-use crate::config::Limits;
+use crate::{
+    config::Limits,
+    store::{
+        StoreError,
+        db::{self, Pool},
+    },
+};
 use engine::vitals::Pulse;
-use sqlx::SqlitePool;
 use std::{
     fmt, io,
     path::{Path, PathBuf},
@@ -103,7 +107,7 @@ pub(crate) struct DiskGuard {
 
 impl DiskGuard {
     /// Looks once.
-    pub(super) fn new(data: &Path, limits: &Limits) -> Self {
+    pub(in crate::store) fn new(data: &Path, limits: &Limits) -> Self {
         let bounds = Bounds {
             percent: u64::from(limits.disk_percent),
             spare_bytes: limits.disk_spare_bytes as u64,
@@ -164,7 +168,7 @@ impl DiskGuard {
     /// Looks every [`PERIOD`], until the server stops. `after` runs after each look.
     pub(crate) async fn watch(
         self: Arc<Self>,
-        reads: SqlitePool,
+        reads: Pool,
         (pulse, mut stopping): (Pulse, watch::Receiver<bool>),
         after: impl Fn() + Send + 'static,
     ) {
@@ -187,9 +191,9 @@ impl DiskGuard {
 }
 
 /// Bytes of the database that are free inside of it.
-async fn freed(reads: &SqlitePool) -> Result<u64, sqlx::Error> {
+async fn freed(reads: &Pool) -> Result<u64, db::Error> {
     let sql = "SELECT freelist_count * page_size FROM pragma_freelist_count, pragma_page_size";
-    sqlx::query_scalar::<_, i64>(sql).fetch_one(reads).await.map(|bytes| bytes.max(0) as u64)
+    db::query_scalar::<i64>(sql).fetch_one(reads).await.map(|bytes| bytes.max(0) as u64)
 }
 
 /// Whether the file system of this directory is mounted read-only.

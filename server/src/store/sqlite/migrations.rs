@@ -10,7 +10,7 @@ use sqlx::{
 /// Names and texts of files of `migrations/`.
 macro_rules! files {
     ($($name:literal),* $(,)?) => {
-        &[$(($name, include_str!(concat!("../../../migrations/", $name, ".sql")))),*]
+        &[$(($name, include_str!(concat!("../../../../migrations/", $name, ".sql")))),*]
     };
 }
 

@@ -2,8 +2,17 @@
 //! power cut. Each setting is read back. Errors: a SQLite with the write-ahead-log corruption bug,
 //! a damaged file, a second server.
 
+use super::{checkpoint::renew_log, disk_guard, migrations, restored};
+use crate::{
+    private_file::{self, OpenToOthers},
+    store::{
+        StoreError,
+        db::{self, Conn, Pool},
+        derived_schema, history, schema,
+    },
+};
 use sqlx::{
-    ConnectOptions, Connection as _, Row, SqliteConnection, SqlitePool,
+    ConnectOptions, Row,
     sqlite::{SqliteConnectOptions, SqlitePoolOptions, SqliteSynchronous},
 };
 use std::{
@@ -11,12 +20,6 @@ use std::{
     path::{Path, PathBuf},
     time::Duration,
 };
-
-use super::{
-    StoreError, checkpoint::renew_log, derived_schema, disk_guard, error::is_without_room, history,
-    migrations, restored, schema,
-};
-use crate::private_file::{self, OpenToOthers};
 
 /// First version without the write-ahead-log corruption of 3.7.0 to 3.51.2
 /// (sqlite.org/wal.html#walresetbug).
@@ -93,10 +96,10 @@ pub(crate) enum OpenError {
 }
 
 /// An open database.
-pub(super) struct Opened {
-    pub(super) writer: SqliteConnection,
-    pub(super) reads: SqlitePool,
-    pub(super) lock: File,
+pub(in crate::store) struct Opened {
+    pub(in crate::store) writer: Conn,
+    pub(in crate::store) reads: Pool,
+    pub(in crate::store) lock: File,
 }
 
 /// Layer of SQLite that keeps the index of the write-ahead log in memory and not in a file. It
@@ -106,7 +109,7 @@ const WITHOUT_SHARED_MEMORY: &str = "unix-excl";
 /// Opens the database in `data` for reading and writing. A full disk does not keep it from opening:
 /// where there is no room for the file of the log's index, the index is in memory. On a read-only
 /// file system it opens for reading alone.
-pub(super) async fn open(data: &Path, vfs: Option<&'static str>) -> Result<Opened, OpenError> {
+pub(in crate::store) async fn open(data: &Path, vfs: Option<&'static str>) -> Result<Opened, OpenError> {
     if disk_guard::is_read_only(data) {
         return open_read_only(data).await;
     }
@@ -122,7 +125,7 @@ pub(super) async fn open(data: &Path, vfs: Option<&'static str>) -> Result<Opene
         renewed => renewed.map_err(|source| OpenError::Directory { path: log, source })?,
     }
     let (writer, reads) = match connect(data, vfs).await {
-        Err(OpenError::Open(error)) if vfs.is_none() && is_without_room(&error) => {
+        Err(OpenError::Open(error)) if vfs.is_none() && db::is_without_room(&error) => {
             let follows = "the index of its log is in memory; what adds data is refused until there is room";
             tracing::warn!(%error, follows, "database_opened_without_room");
             connect(data, Some(WITHOUT_SHARED_MEMORY)).await?
@@ -135,16 +138,14 @@ pub(super) async fn open(data: &Path, vfs: Option<&'static str>) -> Result<Opene
 /// The connections, checked, on the present schema. After an error the writer is closed before this
 /// returns: what connections of a process share (the index of the log, and where that is) lives as
 /// long as one of them is open.
-async fn connect(
-    data: &Path,
-    vfs: Option<&'static str>,
-) -> Result<(SqliteConnection, SqlitePool), OpenError> {
+async fn connect(data: &Path, vfs: Option<&'static str>) -> Result<(Conn, Pool), OpenError> {
     // SQLite gives the log and its index the mode of the database. An error here is one of the next
     // line, too.
     drop(private_file::open(&data.join(FILE)));
     let options = options(&data.join(FILE));
     let options = if let Some(vfs) = vfs { options.vfs(vfs) } else { options };
-    let mut writer = options.clone().create_if_missing(true).connect().await.map_err(OpenError::Open)?;
+    let writer = options.clone().create_if_missing(true).connect().await.map_err(OpenError::Open)?;
+    let mut writer = Conn::from(writer);
     match prepare(&mut writer, options).await {
         Ok(reads) => Ok((writer, reads)),
         Err(error) => {
@@ -158,16 +159,13 @@ async fn connect(
 
 /// Sets what reads or writes the file, checks it and brings it to the present schema; opens the
 /// connections that read.
-async fn prepare(
-    writer: &mut SqliteConnection,
-    options: SqliteConnectOptions,
-) -> Result<SqlitePool, OpenError> {
+async fn prepare(writer: &mut Conn, options: SqliteConnectOptions) -> Result<Pool, OpenError> {
     let durable = "PRAGMA journal_mode = wal; PRAGMA synchronous = FULL";
-    sqlx::raw_sql(durable).execute(&mut *writer).await.map_err(OpenError::Open)?;
+    db::raw_sql(durable).execute(&mut *writer).await.map_err(OpenError::Open)?;
     check_version(writer).await?;
     check_pragmas(writer).await?;
     check_integrity(writer).await?;
-    migrations::migrator().run(&mut *writer).await.map_err(OpenError::Migrate)?;
+    migrations::migrator().run(writer.sqlite()).await.map_err(OpenError::Migrate)?;
     derived_schema::complete(writer).await.map_err(OpenError::Open)?;
     history::close_outside(writer).await.map_err(OpenError::Open)?;
     let reads = SqlitePoolOptions::new()
@@ -177,8 +175,9 @@ async fn prepare(
         .test_before_acquire(false)
         .connect_with(options.synchronous(SqliteSynchronous::Full).read_only(true))
         .await
+        .map(Pool::Sqlite)
         .map_err(OpenError::Open)?;
-    check_pragmas(&mut *reads.acquire().await.map_err(OpenError::Open)?).await?;
+    check_pragmas(&mut reads.acquire().await.map_err(OpenError::Open)?).await?;
     Ok(reads)
 }
 
@@ -198,14 +197,15 @@ async fn open_read_only(data: &Path) -> Result<Opened, OpenError> {
         return Err(unreadable(reason));
     }
     let options = read_options(&data.join(FILE)).immutable(!has_log);
-    let mut writer = options.clone().connect().await.map_err(OpenError::Open)?;
+    let mut writer = options.clone().connect().await.map(Conn::from).map_err(OpenError::Open)?;
     check_version(&mut writer).await?;
     check_integrity(&mut writer).await?;
     if schema::schema(&mut writer).await.map_err(OpenError::Load)? != schema::known_schema() {
         return Err(unreadable("another version of the server has written it: mount it writable"));
     }
     let reads = SqlitePoolOptions::new().max_connections(READERS).acquire_timeout(BUSY_TIMEOUT);
-    let reads = reads.test_before_acquire(false).connect_with(options).await.map_err(OpenError::Open)?;
+    let reads = reads.test_before_acquire(false).connect_with(options).await.map(Pool::Sqlite);
+    let reads = reads.map_err(OpenError::Open)?;
     tracing::error!(path = %data.display(), follows = "robots are served; nothing is stored", "data_directory_read_only");
     Ok(Opened { writer, reads, lock })
 }
@@ -259,9 +259,9 @@ fn held(file: File, data: &Path) -> Result<File, OpenError> {
     }
 }
 
-async fn check_version(conn: &mut SqliteConnection) -> Result<(), OpenError> {
+async fn check_version(conn: &mut Conn) -> Result<(), OpenError> {
     let text: String =
-        sqlx::query_scalar("SELECT sqlite_version()").fetch_one(conn).await.map_err(OpenError::Open)?;
+        db::query_scalar("SELECT sqlite_version()").fetch_one(conn).await.map_err(OpenError::Open)?;
     if version(&text).is_some_and(|v| v >= SQLITE_MIN) { Ok(()) } else { Err(OpenError::Version(text)) }
 }
 
@@ -270,10 +270,10 @@ fn version(text: &str) -> Option<(u32, u32, u32)> {
     Some((parts.next()?.ok()?, parts.next()?.ok()?, parts.next()?.ok()?))
 }
 
-async fn check_pragmas(conn: &mut SqliteConnection) -> Result<(), OpenError> {
+async fn check_pragmas(conn: &mut Conn) -> Result<(), OpenError> {
     for (pragma, expected) in PRAGMAS {
         let sql = sqlx::AssertSqlSafe(format!("PRAGMA {pragma}"));
-        let row = sqlx::query(sql).fetch_one(&mut *conn).await.map_err(OpenError::Open)?;
+        let row = sqlx::query(sql).fetch_one(conn.sqlite()).await.map_err(OpenError::Open)?;
         // Some pragmas answer with a number, some with a word; SQLite converts either to text.
         let actual: String = row.try_get_unchecked(0).map_err(OpenError::Open)?;
         if actual != expected {
@@ -286,13 +286,13 @@ async fn check_pragmas(conn: &mut SqliteConnection) -> Result<(), OpenError> {
 /// Checks every table but the pictures and the bytes of models, which are most of a large file.
 /// Each has a digest, which is compared whenever it is read: models in use at the start, pictures
 /// once by `pictures::check_all` after it.
-async fn check_integrity(conn: &mut SqliteConnection) -> Result<(), OpenError> {
+async fn check_integrity(conn: &mut Conn) -> Result<(), OpenError> {
     let tables = "SELECT name FROM sqlite_schema WHERE type = 'table' \
                   AND name NOT IN ('pictures', 'model_contents')";
     let tables: Vec<String> =
-        sqlx::query_scalar(tables).fetch_all(&mut *conn).await.map_err(OpenError::Open)?;
+        db::query_scalar(tables).fetch_all(&mut *conn).await.map_err(OpenError::Open)?;
     for table in std::iter::once("sqlite_schema").chain(tables.iter().map(String::as_str)) {
-        let said: String = sqlx::query_scalar("SELECT quick_check FROM pragma_quick_check(?1)")
+        let said: String = db::query_scalar("SELECT quick_check FROM pragma_quick_check($1)")
             .bind(table)
             .fetch_one(&mut *conn)
             .await
@@ -330,7 +330,7 @@ mod tests {
     async fn a_setting_that_did_not_take_is_found() {
         let dir = tempfile::tempdir().unwrap();
         let mut opened = open(dir.path(), None).await.unwrap();
-        sqlx::raw_sql("PRAGMA synchronous = NORMAL").execute(&mut opened.writer).await.unwrap();
+        db::raw_sql("PRAGMA synchronous = NORMAL").execute(&mut opened.writer).await.unwrap();
         assert!(matches!(
             check_pragmas(&mut opened.writer).await,
             Err(OpenError::Pragma { pragma: "synchronous", .. })
@@ -345,7 +345,7 @@ mod tests {
         for (change, says) in [(newer, "migration 9999"), (other, "migration 1 ")] {
             let dir = tempfile::tempdir().unwrap();
             let mut opened = open(dir.path(), None).await.unwrap();
-            sqlx::raw_sql(change).execute(&mut opened.writer).await.unwrap();
+            db::raw_sql(change).execute(&mut opened.writer).await.unwrap();
             opened.reads.close().await;
             opened.writer.close().await.unwrap();
             drop(opened.lock);
@@ -392,7 +392,7 @@ mod tests {
     async fn readers_cannot_write() {
         let dir = tempfile::tempdir().unwrap();
         let opened = open(dir.path(), None).await.unwrap();
-        let write = sqlx::query("INSERT INTO maps (name, distance, created_ms) VALUES ('a', 'both', 0)")
+        let write = db::query("INSERT INTO maps (name, distance, created_ms) VALUES ('a', 'both', 0)")
             .execute(&opened.reads)
             .await;
         assert!(write.is_err());

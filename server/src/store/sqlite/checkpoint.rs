@@ -2,7 +2,7 @@
 //! itself after a commit, and tell nobody of an error in it; so it is told not to, and the store
 //! does it.
 
-use super::StoreError;
+use crate::store::StoreError;
 use sqlx::SqliteConnection;
 use std::{
     fs::File,
@@ -11,7 +11,7 @@ use std::{
 };
 
 /// Pages of the log from which on it is moved into the file: 4 MB, as SQLite has it.
-pub(super) const LOG_PAGES: i64 = 1000;
+pub(in crate::store) const LOG_PAGES: i64 = 1000;
 
 /// Bytes that are written anew at a time.
 const PIECE_BYTES: usize = 1 << 20;
@@ -43,7 +43,10 @@ pub(super) fn renew_log(log: &Path) -> io::Result<()> {
 
 /// Moves a log of at least `pages` pages into the file, as far as nobody reads it. Waits for
 /// nobody.
-pub(super) async fn move_long_log(conn: &mut SqliteConnection, pages: i64) -> Result<(), StoreError> {
+pub(in crate::store) async fn move_long_log(
+    conn: &mut SqliteConnection,
+    pages: i64,
+) -> Result<(), StoreError> {
     let at = || StoreError::during("look at the log");
     // Busy, pages of the log, pages that are in the file.
     let (_, length, _): (i64, i64, i64) =
@@ -57,7 +60,7 @@ pub(super) async fn move_long_log(conn: &mut SqliteConnection, pages: i64) -> Re
 
 /// Moves the whole log into the file and empties it, so that the file alone is complete. Waits for
 /// readers. False: one still reads, and the log stays.
-pub(super) async fn empty_log(conn: &mut SqliteConnection) -> Result<bool, sqlx::Error> {
+pub(in crate::store) async fn empty_log(conn: &mut SqliteConnection) -> Result<bool, sqlx::Error> {
     let busy: i64 = sqlx::query_scalar("PRAGMA wal_checkpoint(TRUNCATE)").fetch_one(conn).await?;
     Ok(busy == 0)
 }

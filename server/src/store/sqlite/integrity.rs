@@ -5,7 +5,7 @@
 //! The start itself compares no indexes (`open`): that reads the file once more, and robots would
 //! wait for it. An index that differs from its table makes a query miss rows, or find others.
 
-use super::{Store, StoreError, now_ms, statements::statements};
+use crate::store::{Store, StoreError, now_ms, statements::statements};
 use protos::api::DatabaseCheckState;
 use sqlx::Connection as _;
 use std::{
@@ -116,7 +116,7 @@ fn cause(error: &StoreError) -> String {
 async fn faults(store: &Store, stopping: watch::Receiver<bool>) -> Result<Vec<String>, StoreError> {
     let at = || StoreError::during("check the database");
     // A connection of its own: requests keep theirs.
-    let mut conn = store.reads().acquire().await.map_err(at())?.detach();
+    let mut conn = store.reads().sqlite().acquire().await.map_err(at())?.detach();
     let mut since = Instant::now();
     conn.lock_handle().await.map_err(at())?.set_progress_handler(STEPS, move || {
         if since.elapsed() > WORK {
@@ -152,7 +152,7 @@ mod tests {
         let create = catalogue.write(move |tx| Box::pin(landmarks::create(tx, "hall", "poster", none, 9)));
         create.await.unwrap();
         let roots = "SELECT rootpage FROM sqlite_schema WHERE type = 'index' AND tbl_name = 'landmarks'";
-        let roots: Vec<i64> = sqlx::query_scalar(roots).fetch_all(catalogue.reads()).await.unwrap();
+        let roots: Vec<i64> = sqlx::query_scalar(roots).fetch_all(catalogue.reads().sqlite()).await.unwrap();
         task.close().await;
         let mut bytes = fs::read(data.join(FILE)).unwrap();
         let mut damaged = 0;
