@@ -3,7 +3,7 @@
 use crate::{
     building::Building,
     seed,
-    wall::{WallSegment, range},
+    wall::{WallSegment, first_hit},
 };
 use map::{laser::Scan, pose2::Pose2};
 use nalgebra::{Point2, Vector2};
@@ -28,7 +28,12 @@ pub struct LaserParams {
     pub max_range_m: f64,
     /// Standard deviation of a range, metres.
     pub range_sigma_m: f64,
+    /// Standard deviation of walls from their line, metres; they bow as real ones do.
+    pub uneven_m: f64,
 }
+
+/// Length of a bow of an uneven wall, metres: with 1 cm, walls turn by 5 mrad.
+const BOW_M: f64 = 12.6;
 
 impl Default for LaserParams {
     fn default() -> Self {
@@ -38,6 +43,7 @@ impl Default for LaserParams {
             field_rad: std::f64::consts::PI,
             max_range_m: 8.0,
             range_sigma_m: 0.015,
+            uneven_m: 0.0,
         }
     }
 }
@@ -61,14 +67,25 @@ pub fn scan_among(walls: &[WallSegment], map_from_robot: &Pose2, params: &LaserP
         let bearing = map_from_laser.theta_rad - 0.5 * field + i as f64 * step;
         let direction = Vector2::new(bearing.cos(), bearing.sin());
         let noise: f64 = StandardNormal.sample(&mut rng);
-        match range(walls, &origin, &direction, max_range_m) {
-            Some(r) => (r + p.range_sigma_m * noise).clamp(0.001, max_range_m) as f32,
-            None => max_range_m as f32,
-        }
+        let Some((r, wall)) = first_hit(walls, &origin, &direction, max_range_m) else {
+            return max_range_m as f32;
+        };
+        let across = direction.dot(&wall.normal()).abs().max(0.1);
+        let uneven = p.uneven_m * bow(wall, &(origin + direction * r)) / across;
+        (r + uneven + p.range_sigma_m * noise).clamp(0.001, max_range_m) as f32
     };
     let ranges = (0..beams).map(beam).collect();
     Scan::new(p.robot_from_laser, -0.5 * field, step, max_range_m, ranges)
         .expect("parameters are clamped to a scan's ranges")
+}
+
+/// How far a wall is off its line at a point, for a standard deviation of 1.
+fn bow(wall: &WallSegment, at: &Point2<f64>) -> f64 {
+    let along_m = wall.direction().dot(&(at - wall.a_m));
+    // Every wall bows in its own way.
+    let phase = seed::mix(wall.a_m.x.to_bits() ^ seed::mix(wall.b_m.y.to_bits() ^ wall.a_m.y.to_bits()));
+    let phase = phase as f64 / u64::MAX as f64;
+    std::f64::consts::SQRT_2 * (std::f64::consts::TAU * (along_m / BOW_M + phase)).sin()
 }
 
 #[cfg(test)]
@@ -117,6 +134,22 @@ mod tests {
         let mean = errors.iter().sum::<f64>() / 4000.0;
         let sigma = (errors.iter().map(|e| (e - mean).powi(2)).sum::<f64>() / 4000.0).sqrt();
         assert!(mean.abs() < 0.0015 && (sigma - 0.02).abs() < 0.001, "{mean} {sigma}");
+    }
+
+    #[test]
+    fn uneven_walls_are_off_their_lines_by_a_centimetre() {
+        let building = Building::corridor(2);
+        let uneven = LaserParams { uneven_m: 0.01, beams: 2, ..quiet() };
+        let off = |i: u32| {
+            let robot = Pose2::new(2.0 + 0.1 * f64::from(i), 0.3, 0.0);
+            let range = |p| f64::from(scan(&building, &robot, p, 0).range_m(0).unwrap() as f32);
+            range(&uneven) - range(&LaserParams { beams: 2, ..quiet() })
+        };
+        let all: Vec<f64> = (0..126).map(off).collect();
+        let sigma = (all.iter().map(|e| e * e).sum::<f64>() / all.len() as f64).sqrt();
+        assert!((sigma - 0.01).abs() < 0.001, "{sigma}");
+        let steepest = all.windows(2).map(|w| (w[1] - w[0]).abs() / 0.1).fold(0.0, f64::max);
+        assert!((0.006..0.008).contains(&steepest), "{steepest}");
     }
 
     #[test]

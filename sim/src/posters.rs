@@ -26,7 +26,7 @@ pub fn poster_of_size(seed: u64, width_texels: usize, aspect: f32) -> Texture {
     let aspect = if aspect.is_finite() { aspect.clamp(0.25, 4.0) } else { 1.0 };
     let height = (width as f32 * aspect).round() as usize;
     let mut canvas = Canvas::new(width, height, 0.5);
-    let mut rng = seed::stream(seed, 0x0070_6F73_7465_7200);
+    let mut rng = stream(seed);
     draw(&mut canvas, &mut rng);
     canvas.into_texture(Edge::Clamp)
 }
@@ -63,25 +63,35 @@ fn draw(canvas: &mut Canvas, rng: &mut ChaCha8Rng) {
 
 /// Draws the border and returns the area within.
 fn border(canvas: &mut Canvas, rng: &mut ChaCha8Rng) -> Area {
-    let all = canvas.area();
+    bands(rng).into_iter().fold(canvas.area(), |area, [thickness, grey]| {
+        canvas.frame(area, thickness, grey);
+        area.inset(thickness)
+    })
+}
+
+/// Bands of the border from outside in: thickness, as a share of the width, and grey.
+fn bands(rng: &mut ChaCha8Rng) -> Vec<[f32; 2]> {
     match rng.random_range(0..5) {
-        0 => all,
-        1 => framed(canvas, all, rng.random_range(0.02..0.04), 0.05),
-        2 => framed(canvas, all, rng.random_range(0.02..0.05), 0.97),
-        3 => {
-            let inner = framed(canvas, all, 0.025, rng.random_range(0.08..0.25));
-            framed(canvas, inner, rng.random_range(0.04..0.08), 0.93)
-        }
-        _ => {
-            let inner = framed(canvas, all, 0.03, 0.95);
-            framed(canvas, inner, 0.015, 0.1)
-        }
+        0 => Vec::new(),
+        1 => vec![[rng.random_range(0.02..0.04), 0.05]],
+        2 => vec![[rng.random_range(0.02..0.05), 0.97]],
+        3 => vec![[0.025, rng.random_range(0.08..0.25)], [rng.random_range(0.04..0.08), 0.93]],
+        _ => vec![[0.03, 0.95], [0.015, 0.1]],
     }
 }
 
-fn framed(canvas: &mut Canvas, area: Area, thickness: f32, grey: f32) -> Area {
-    canvas.frame(area, thickness, grey);
-    area.inset(thickness)
+/// How far each of the poster's borders is from its outer edge, as shares of its width: 0 first.
+pub fn borders(seed: u64) -> Vec<f64> {
+    let mut inset = 0.0;
+    let inner = bands(&mut stream(seed)).into_iter().map(|[thickness, _]| {
+        inset += f64::from(thickness);
+        inset
+    });
+    std::iter::once(0.0).chain(inner.collect::<Vec<_>>()).collect()
+}
+
+fn stream(seed: u64) -> ChaCha8Rng {
+    seed::stream(seed, 0x0070_6F73_7465_7200)
 }
 
 /// Fills the ground; true when it is dark.

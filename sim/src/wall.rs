@@ -38,6 +38,16 @@ pub(crate) fn range(
     direction: &Vector2<f64>,
     max_m: f64,
 ) -> Option<f64> {
+    first_hit(walls, from_m, direction, max_m).map(|(range_m, _)| range_m)
+}
+
+/// As [`range`], with the wall.
+pub(crate) fn first_hit<'a>(
+    walls: &'a [WallSegment],
+    from_m: &Point2<f64>,
+    direction: &Vector2<f64>,
+    max_m: f64,
+) -> Option<(f64, &'a WallSegment)> {
     let hit = |w: &WallSegment| {
         let (along, to_a) = (w.b_m - w.a_m, w.a_m - from_m);
         let cross = direction.perp(&along);
@@ -47,5 +57,5 @@ pub(crate) fn range(
         let (r, k) = (to_a.perp(&along) / cross, to_a.perp(direction) / cross);
         (r > 1e-9 && r < max_m && (0.0..=1.0).contains(&k)).then_some(r)
     };
-    walls.iter().filter_map(hit).min_by(f64::total_cmp)
+    walls.iter().filter_map(|w| Some((hit(w)?, w))).min_by(|a, b| a.0.total_cmp(&b.0))
 }
