@@ -73,7 +73,7 @@ impl SurveyProblem {
         made.camera(survey);
         for drive in 0..survey.drives.len() {
             made.odometry(survey, params, drive)?;
-            made.lines(survey, drive)?;
+            made.lines(survey, params, drive)?;
         }
         made.plan(survey, params);
         for (number, (drive, track)) in survey.tracks().enumerate() {
@@ -112,7 +112,7 @@ impl SurveyProblem {
     }
 
     /// The first observation of a wall is its start value, and its middle the anchor.
-    fn lines(&mut self, survey: &Survey, drive: usize) -> Result<(), JointError> {
+    fn lines(&mut self, survey: &Survey, params: &JointParams, drive: usize) -> Result<(), JointError> {
         for (number, line) in survey.drives[drive].lines.iter().enumerate() {
             let keyframe = self.first_keyframe[drive] + line.keyframe;
             let walls = &mut self.problem.state.walls;
@@ -124,7 +124,8 @@ impl SurveyProblem {
             let wrong = JointError::Survey { field: "covariance", what: "line", number };
             let sqrt_information = sqrt_information(&line.covariance).ok_or(wrong)?;
             let (facing_rad, offset_m) = (line.facing_rad, line.offset_m);
-            let factor = LineFit { keyframe, wall, facing_rad, offset_m, sqrt_information };
+            let doubt_chi2 = params.line_doubt_chi2;
+            let factor = LineFit { keyframe, wall, facing_rad, offset_m, sqrt_information, doubt_chi2 };
             self.problem.factors.push(Factor::Line(factor));
         }
         Ok(())

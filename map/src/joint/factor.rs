@@ -61,7 +61,7 @@ pub enum Factor {
 /// Factors on the width of robust kernels (graduated non-convexity).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Kernels {
-    /// Of views.
+    /// Of views and lines.
     pub views: f64,
     /// Of identities, and of landmarks on walls.
     pub identities: f64,
@@ -125,6 +125,7 @@ impl Factor {
             Self::View(_) => Some(VIEW_CHI2 * kernels.views),
             Self::Same(_) => Some(SAME_CHI2 * kernels.identities),
             Self::OnWall(_) => Some(ON_WALL_CHI2 * kernels.identities),
+            Self::Line(f) => f.doubt_chi2.map(|chi2| chi2 * kernels.views),
             Self::ScanMatch(f) => f.doubt_chi2,
             _ => None,
         }

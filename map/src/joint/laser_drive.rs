@@ -62,6 +62,8 @@ pub(super) struct DriveSurvey {
     pub(super) survey: Survey,
     /// Keyframes by the laser map.
     pub(super) keyframes: Vec<Pose2>,
+    /// Keyframe of each of the laser map's.
+    pub(super) of_key: Vec<usize>,
     /// Keyframe of each frame.
     pub(super) of_frame: Vec<usize>,
     /// Walls of the survey: pieces of the laser map's.
@@ -104,7 +106,7 @@ impl LaserDrive<'_> {
         let pieces = pieces(&self.map.walls);
         let Keyframes { poses, motions, of_key, of_frame } = self.keyframes(odometry);
         let mut lines = Vec::new();
-        for (key, keyframe) in self.map.keys.iter().zip(of_key) {
+        for (key, keyframe) in self.map.keys.iter().zip(of_key.iter().copied()) {
             let on = |line: &LaserSegment| piece_of(line, &key.pose.pose, &self.map.walls, &pieces);
             lines.extend(key.lines.iter().filter_map(|line| Some(line_seen(line, keyframe, on(line)?))));
         }
@@ -126,7 +128,7 @@ impl LaserDrive<'_> {
             plan: Vec::new(),
             candidates: Vec::new(),
         };
-        Ok(DriveSurvey { survey, keyframes: poses, of_frame, pieces })
+        Ok(DriveSurvey { survey, keyframes: poses, of_key, of_frame, pieces })
     }
 
     /// A scan and a frame of one time are one keyframe.

@@ -18,11 +18,14 @@ use crate::{
     place::LandmarkPlace,
     pose2::{Pose2, Pose2Covariance},
     segments::LaserSegment,
+    slam::SlamMap,
 };
 use nalgebra::{Matrix2, Matrix3, Matrix6, Point2, SVector};
 
 /// Variables whose covariance is computed at once.
 const AT_ONCE: usize = 32;
+/// 99.9 % of chi2 with 2 degrees of freedom: beyond it a line may be of another wall.
+const LINE_CHI2: f64 = 13.8;
 /// Parameters of a landmark's variable that its place has a covariance of.
 const OF_PLACE: [usize; 6] = [0, 1, 2, 3, 6, 7];
 
@@ -53,6 +56,8 @@ pub struct JointLaserMap {
     pub walls: Vec<MappedWall>,
     /// `map_from_robot` of every frame, with its covariance relative to the first keyframe.
     pub frames: Vec<Pose2Covariance>,
+    /// `map_from_robot` of every scan, in order.
+    pub path: Vec<Pose2>,
     /// Objects in their order; `None` with too few views, or at no possible place.
     pub objects: Vec<Option<MappedObject>>,
     /// The camera as estimated.
@@ -73,17 +78,28 @@ impl LaserDrive<'_> {
         odometry: &FuseParams,
     ) -> Result<JointLaserMap, JointError> {
         let made = self.survey(camera, odometry)?;
-        let solved = opened_from(&made.survey, params, made.keyframes.clone())?;
+        let params = JointParams { line_doubt_chi2: Some(LINE_CHI2), ..params.clone() };
+        let solved = opened_from(&made.survey, &params, made.keyframes.clone())?;
         let camera = Marginals::of(&solved.problem, &[Variable::Camera(0)])?.into_covariance();
         Ok(JointLaserMap {
             walls: walls(&solved, &made, &self.map.walls)?,
             frames: frames(&solved, &made.of_frame)?,
+            path: path(self.map, &made.of_key, &solved.problem.state.keyframes),
             objects: objects(&solved)?,
             camera: solved.problem.state.cameras[0],
             camera_sigmas: SVector::from_fn(|i, _| camera[(i, i)].max(0.0).sqrt()),
             odometry: solved.problem.state.odometry[0],
         })
     }
+}
+
+/// Every scan moves with the keyframe before it.
+fn path(map: &SlamMap, of_key: &[usize], keyframes: &[Pose2]) -> Vec<Pose2> {
+    let scan = |(scan, pose): (usize, &Pose2)| {
+        let key = map.keys.partition_point(|key| key.scan <= scan).saturating_sub(1);
+        keyframes[of_key[key]].compose(&map.keys[key].pose.pose.between(pose))
+    };
+    map.path.iter().enumerate().map(scan).collect()
 }
 
 fn frames(solved: &SurveyProblem, of_frame: &[usize]) -> Result<Vec<Pose2Covariance>, JointError> {

@@ -26,6 +26,8 @@ pub struct JointParams {
     pub plan_sigma_m: f64,
     /// Error of a printed border, added to the covariance of every corner, px.
     pub border_sigma_px: f64,
+    /// For lines that the program gave to walls: beyond this chi2 a line's weight falls off.
+    pub line_doubt_chi2: Option<f64>,
     /// Least views of a track that becomes a landmark.
     pub min_views: usize,
 }
@@ -43,6 +45,7 @@ impl Default for JointParams {
             plan_sigma_rad: 0.3_f64.to_radians(),
             plan_sigma_m: 0.03,
             border_sigma_px: 0.3,
+            line_doubt_chi2: None,
             min_views: 3,
         }
     }

@@ -141,6 +141,7 @@ impl JointWindow {
             facing_rad,
             offset_m,
             sqrt_information,
+            doubt_chi2: None,
         }));
         Ok(())
     }

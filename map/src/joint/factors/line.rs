@@ -18,6 +18,8 @@ pub struct LineFit {
     pub offset_m: f64,
     /// Root of the information over (facing angle, offset).
     pub sqrt_information: Matrix2<f64>,
+    /// For a line that may be of another wall: beyond this chi2 its weight falls off.
+    pub doubt_chi2: Option<f64>,
 }
 
 impl LineFit {

@@ -101,6 +101,7 @@ fn factors() -> Vec<Factor> {
         facing_rad: 0.4,
         offset_m: -2.0,
         sqrt_information: sqrt_information(&Matrix2::new(1e-5, 1e-6, 1e-6, 1e-5)).unwrap(),
+        doubt_chi2: None,
     };
     let on_wall = |wall| OnWall { landmark: 0, wall, distance_sigma_m: 0.01, angle_sigma_rad: 0.009 };
     let plan = WallLine { anchor: Point2::new(-3.0, 2.0), facing_rad: 3.1, offset_m: 0.2 };

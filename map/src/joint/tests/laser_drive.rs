@@ -231,3 +231,26 @@ fn frames_and_scans_of_one_time_are_one_keyframe_and_strays_are_refused() {
     let refused = driven.drive().survey(stated, &FuseParams::default()).unwrap_err();
     assert!(refused.to_string().starts_with("scan of laser map"), "{refused}");
 }
+
+#[test]
+fn lines_of_cupboards_do_not_pull_the_walls_behind_them() {
+    let mut driven = driven(&camera(), 1);
+    // A third of the keyframes sees something 12 cm before the left wall.
+    for key in driven.map.keys.iter_mut().step_by(3) {
+        for line in &mut key.lines {
+            let [a, b] = [line.a, line.b].map(|end| end + line.facing() * 0.12);
+            let is_left = key.pose.pose.theta_rad.cos() * line.facing().y < -0.9;
+            if is_left {
+                *line = LaserSegment::about_middle(a, b, &line.covariance_about_middle()).unwrap();
+            }
+        }
+    }
+    let made = solved(&driven, &camera());
+    let start = path()[0];
+    for (object, poster) in made.objects.iter().zip(posters()) {
+        let MappedObject { place, .. } = object.as_ref().unwrap();
+        let truth = start.inverse().apply(&Point2::from(poster.centre.xy()));
+        let off = Point2::new(place.x_m, place.y_m) - truth;
+        assert!(off.norm() < 0.04, "{off}");
+    }
+}
