@@ -10,7 +10,7 @@ pub(crate) mod report;
 mod simulated;
 
 pub use drive_log::DriveLog;
-pub use simulated::{SimulatedDrive, simulated_drive};
+pub use simulated::{SimulatedDrive, UNEVEN_M, simulated_drive};
 
 use crate::{arg_parsers::numbers, recording::drive_args::DriveArgs, screen, session::ServerArgs};
 use anyhow::Context as _;

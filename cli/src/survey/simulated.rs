@@ -1,16 +1,19 @@
-//! A simulated drive as a recording has it: scans, odometry, and frames with a camera whose
-//! intrinsics and mounting are stated wrongly.
+//! A simulated drive as a recording has it: scans of uneven walls, odometry, and frames with a
+//! camera whose intrinsics and mounting are stated wrongly. Errors are as large as an estimate
+//! believes them to be: only there can its covariance be evaluated.
 
 use super::drive_log::DriveLog;
 use crate::{pictures, simulated_errors::SimulatedRobotErrors};
 use anyhow::Context as _;
 use client::protos::convert::frame::{CheckedFrame, EncodedImage, Encoding, Pixels};
 use engine::survey::{Drive, DriveFrame, ScanStamp};
-use map::extrinsics::CameraExtrinsics;
+use map::{extrinsics::CameraExtrinsics, fuse::FuseParams};
 use nalgebra::{Isometry3, Vector3, Vector6};
 use sim::{
     building::Building,
     drive::DriveParams,
+    laser::LaserParams,
+    odometry::OdometryParams,
     robot::{Robot, RobotParams, SensorReadings},
 };
 use std::sync::Arc;
@@ -18,6 +21,9 @@ use vision::{pose::reprojection::perturbed, random::Random};
 
 /// Error of a mounting that was measured with a tape: each angle (radians) and coordinate (metres).
 const MOUNTING: [f64; 2] = [0.6 * std::f64::consts::PI / 180.0, 0.01];
+
+/// How far walls are off their lines, metres: lines of public laser logs spread so far about theirs.
+pub const UNEVEN_M: f64 = 0.01;
 
 /// A drive, and what its robot did not know.
 #[derive(Debug)]
@@ -28,6 +34,18 @@ pub struct SimulatedDrive {
     pub mounting: Isometry3<f64>,
 }
 
+/// Errors of odometry, as large as an estimate believes of an unknown robot.
+fn odometry(random: &mut Random) -> OdometryParams {
+    let believed = FuseParams::default();
+    OdometryParams {
+        scale_error: believed.scale_sigma * random.normal(),
+        heading_bias_rad_per_m: believed.turn_bias_sigma_rad_per_m * random.normal(),
+        length_sigma_m: believed.along_m,
+        heading_sigma_rad: believed.turn_rad,
+        turn_sigma_rad: believed.turn_per_turn_rad,
+    }
+}
+
 /// Drives through a building; `sensed` is told of every step.
 pub fn simulated_drive(
     building: &Arc<Building>,
@@ -35,9 +53,11 @@ pub fn simulated_drive(
     mut sensed: impl FnMut(&SensorReadings),
 ) -> anyhow::Result<SimulatedDrive> {
     let seed = drive.seed;
-    let robot = Robot::new(building.clone(), &RobotParams { drive, ..RobotParams::default() });
-    let stated = SimulatedRobotErrors::drawn(robot.camera().intrinsics(), seed ^ 1).camera;
     let mut random = Random::new(seed ^ 2);
+    let drive = DriveParams { odometry: odometry(&mut random), ..drive };
+    let laser = LaserParams { uneven_m: UNEVEN_M, ..LaserParams::default() };
+    let robot = Robot::new(building.clone(), &RobotParams { drive, laser, ..RobotParams::default() });
+    let stated = SimulatedRobotErrors::drawn(robot.camera().intrinsics(), seed ^ 1).camera;
     let [turn, shift] = MOUNTING;
     let error = Vector6::new(turn, turn, turn, shift, shift, shift).map(|s| s * random.normal());
     let (turn, shift): (Vector3<f64>, Vector3<f64>) =
@@ -71,4 +91,37 @@ pub fn simulated_drive(
     }
     let (origin, mounting) = first.context("a drive without a step")?;
     Ok(SimulatedDrive { log: DriveLog { origin, scans, drive }, mounting })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{super::surveyed, *};
+    use engine::survey::SurveyedObject;
+    use sim::{
+        building::{LandmarkKind, LandmarkTruth},
+        corridor::CorridorParams,
+    };
+    use vision::params::Params;
+
+    #[test]
+    fn doors_that_look_alike_are_no_landmarks_and_posters_are() {
+        let corridor = CorridorParams { posters: 4, ..CorridorParams::default() };
+        let building = Arc::new(Building::corridor_with(&corridor, 12));
+        let drive = DriveParams { seed: 3, legs: 2, rate_hz: 3.0, ..DriveParams::default() };
+        let log = simulated_drive(&building, drive, |_| ()).unwrap().log;
+        let found = surveyed(&log, &Params::default()).unwrap();
+        let there = |object: &SurveyedObject| {
+            let at = object.place.map_from_landmark().translation.vector;
+            let off = |l: &LandmarkTruth| (l.map_from_landmark.translation.vector - at).norm();
+            building.landmarks().iter().find(|l| off(l) < 0.3).map(|l| l.kind)
+        };
+        let accepted = found.objects.iter().filter(|object| object.refused.is_none());
+        let kinds: Vec<_> = accepted.map(there).collect();
+        assert!(kinds.iter().filter(|kind| **kind == Some(LandmarkKind::Poster)).count() >= 2, "{kinds:?}");
+        assert!(!kinds.contains(&Some(LandmarkKind::Door)), "{kinds:?}");
+        let why: Vec<_> = found.objects.iter().map(|object| (there(object), &object.refused)).collect();
+        let alike = |why: &&Option<String>| why.as_ref().is_some_and(|why| why.contains("looks like it"));
+        let doors = why.iter().filter(|(kind, _)| *kind == Some(LandmarkKind::Door)).map(|(_, why)| *why);
+        assert!(doors.filter(alike).count() >= 2, "{why:?}");
+    }
 }

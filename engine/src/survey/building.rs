@@ -3,9 +3,12 @@
 
 use super::{
     drive::{Drive, DriveFrame},
+    gates::{refusal, refuse_twins},
+    look_alikes::refuse_look_alikes,
     objects::{Known, ObjectView, SeenObject, objects},
     parallel::Effort,
     sightings::{sightings, straight},
+    surveyed::{SurveyedBuilding, SurveyedObject, with_focal},
 };
 use map::{
     extrinsics::CameraExtrinsics,
@@ -14,12 +17,11 @@ use map::{
         CameraState, CameraStated, FrameSeen, JointError, JointLaserMap, JointParams, LaserDrive, MappedWall,
         ObjectSeen, QuadView,
     },
-    place::LandmarkPlace,
     pose2::{Pose2, Pose2Covariance},
     segments::LaserSegment,
     slam::SlamMap,
 };
-use nalgebra::{Isometry3, Matrix3, Matrix6, Point2, SVector, Vector2};
+use nalgebra::{Isometry3, Matrix3, Matrix6, Point2, SVector};
 use vision::{
     frame::{Intrinsics, IntrinsicsSigmas},
     params::Params,
@@ -32,62 +34,6 @@ const MOUNTING_SIGMA: [f64; 2] = [std::f64::consts::PI / 180.0, 0.02];
 const K1_SIGMA: f64 = 1e-3;
 /// Times that objects are followed: with the camera as stated, then as found.
 const ROUNDS: usize = 2;
-/// Gates of an object: mean weight of its views, standard deviation of its centre (metres), angle
-/// between its views (radians) or way between them (metres), and number of views.
-const MIN_AGREEMENT: f64 = 0.5;
-const MAX_SIGMA_M: f64 = 0.25;
-const MIN_PARALLAX_RAD: f64 = 0.14;
-const MIN_BASELINE_M: f64 = 0.5;
-const MIN_VIEWS: usize = 4;
-
-/// An object of a surveyed building.
-#[derive(Debug, Clone)]
-pub struct SurveyedObject {
-    /// Where it hangs.
-    pub place: LandmarkPlace,
-    /// Its views.
-    pub views: Vec<ObjectView>,
-    /// Why it is no landmark; none where it is one.
-    pub refused: Option<String>,
-}
-
-/// What a drive gave.
-#[derive(Debug)]
-pub struct SurveyedBuilding {
-    /// Walls, map frame.
-    pub walls: Vec<LaserSegment>,
-    /// Walls of the laser map alone, for comparison.
-    pub laser_walls: Vec<LaserSegment>,
-    /// `map_from_robot` of each frame by the laser map alone.
-    pub laser_frames: Vec<Pose2>,
-    /// Objects.
-    pub objects: Vec<SurveyedObject>,
-    /// `map_from_robot` of each frame.
-    pub frames: Vec<Pose2Covariance>,
-    /// The camera as found, without its lens, and its standard deviations.
-    pub camera: (CameraState, SVector<f64, 10>),
-    /// The camera as stated.
-    pub stated: CameraState,
-    /// Scale of odometry as found, minus 1.
-    pub odometry_scale: f64,
-    /// Loop closures of the laser map.
-    pub loops: usize,
-    /// Frames that could not be decoded.
-    pub undecodable: usize,
-}
-
-impl SurveyedBuilding {
-    /// The mounting of a frame by the camera as found.
-    pub fn mounting(&self, stated: &Isometry3<f64>) -> Isometry3<f64> {
-        self.camera.0.robot_from_camera * self.stated.robot_from_camera.inverse() * stated
-    }
-
-    /// Intrinsics with the focal length as found; their lens stays.
-    pub fn intrinsics(&self, stated: &Intrinsics) -> Intrinsics {
-        with_focal(stated, self.camera.0.focal_px)
-    }
-}
-
 /// Why a drive gives no building.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SurveyError {
@@ -143,13 +89,15 @@ pub fn surveyed(
         let found = objects(drive, &seen, &known, (params, effort));
         let map = solved(drive, slam, &found, &camera, &stated)?;
         if round == ROUNDS {
-            return Ok(SurveyedBuilding {
+            let mut building = SurveyedBuilding {
                 laser_walls: slam.walls.clone(),
                 laser_frames,
                 loops: slam.loops.len(),
                 undecodable,
                 ..made(found, map, stated)
-            });
+            };
+            refuse_look_alikes(drive, &mut building, (params, effort));
+            return Ok(building);
         }
         known = corrected(drive, &map, &camera, &stated)?;
     }
@@ -250,10 +198,6 @@ fn corrected(
     })
 }
 
-fn with_focal(camera: &Intrinsics, focal_px: f64) -> Intrinsics {
-    Intrinsics { fx_px: focal_px, fy_px: focal_px * camera.fy_px / camera.fx_px, ..*camera }
-}
-
 /// The solution, without what is of the laser map and the frames.
 fn made(found: Vec<SeenObject>, map: JointLaserMap, stated: CameraState) -> SurveyedBuilding {
     let mut objects = Vec::new();
@@ -278,82 +222,10 @@ fn made(found: Vec<SeenObject>, map: JointLaserMap, stated: CameraState) -> Surv
     }
 }
 
-/// Why an object is no landmark by its own views.
-fn refusal(place: &LandmarkPlace, agreement: f64, poses: &[Pose2]) -> Option<String> {
-    let centre = Vector2::new(place.x_m, place.y_m);
-    let ways: Vec<Vector2<f64>> = poses.iter().map(|pose| pose.position() - centre).collect();
-    let pairs = || ways.iter().enumerate().flat_map(|(i, a)| ways[i + 1..].iter().map(move |b| (a, b)));
-    let parallax = pairs().map(|(a, b)| a.angle(b)).fold(0.0, f64::max);
-    let baseline_m = pairs().map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
-    let sigma_m = (place.covariance[(0, 0)] + place.covariance[(1, 1)]).sqrt();
-    if poses.len() < MIN_VIEWS {
-        Some(format!("{} views, {MIN_VIEWS} needed", poses.len()))
-    } else if parallax < MIN_PARALLAX_RAD && baseline_m < MIN_BASELINE_M {
-        Some(format!("seen from one place only: {:.0} degrees, {baseline_m:.2} m", parallax.to_degrees()))
-    } else if agreement < MIN_AGREEMENT {
-        Some(format!("its views contradict each other: {:.0} % agree", 100.0 * agreement))
-    } else if sigma_m > MAX_SIGMA_M {
-        Some(format!("its place is known to {sigma_m:.2} m only"))
-    } else {
-        None
-    }
-}
-
-/// Of objects at one place, that with most views stays: the others are its frame or its mat.
-fn refuse_twins(objects: &mut [SurveyedObject]) {
-    let reach = |place: &LandmarkPlace| 0.5 * place.size.width_m.max(place.size.height_m);
-    let at = |place: &LandmarkPlace| place.map_from_landmark().translation.vector;
-    for i in 0..objects.len() {
-        let rival = (0..objects.len()).find(|&j| {
-            let (own, other) = (&objects[i], &objects[j]);
-            let apart = (at(&own.place) - at(&other.place)).norm();
-            let is_near = apart < reach(&own.place).max(reach(&other.place));
-            let is_better =
-                (other.views.len(), std::cmp::Reverse(j)) > (own.views.len(), std::cmp::Reverse(i));
-            i != j && is_near && is_better && own.refused.is_none() && other.refused.is_none()
-        });
-        if rival.is_some() {
-            objects[i].refused = Some("another one with more views is at its place".to_owned());
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::{super::drive::ScanStamp, *};
-    use map::place::PlaceSigmas;
-    use nalgebra::Vector3;
-    use vision::{geometry::Corners, pose::LandmarkSize};
-
-    fn place(x_m: f64, width_m: f64) -> LandmarkPlace {
-        let size = LandmarkSize { width_m, height_m: 0.8 };
-        LandmarkPlace::by_hand(Vector3::new(x_m, 0.0, 1.5), 0.0, size, PlaceSigmas::default()).unwrap()
-    }
-
-    fn object(x_m: f64, width_m: f64, views: usize) -> SurveyedObject {
-        let corners = [[0.0, 0.0], [9.0, 0.0], [9.0, 9.0], [0.0, 9.0]].map(Point2::from);
-        let view = ObjectView {
-            frame: 0,
-            corners_px: Corners::new(corners).unwrap(),
-            covariance_px2: [nalgebra::Matrix2::identity(); 4],
-        };
-        SurveyedObject { place: place(x_m, width_m), views: vec![view; views], refused: None }
-    }
-
-    #[test]
-    fn an_object_needs_views_from_several_places_that_agree() {
-        let poses = |ways: &[f64]| ways.iter().map(|y| Pose2::new(2.0, *y, 0.0)).collect::<Vec<_>>();
-        let there = place(0.0, 0.6);
-        let why = |agreement, poses: &[Pose2]| refusal(&there, agreement, poses).unwrap_or_default();
-        assert_eq!(why(0.9, &poses(&[-0.5, 0.0, 0.5, 1.0])), "");
-        assert_eq!(why(0.9, &poses(&[-0.5, 0.0, 0.5])), "3 views, 4 needed");
-        assert!(why(0.9, &poses(&[0.0, 0.01, 0.02, 0.03])).contains("one place only: 1 degrees, 0.03 m"));
-        assert!(why(0.4, &poses(&[-0.5, 0.0, 0.5, 1.0])).contains("40 % agree"));
-        let mut vague = there;
-        vague.covariance[(0, 0)] = 0.09;
-        let why = refusal(&vague, 0.9, &poses(&[-0.5, 0.0, 0.5, 1.0])).unwrap();
-        assert_eq!(why, "its place is known to 0.30 m only");
-    }
+    use nalgebra::Vector2;
 
     #[test]
     fn a_drive_whose_scans_go_back_in_time_is_refused() {
@@ -370,17 +242,6 @@ mod tests {
         assert_eq!(surveyed_at(&[5, 9, 8]), SurveyError::Times(2));
         assert_eq!(surveyed_at(&[0, 0]), SurveyError::Times(1));
         assert_eq!(surveyed_at(&[5, 9]), SurveyError::NoFrame);
-    }
-
-    #[test]
-    fn of_a_picture_and_its_frame_the_one_with_most_views_stays() {
-        let mut objects = vec![object(0.0, 0.6, 5), object(0.02, 0.7, 9), object(3.0, 0.6, 4)];
-        refuse_twins(&mut objects);
-        let refused: Vec<bool> = objects.iter().map(|object| object.refused.is_some()).collect();
-        assert_eq!(refused, [true, false, false]);
-        let mut equal = vec![object(0.0, 0.6, 5), object(0.02, 0.7, 5)];
-        refuse_twins(&mut equal);
-        assert_eq!(equal.iter().filter(|object| object.refused.is_some()).count(), 1, "one stays");
     }
 
     #[test]

@@ -2,7 +2,8 @@
 //!
 //! ```text
 //! drive (scans' odometry, frames) -> sightings (quads of frames) -> objects (quads of one object)
-//!     -> building (walls, objects, camera)
+//!     -> building (walls, objects, camera) -> landmarks (objects that pass gates, and look like
+//!     nothing else)
 //! ```
 //!
 //! In: a drive with its finished laser map. Out: walls, objects with places and views, the camera
@@ -12,10 +13,14 @@ mod parallel;
 mod drive;
 mod sightings;
 mod objects;
+mod surveyed;
+mod gates;
+mod look_alikes;
 mod building;
 
-pub use building::{SurveyError, SurveyedBuilding, SurveyedObject, surveyed};
+pub use building::{SurveyError, surveyed};
 pub use drive::{Drive, DriveBounds, DriveFrame, DriveReading, OF_FILE, ScanStamp, WHILE_DRIVING};
 pub use objects::ObjectView;
 pub use parallel::Effort;
 pub use sightings::picture;
+pub use surveyed::{SurveyedBuilding, SurveyedObject};

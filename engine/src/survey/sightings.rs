@@ -16,7 +16,7 @@ use vision::{
     icon::icon,
     model::ModelSet,
     params::Params,
-    pipeline::{FrameCamera, LandmarkDatabase, Pipeline},
+    pipeline::{FrameAnalysis, FrameCamera, LandmarkDatabase, Pipeline},
     recognise::{DistanceKind, IconFeatures, features},
     trace::NoTrace,
     up::Up,
@@ -51,16 +51,8 @@ pub fn picture(frame: &DriveFrame) -> Result<Picture, Rejection> {
 
 fn of_frame(frame: &DriveFrame, params: &Params) -> Result<Vec<Sighting>, Rejection> {
     let picture = picture(frame)?;
-    let mounting = frame.frame.mounting.as_ref();
-    let camera = FrameCamera {
-        intrinsics: frame.frame.intrinsics.as_ref(),
-        up: mounting.and_then(|mounting| Up::new(mounting.camera_up())),
-        height_m: mounting.map(|mounting| mounting.robot_from_camera.translation.vector.z),
-    };
     // Nothing is known yet.
-    let (models, sizes) = (ModelSet::default(), BTreeMap::new());
-    let none = LandmarkDatabase { models: &models, sizes: &sizes, kind: DistanceKind::default() };
-    let analysed = Pipeline::default().analyse(&picture, camera, none, params, &mut NoTrace);
+    let analysed = analysed(frame, &picture, &ModelSet::default(), params);
     let is_whole = |quad: &Quad| quad.kind == QuadKind::Full && !quad.side_clipped.contains(&true);
     let is_large = |quad: &Quad| quad.corners_px.area_px2().sqrt() >= MIN_SIDE_PX;
     let quads = analysed.quads.into_iter().map(|analysis| analysis.quad);
@@ -70,6 +62,24 @@ fn of_frame(frame: &DriveFrame, params: &Params) -> Result<Vec<Sighting>, Reject
         Some(Sighting { corners_px: quad.corners_px, covariance_px2: quad.corner_covariance_px2, icon })
     };
     Ok(quads.filter(is_whole).filter(is_large).take(MAX_QUADS).filter_map(sighting).collect())
+}
+
+/// Quads and names of a frame.
+pub(super) fn analysed(
+    frame: &DriveFrame,
+    picture: &Picture,
+    models: &ModelSet,
+    params: &Params,
+) -> FrameAnalysis {
+    let mounting = frame.frame.mounting.as_ref();
+    let camera = FrameCamera {
+        intrinsics: frame.frame.intrinsics.as_ref(),
+        up: mounting.and_then(|mounting| Up::new(mounting.camera_up())),
+        height_m: mounting.map(|mounting| mounting.robot_from_camera.translation.vector.z),
+    };
+    let sizes = BTreeMap::new();
+    let known = LandmarkDatabase { models, sizes: &sizes, kind: DistanceKind::default() };
+    Pipeline::default().analyse(picture, camera, known, params, &mut NoTrace)
 }
 
 /// Corners as a camera without a lens sees them; `None` where the lens is not invertible.

@@ -1,6 +1,7 @@
 //! `waymark-lab evaluate mapping`: maps built from scan logs, and their paths compared with the
 //! known relations of the truth.
 
+mod joint;
 mod localise;
 mod odometry;
 mod score;
@@ -67,6 +68,9 @@ pub(crate) struct Args {
     /// Parameters as a JSON file, as for `waymark map build`.
     #[arg(long, value_name = "FILE")]
     params: Option<PathBuf>,
+    /// Solve for walls and path together besides, as a survey does.
+    #[arg(long)]
+    joint: bool,
     /// Draw every map into this folder, as SVG.
     #[arg(long, value_name = "DIR")]
     draw: Option<PathBuf>,
@@ -83,6 +87,7 @@ struct Row {
     name: String,
     map: MapFile,
     found: Errors,
+    joint: Option<Errors>,
     odometry: Errors,
     relations: usize,
     seconds: f64,
@@ -179,6 +184,7 @@ fn row(args: &Args, name: &str, recording: &ScanLog) -> anyhow::Result<Row> {
     let built = build::build(records, |i| records[i].odom, build::params(args.params.as_ref())?)?;
     let odometry: Vec<Pose2> = records.iter().map(|r| r.odom).collect();
     let map = MapFile::of(&built.map);
+    let joint = args.joint.then(|| joint::path(&built.map)).transpose()?;
     if let Some(folder) = &args.draw {
         std::fs::create_dir_all(folder)?;
         let file = folder.join(format!("{}.svg", name.replace([' ', ','], "-")));
@@ -188,6 +194,7 @@ fn row(args: &Args, name: &str, recording: &ScanLog) -> anyhow::Result<Row> {
     Ok(Row {
         name: name.to_owned(),
         found: relations.errors(records, &built.map.path),
+        joint: joint.map(|path| relations.errors(records, &path)),
         odometry: relations.errors(records, &odometry),
         relations: relations.len(),
         seconds: built.seconds,
@@ -216,6 +223,7 @@ impl Row {
         json!({
             "log": self.name, "scans": self.map.path.len(), "keyframes": self.map.key_scans.len(),
             "relations": self.relations, "error": errors(&self.found), "odometry_error": errors(&self.odometry),
+            "joint_error": self.joint.as_ref().map(errors),
             "published_scan_matching_m": self.published().map(|p| p.1),
             "published_graph_mapping_m": self.published().map(|p| p.2),
             "loop_closures": self.map.loops.len(), "loop_closures_refused": self.map.refused,
@@ -231,8 +239,8 @@ fn table(rows: &[Row]) -> Vec<String> {
         "Error of relative poses, mean and standard deviation; published: scan matching, graph mapping (Kuemmerle et al. 2009)"
             .to_owned(),
         format!(
-            "{:<20} {:>9} {:>16} {:>14} {:>9} {:>16} {:>16} {:>6} {:>8} {:>9} {:>9} {:>8} {:>8} {:>7} {:>6}",
-            "log", "relations", "error m", "error deg", "odometry", "published sm", "published gm", "loops",
+            "{:<20} {:>9} {:>16} {:>14} {:>16} {:>9} {:>16} {:>16} {:>6} {:>8} {:>9} {:>9} {:>8} {:>8} {:>7} {:>6}",
+            "log", "relations", "error m", "error deg", "joint m", "odometry", "published sm", "published gm", "loops",
             "segments", "complete", "residual", "seconds", "faster", "fix us", "fixed"
         ),
     ];
@@ -242,11 +250,12 @@ fn table(rows: &[Row]) -> Vec<String> {
             |k: usize| r.published().map_or("-".to_owned(), |p| pair(if k == 0 { p.1 } else { p.2 }));
         let [deg, degs] = r.found.rotation_deg();
         lines.push(format!(
-            "{:<20} {:>9} {:>16} {:>14} {:>9.2} {:>16} {:>16} {:>6} {:>8} {:>8.1}% {:>7.1}cm {:>8.2} {:>8} {:>7.0} {:>5.0}%",
+            "{:<20} {:>9} {:>16} {:>14} {:>16} {:>9.2} {:>16} {:>16} {:>6} {:>8} {:>8.1}% {:>7.1}cm {:>8.2} {:>8} {:>7.0} {:>5.0}%",
             r.name,
             r.relations,
             pair(r.found.translation_m()),
             format!("{deg:.2} +/- {degs:.2}"),
+            r.joint.as_ref().map_or("-".to_owned(), |e| pair(e.translation_m())),
             r.odometry.translation_m()[0],
             published(0),
             published(1),

@@ -6,10 +6,12 @@ use super::{
     world::World,
 };
 use crate::evaluate::experiment::mixed;
+use cli::survey::UNEVEN_M;
 use map::pose2::Pose2;
 use nalgebra::Vector3;
 use sim::{
     drive::{DriveParams, middle},
+    laser::LaserParams,
     robot::{Robot, RobotParams, SensorReadings},
     steered::Steered,
 };
@@ -77,7 +79,11 @@ impl Body {
                 state: State::Driving,
             }
         });
-        let robot = Robot::new(world.building.clone(), &RobotParams { drive, ..RobotParams::default() });
+        // The same walls as in the survey.
+        let uneven_m = if world.course.surveyed { UNEVEN_M } else { 0.0 };
+        let laser = LaserParams { uneven_m, ..LaserParams::default() };
+        let robot =
+            Robot::new(world.building.clone(), &RobotParams { drive, laser, ..RobotParams::default() });
         Self { robot, steered }
     }
 

@@ -19,7 +19,7 @@ use map::{
     landmark_health::LandmarkHealth,
     pose2::{Pose2, Pose2Covariance},
 };
-use nalgebra::Matrix2;
+use nalgebra::{Matrix2, Point2, Vector3};
 use sim::{
     building::LandmarkKind,
     robot::SensorReadings,
@@ -30,12 +30,15 @@ use vision::{
     geometry::{Corners, polygon},
     model::LandmarkId,
     pipeline::{FrameAnalysis, matched_border},
+    pose::reprojection::pixel,
     recognise::Verdict,
     seen_border::FoundBy,
 };
 
 /// A name is right if its quad overlaps the landmark's true outline by this much.
 const IOU_TRUE: f64 = 0.5;
+/// Of a surveyed place, which is some centimetres off.
+const IOU_SURVEYED: f64 = 0.3;
 /// A frame shows a landmark if all of it is visible and no side is shorter than this...
 const MIN_SIDE_PX: f64 = 38.0;
 /// ... at up to this view angle, the paper's limit of recognition.
@@ -174,9 +177,15 @@ impl Journey {
     ) -> bool {
         let truth = &seen.frame.truth;
         let is_there = |id: LandmarkId, found: &Corners| {
-            let view = truth.landmark(world.name(id));
-            view.is_some_and(|v| polygon::iou(found.points(), v.corners_px.points()) >= IOU_TRUE)
+            let there = match world.course.surveyed {
+                true => surveyed_at(world, id, seen),
+                false => truth.landmark(world.name(id)).map(|v| *v.corners_px.points()),
+            };
+            let least = if world.course.surveyed { IOU_SURVEYED } else { IOU_TRUE };
+            there.is_some_and(|there| polygon::iou(found.points(), &there) >= least)
         };
+        // A survey takes what it finds: a panel of a door, the picture in a frame.
+        let border = |id| truth.landmark(world.name(id)).filter(|_| !world.course.surveyed);
         let mut global = Vec::new();
         for quad in &analysis.quads {
             let Some(Verdict::Unique(id)) = quad.recognition.as_ref().map(|v| v.verdict) else {
@@ -188,7 +197,7 @@ impl Journey {
                 global.push(world.name(id));
                 let corners =
                     quad.recognition.as_ref().and_then(|v| matched_border(&quad.quad, v, &world.map.params));
-                if let (Some(corners), Some(view)) = (corners, truth.landmark(world.name(id))) {
+                if let (Some(corners), Some(view)) = (corners, border(id)) {
                     let how = match corners.found_by {
                         FoundBy::Edges => "by the picture, detected",
                         FoundBy::Alignment => "by the picture, aligned",
@@ -206,7 +215,7 @@ impl Journey {
         for observation in guided.iter().flat_map(|guided| &guided.observations) {
             if is_there(observation.landmark, &observation.corners_px) {
                 with_pose.push(world.name(observation.landmark));
-                if let Some(view) = truth.landmark(world.name(observation.landmark)) {
+                if let Some(view) = border(observation.landmark) {
                     let group = match (observation.quad, view.state) {
                         (Some(_), _) => "detected, named by the pose",
                         (None, ViewState::Truncated) => "expected, cut",
@@ -241,6 +250,17 @@ impl Journey {
         self.recognised += shown.iter().filter(|v| global.contains(&v.name.as_str())).count();
         !shown.is_empty()
     }
+}
+
+/// Where the true pose sees a surveyed landmark, whose border the building does not name.
+fn surveyed_at(world: &World, id: LandmarkId, seen: &SensorReadings) -> Option<[Point2<f64>; 4]> {
+    let place = world.map.landmarks.get(&id)?.place?;
+    let map_from_camera = seen.step.map_from_robot.to_isometry3() * seen.step.robot_from_camera;
+    let camera_from_landmark = map_from_camera.inverse() * place.map_from_landmark();
+    let (w, h) = (0.5 * place.size.width_m, 0.5 * place.size.height_m);
+    let corner = |[y, z]: [f64; 2]| pixel(&camera_from_landmark, &Vector3::new(0.0, y, z), &world.camera);
+    let [a, b, c, d] = [[-w, h], [w, h], [w, -h], [-w, -h]].map(corner);
+    Some([a?, b?, c?, d?])
 }
 
 /// For each corner: error (px) and squared Mahalanobis distance.

@@ -7,6 +7,7 @@
 
 mod server;
 mod exploration;
+mod surveying;
 mod world;
 mod pilot;
 mod body;
@@ -79,6 +80,10 @@ pub(crate) struct Args {
     /// come from true poses, cameras and mountings are exact. For figures about names and corners.
     #[arg(long)]
     open_loop: bool,
+    /// Walls and landmarks come from one drive of a robot that knew neither, as `waymark survey` makes
+    /// them, in place of a map of walls and a lesson.
+    #[arg(long, conflicts_with = "open_loop")]
+    survey: bool,
     /// Kidnap every robot: carry it so far forwards, while its odometry stands still, 8 s after its
     /// first pose. The report says after how many frames the wrong pose is detected.
     #[arg(long, value_name = "M", value_parser = kidnap, allow_negative_numbers = true, requires = "open_loop")]
@@ -126,6 +131,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
         fittings: args.fittings,
         true_lessons: args.true_lessons,
         views: args.views as usize,
+        surveyed: args.survey,
         closed: !args.open_loop,
         seed: args.seed,
     };

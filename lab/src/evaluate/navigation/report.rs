@@ -107,6 +107,7 @@ pub(super) struct Report {
     runs: usize,
     /// The robots went by their own estimate, in a map of their own.
     closed: bool,
+    surveyed: bool,
     /// Outcomes of the kidnapped robots.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     kidnapped: Vec<KidnapOutcome>,
@@ -177,6 +178,7 @@ impl Report {
             fusion: world.map.modalities.mode(),
             runs,
             closed: world.course.closed,
+            surveyed: world.course.surveyed,
             kidnapped: journeys.iter().filter_map(|j| j.kidnapped.clone()).collect(),
         }
     }
@@ -225,7 +227,8 @@ impl Report {
         lines.extend([
             if self.closed {
                 format!(
-                    "  Closed loop: map by SLAM, camera and wheels by the estimate; {} drives arrived.",
+                    "  Closed loop: map by {}, camera and wheels by the estimate; {} drives arrived.",
+                    if self.surveyed { "one survey" } else { "SLAM and a lesson" },
                     self.arrived
                 )
             } else {

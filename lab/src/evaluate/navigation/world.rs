@@ -4,9 +4,9 @@
 use super::{
     exploration::{Explored, explore},
     server::MAP,
+    surveying::survey,
 };
 use crate::evaluate::experiment::{lesson::points_of, mixed, of_each};
-use anyhow::Context as _;
 use cli::{
     first_drive::{FirstView, first_drive, known_poses, place_on_walls},
     screen,
@@ -20,13 +20,15 @@ use map::{
     visibility::{Obstacle, PanTiltCamera, VisibilityParams, visibility},
 };
 use sim::{
-    building::Building,
+    building::{Building, LandmarkKind, LandmarkTruth},
     corridor::CorridorParams,
     lesson::{LessonParams, stops},
     robot::{Robot, RobotParams},
 };
 use std::{collections::BTreeMap, sync::Arc};
 use vision::{
+    frame::{GrayImage, Intrinsics},
+    geometry::Corners,
     learn::{LearnRules, TrainingView, add_negatives, learn, synthesis},
     model::{LandmarkId, LandmarkModel, ModelSet, ModelStatus},
     params::{Params, preset::Preset},
@@ -58,6 +60,8 @@ pub(super) struct Course {
     pub(super) true_lessons: bool,
     /// Photographs of each landmark.
     pub(super) views: usize,
+    /// Walls and landmarks come from one drive of a robot that knew neither.
+    pub(super) surveyed: bool,
     /// Walls are made by SLAM, the lesson's poses by laser; robots go by their own estimate, and
     /// their intrinsics and extrinsics have errors. Otherwise the truth stands for all of these.
     pub(super) closed: bool,
@@ -69,12 +73,24 @@ pub(super) struct World {
     pub(super) building: Arc<Building>,
     pub(super) map: MapSnapshot,
     pub(super) course: Course,
+    /// Of the robots, exact.
+    pub(super) camera: Intrinsics,
     /// Distance of each placed landmark from its true place, and the squared error along the
     /// corridor over its stated variance.
     pub(super) place_errors: Vec<(f64, f64)>,
 }
 
-/// One landmark after the first drive.
+/// A landmark of the first drive, with its photographs.
+pub(super) struct Photographed {
+    pub(super) name: String,
+    pub(super) place: LandmarkPlace,
+    pub(super) pictures: Vec<(GrayImage, Corners)>,
+}
+
+/// Walls and landmarks.
+pub(super) type FirstMap = (Vec<LaserSegment>, Vec<Photographed>);
+
+/// What is learnt of one landmark.
 struct Lesson {
     name: String,
     place: LandmarkPlace,
@@ -84,10 +100,9 @@ struct Lesson {
 }
 
 impl World {
-    /// Builds the corridor, surveys it and learns its landmarks.
+    /// Builds the corridor, has it mapped, and learns its landmarks.
     pub(super) fn taught(course: Course) -> anyhow::Result<Self> {
-        let Course { length_m, posters, pictures, unique, preset, fittings, .. } = course;
-        let Course { true_lessons, views: photographs, closed, seed, .. } = course;
+        let Course { length_m, posters, pictures, unique, preset, seed, .. } = course;
         let p = preset.params();
         let corridor = CorridorParams {
             length_m,
@@ -98,40 +113,12 @@ impl World {
             ..CorridorParams::default()
         };
         let building = Arc::new(Building::corridor_with(&corridor, seed));
-        let robot = Robot::new(building.clone(), &RobotParams::default());
-        let wrong = SimulatedRobotErrors::of(robot.camera().intrinsics(), !closed, mixed(&[seed, 13]));
-        let camera = wrong.camera;
-        let lesson = LessonParams { seed, views: photographs, fittings, ..LessonParams::default() };
-        let stops = stops(&building, &lesson);
-        let (walls, stops) = if closed {
-            let Explored { walls, stops } = explore(&building, stops, mixed(&[seed, 16]))?;
-            (Some(walls), stops)
+        let (walls, photographed) = if course.surveyed {
+            survey(&building, course.views, mixed(&[seed, 16]))?
         } else {
-            (None, known_poses(stops))
+            taught_by_hand(&building, &course, &p)?
         };
-        let mut driven = first_drive(robot, &stops, &wrong, &p.detect)?;
-        let walls = walls.unwrap_or_else(|| std::mem::take(&mut driven.walls));
-        if true_lessons {
-            driven.views.iter_mut().for_each(|(name, views_of_one)| take_true_corners(name, views_of_one));
-        }
-        let found: Vec<(&String, &Vec<FirstView>)> = driven.views.iter().collect();
-        let lessons: Vec<Lesson> = of_each(&found, "views", |i, (name, views_of_one)| {
-            let (mut place, agreed) = place_on_walls(views_of_one, &walls, &camera)?;
-            if true_lessons {
-                place = true_place(&building, name)?;
-            }
-            let views_of_one: Vec<&FirstView> = agreed.iter().map(|&i| &views_of_one[i]).collect();
-            let views = views(&views_of_one, mixed(&[seed, 12, i as u64]), &p);
-            let each = views.iter().step_by(views.len().div_ceil(NEGATIVES).max(1));
-            let icons = each.map(|v| features(v.icon.clone(), &p.recognise)).collect();
-            let photographs: Vec<_> =
-                views_of_one.iter().map(|l| (&l.readings.frame.image, &l.quad.corners_px)).collect();
-            let points = points_of(&photographs);
-            Some(Lesson { name: (*name).clone(), place, views, icons, points })
-        })
-        .into_iter()
-        .flatten()
-        .collect();
+        let lessons = of_each(&photographed, "views", |i, one| lesson(one, mixed(&[seed, 12, i as u64]), &p));
         let models = of_each(&lessons, "learning", |i, lesson| {
             let alone = learn(LandmarkId(i as u64), &lesson.views, &[], &p).ok()?;
             let alone = alone.with_points(&lesson.points);
@@ -141,8 +128,9 @@ impl World {
         });
         let map = snapshot(&lessons, &walls, models, (preset, p))?;
         anyhow::ensure!(!map.models.is_empty(), "no landmark passed the quality gates; try another --seed");
-        let place_errors = lessons.iter().map(|l| place_error(&building, l)).collect::<Result<_, _>>()?;
-        Ok(Self { building, map, course, place_errors })
+        let place_errors = lessons.iter().filter_map(|l| place_error(&building, l, &course)).collect();
+        let camera = *Robot::new(building.clone(), &RobotParams::default()).camera().intrinsics();
+        Ok(Self { building, map, course, camera, place_errors })
     }
 
     /// The landmark's name.
@@ -151,16 +139,55 @@ impl World {
     }
 }
 
-fn views(views_of_one: &[&FirstView], seed: u64, p: &Params) -> Vec<TrainingView> {
-    let image = |view: &FirstView| view.readings.frame.image.clone();
+/// Walls, and the landmarks that a person taught.
+fn taught_by_hand(building: &Arc<Building>, course: &Course, p: &Params) -> anyhow::Result<FirstMap> {
+    let Course { true_lessons, views: photographs, closed, fittings, seed, .. } = *course;
+    let robot = Robot::new(building.clone(), &RobotParams::default());
+    let wrong = SimulatedRobotErrors::of(robot.camera().intrinsics(), !closed, mixed(&[seed, 13]));
+    let camera = wrong.camera;
+    let lesson = LessonParams { seed, views: photographs, fittings, ..LessonParams::default() };
+    let stops = stops(building, &lesson);
+    let (walls, stops) = if closed {
+        let Explored { walls, stops } = explore(building, stops, mixed(&[seed, 16]))?;
+        (Some(walls), stops)
+    } else {
+        (None, known_poses(stops))
+    };
+    let mut driven = first_drive(robot, &stops, &wrong, &p.detect)?;
+    let walls = walls.unwrap_or_else(|| std::mem::take(&mut driven.walls));
+    if true_lessons {
+        driven.views.iter_mut().for_each(|(name, views_of_one)| take_true_corners(name, views_of_one));
+    }
+    let photographed = |(name, views_of_one): (String, Vec<FirstView>)| {
+        let (mut place, agreed) = place_on_walls(&views_of_one, &walls, &camera)?;
+        if true_lessons {
+            place = true_place(building, &name)?;
+        }
+        let views = agreed.iter().map(|&i| &views_of_one[i]);
+        let pictures = views.map(|view| (view.readings.frame.image.clone(), view.quad.corners_px)).collect();
+        Some(Photographed { name, place, pictures })
+    };
+    let photographed = driven.views.into_iter().filter_map(photographed).collect();
+    Ok((walls, photographed))
+}
+
+fn lesson(one: &Photographed, seed: u64, p: &Params) -> Lesson {
+    let Photographed { name, place, pictures } = one;
+    let views = views(pictures, seed, p);
+    let each = views.iter().step_by(views.len().div_ceil(NEGATIVES).max(1));
+    let icons = each.map(|v| features(v.icon.clone(), &p.recognise)).collect();
+    let photographs: Vec<_> = pictures.iter().map(|(image, corners)| (image, corners)).collect();
+    Lesson { name: name.clone(), place: *place, views, icons, points: points_of(&photographs) }
+}
+
+fn views(pictures: &[(GrayImage, Corners)], seed: u64, p: &Params) -> Vec<TrainingView> {
     let photographed =
-        views_of_one.iter().filter_map(|l| TrainingView::photographed(&image(l), &l.quad.corners_px, p).ok());
+        pictures.iter().filter_map(|(image, corners)| TrainingView::photographed(image, corners, p).ok());
     let mut views: Vec<TrainingView> = photographed.collect();
     let wanted = VIEWS.saturating_sub(views.len());
-    for (i, view) in views_of_one.iter().enumerate() {
-        let count = (wanted + views_of_one.len() - 1 - i) / views_of_one.len();
-        let seed = mixed(&[seed, i as u64]);
-        views.extend(synthesis::views(&image(view), &view.quad.corners_px, count, p, seed));
+    for (i, (image, corners)) in pictures.iter().enumerate() {
+        let count = (wanted + pictures.len() - 1 - i) / pictures.len();
+        views.extend(synthesis::views(image, corners, count, p, mixed(&[seed, i as u64])));
     }
     views
 }
@@ -234,10 +261,12 @@ fn true_place(building: &Building, name: &str) -> Option<LandmarkPlace> {
     LandmarkPlace::by_hand(at, theta_rad, size, PlaceSigmas::default()).ok()
 }
 
-fn place_error(building: &Building, lesson: &Lesson) -> anyhow::Result<(f64, f64)> {
-    let truth = building.landmark(&lesson.name).context("a taught poster that the building lacks")?;
+/// `None` of a landmark that is nothing of the building, or perhaps a part of a door or window.
+fn place_error(building: &Building, lesson: &Lesson, course: &Course) -> Option<(f64, f64)> {
+    let is_whole = |truth: &&LandmarkTruth| !course.surveyed || truth.kind == LandmarkKind::Poster;
+    let truth = building.landmark(&lesson.name).filter(is_whole)?;
     let place = &lesson.place;
     let error =
         truth.map_from_landmark.translation.vector - nalgebra::Vector3::new(place.x_m, place.y_m, place.z_m);
-    Ok((error.norm(), error.x * error.x / place.covariance[(0, 0)]))
+    Some((error.norm(), error.x * error.x / place.covariance[(0, 0)]))
 }

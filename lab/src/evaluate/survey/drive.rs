@@ -3,10 +3,11 @@
 use crate::evaluate::experiment::mixed;
 use cli::survey::{SimulatedDrive, simulated_drive};
 use sim::{
-    building::Building,
+    building::{Building, LandmarkTruth},
     corridor::CorridorParams,
     drive::DriveParams,
     gaze::GazeParams,
+    posters,
     robot::SensorReadings,
     truth::{LandmarkView, ViewState},
 };
@@ -33,6 +34,19 @@ pub(super) struct Driven {
     pub(super) drive: SimulatedDrive,
     /// Posters that some frame shows in full.
     pub(super) shown: BTreeSet<String>,
+    first_poster: u64,
+}
+
+impl Driven {
+    /// Width and height of each border of an object, metres, the outer one first.
+    pub(super) fn borders(&self, truth: &LandmarkTruth) -> Vec<[f64; 2]> {
+        let number = truth.name.strip_prefix("poster-").and_then(|number| number.parse::<u64>().ok());
+        let insets =
+            number.map_or(vec![0.0], |number| posters::borders(self.first_poster.wrapping_add(number)));
+        let border =
+            |inset: f64| [truth.width_m, truth.height_m].map(|side| side - 2.0 * inset * truth.width_m);
+        insets.into_iter().map(border).collect()
+    }
 }
 
 pub(super) fn drive(course: &Course) -> anyhow::Result<Driven> {
@@ -62,5 +76,5 @@ pub(super) fn drive(course: &Course) -> anyhow::Result<Driven> {
     })?;
     let posters: BTreeSet<&str> = building.posters().map(|poster| poster.name.as_str()).collect();
     shown.retain(|name| posters.contains(name.as_str()));
-    Ok(Driven { building, drive, shown })
+    Ok(Driven { building, drive, shown, first_poster: corridor.first_poster })
 }

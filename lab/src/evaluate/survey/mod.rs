@@ -17,7 +17,7 @@ use map::{
 };
 use nalgebra::{Matrix3, Point2, Vector2, Vector3};
 use serde::Serialize;
-use sim::building::LandmarkTruth;
+use sim::building::{Building, LandmarkTruth};
 use vision::params::Params;
 
 /// An object is a poster if its centre is so near, as a share of the longer side.
@@ -66,7 +66,7 @@ struct Figures {
     joint_aligned_m: Vec<f64>,
     two_steps_m: Vec<f64>,
     two_steps_aligned_m: Vec<f64>,
-    /// Errors of the sides, %.
+    /// Errors of the sides of the border that was taken, %.
     size_percent: Vec<f64>,
     two_steps_size_percent: Vec<f64>,
     /// Squared errors on the floor over their covariance, for each degree of freedom.
@@ -156,7 +156,7 @@ fn figures(driven: &Driven, building: &SurveyedBuilding) -> Figures {
     let (mut joint, mut two) = (Vec::new(), Vec::new());
     let mut named = std::collections::BTreeSet::new();
     for object in building.objects.iter().filter(|object| object.refused.is_none()) {
-        let Some(truth) = truth_of(driven, &object.place) else {
+        let Some(truth) = truth_at(&driven.building, &object.place) else {
             made.strangers += 1;
             continue;
         };
@@ -170,12 +170,12 @@ fn figures(driven: &Driven, building: &SurveyedBuilding) -> Figures {
         let d = here - at;
         made.joint_m.push(d.norm());
         made.nees.extend(covariance.cholesky().map(|c| d.dot(&c.solve(&d)) / 2.0));
-        made.size_percent.extend(size_errors(&object.place, truth));
+        made.size_percent.extend(size_errors(&object.place, &driven.borders(truth)));
         joint.push((here, at));
         if let Some(place) = two_steps(driven, building, object) {
             let here = Vector2::new(place.x_m, place.y_m);
             made.two_steps_m.push((here - at).norm());
-            made.two_steps_size_percent.extend(size_errors(&place, truth));
+            made.two_steps_size_percent.extend(size_errors(&place, &driven.borders(truth)));
             two.push((here, at));
         }
     }
@@ -192,19 +192,20 @@ fn figures(driven: &Driven, building: &SurveyedBuilding) -> Figures {
 }
 
 /// The truth that hangs where a place is, if any.
-fn truth_of<'a>(driven: &'a Driven, place: &LandmarkPlace) -> Option<&'a LandmarkTruth> {
+pub(super) fn truth_at<'a>(building: &'a Building, place: &LandmarkPlace) -> Option<&'a LandmarkTruth> {
     let here = Vector2::new(place.x_m, place.y_m);
     let off = |truth: &&LandmarkTruth| (here - floor(truth)).norm();
     let near = |truth: &&LandmarkTruth| {
         off(truth) < NEAR_SHARE * truth.width_m.max(truth.height_m)
             && (truth.map_from_landmark.translation.z - place.z_m).abs() < NEAR_SHARE * truth.height_m
     };
-    driven.building.landmarks().iter().filter(near).min_by(|a, b| off(a).total_cmp(&off(b)))
+    building.landmarks().iter().filter(near).min_by(|a, b| off(a).total_cmp(&off(b)))
 }
 
 /// Why a poster is no landmark.
 fn why_lost(driven: &Driven, building: &SurveyedBuilding, name: &str) -> String {
-    let of_it = |object: &&SurveyedObject| truth_of(driven, &object.place).is_some_and(|t| t.name == name);
+    let of_it =
+        |object: &&SurveyedObject| truth_at(&driven.building, &object.place).is_some_and(|t| t.name == name);
     let refused: Vec<&str> =
         building.objects.iter().filter(of_it).filter_map(|object| object.refused.as_deref()).collect();
     if refused.is_empty() { "no object was followed there".to_owned() } else { refused.join("; ") }
@@ -215,9 +216,15 @@ fn floor(truth: &LandmarkTruth) -> Vector2<f64> {
     truth.map_from_landmark.translation.vector.xy()
 }
 
-fn size_errors(place: &LandmarkPlace, truth: &LandmarkTruth) -> [f64; 2] {
-    [place.size.width_m / truth.width_m, place.size.height_m / truth.height_m]
-        .map(|r| 100.0 * (r - 1.0).abs())
+/// Errors of both sides, %, against the border that is nearest: a detector may take a poster's
+/// frame or its picture.
+fn size_errors(place: &LandmarkPlace, borders: &[[f64; 2]]) -> [f64; 2] {
+    let off = |border: &[f64; 2]| {
+        let ratios = [place.size.width_m / border[0], place.size.height_m / border[1]];
+        ratios.map(|ratio| 100.0 * (ratio - 1.0).abs())
+    };
+    let all = borders.iter().map(off);
+    all.min_by(|a, b| (a[0] + a[1]).total_cmp(&(b[0] + b[1]))).unwrap_or([100.0; 2])
 }
 
 /// The place of an object by the laser map's walls and poses and the camera as stated.

@@ -1,0 +1,149 @@
+//! Objects that look like something else of the building, as doors do: each is learnt from its
+//! views and looked for in every frame of the drive. Where it is named at another place, a robot
+//! would be, too. In: the drive and its map. Out: such objects, refused.
+//!
+//! What the drive did not show is not tested.
+
+use super::{
+    drive::{Drive, DriveFrame},
+    objects::ObjectView,
+    parallel::Effort,
+    sightings::{analysed, picture},
+    surveyed::{SurveyedBuilding, SurveyedObject},
+};
+use map::place::LandmarkPlace;
+use nalgebra::{Isometry3, Point2, Vector3};
+use std::{collections::BTreeMap, sync::Arc};
+use vision::{
+    frame::{GrayImage, Intrinsics},
+    geometry::{Corners, polygon},
+    learn::{TrainingView, learn},
+    model::{LandmarkId, LandmarkModel, ModelSet, ModelStatus},
+    params::Params,
+    points::taught::{MAX_POINT_VIEWS, view_points},
+    pose::reprojection::pixel,
+    recognise::{MatchRefusal, RecognitionResult, Verdict},
+};
+
+/// Views that an object is learnt from.
+const MAX_VIEWS: usize = 6;
+/// An object is where it is named if the quad covers this share of both together.
+const MIN_IOU: f64 = 0.3;
+/// Without one that was refused, others may be named in its place: so often they are tested again.
+const ROUNDS: usize = 3;
+
+/// Refuses objects that are named where they are not.
+pub(super) fn refuse_look_alikes(
+    drive: &Drive,
+    building: &mut SurveyedBuilding,
+    (params, effort): (&Params, Effort<'_>),
+) {
+    for _ in 0..ROUNDS {
+        let Some(models) = models(drive, &building.objects, (params, effort)) else { return };
+        let places = |id: LandmarkId| building.objects.get(id.0 as usize).map(|object| object.place);
+        let named = effort.of_each(&drive.frames, "telling apart", |number, frame| {
+            let seen = FrameLook::new(building, number, frame)?;
+            Some(seen.named_elsewhere(frame, &models, places, params))
+        });
+        let mut wrong: BTreeMap<LandmarkId, usize> = BTreeMap::new();
+        named.into_iter().flatten().flatten().for_each(|id| *wrong.entry(id).or_default() += 1);
+        for (id, times) in &wrong {
+            let Some(object) = building.objects.get_mut(id.0 as usize) else { continue };
+            object.refused = Some(format!("something else looks like it: taken for it {times} times"));
+        }
+        if wrong.is_empty() {
+            return;
+        }
+    }
+}
+
+/// Of all objects that are not refused; `None` without any. They are `LandmarkId`s by number.
+fn models(
+    drive: &Drive,
+    objects: &[SurveyedObject],
+    (params, effort): (&Params, Effort<'_>),
+) -> Option<ModelSet> {
+    let accepted: Vec<usize> = (0..objects.len()).filter(|i| objects[*i].refused.is_none()).collect();
+    let models = effort.of_each(&accepted, "learning", |_, number| {
+        model(drive, &objects[*number], LandmarkId(*number as u64), params).map(Arc::new)
+    });
+    let models: Vec<Arc<LandmarkModel>> = models.into_iter().flatten().collect();
+    if models.is_empty() { None } else { ModelSet::in_use(models.into_iter(), params).ok() }
+}
+
+/// Learnt from some of its views, whatever the gates of a lesson say.
+fn model(drive: &Drive, object: &SurveyedObject, id: LandmarkId, params: &Params) -> Option<LandmarkModel> {
+    let every = object.views.len().div_ceil(MAX_VIEWS).max(1);
+    let photograph = |view: &ObjectView| {
+        let seen = picture(&drive.frames[view.frame]).ok()?;
+        Some((seen.grey().clone(), view.corners_px))
+    };
+    let photographs: Vec<(GrayImage, Corners)> =
+        object.views.iter().step_by(every).filter_map(photograph).collect();
+    let view =
+        |(image, corners): &(GrayImage, Corners)| TrainingView::photographed(image, corners, params).ok();
+    let views: Vec<TrainingView> = photographs.iter().filter_map(view).collect();
+    let points = photographs.iter().step_by(photographs.len().div_ceil(MAX_POINT_VIEWS).max(1));
+    let points: Vec<_> = points.map(|(image, corners)| view_points(image, corners)).collect();
+    let model = learn(id, &views, &[], params).ok()?.with_points(&points);
+    Some(LandmarkModel { status: ModelStatus::Active, ..model })
+}
+
+/// How a frame was looked at, by the solution.
+struct FrameLook {
+    camera_from_map: Isometry3<f64>,
+    camera: Intrinsics,
+}
+
+impl FrameLook {
+    fn new(building: &SurveyedBuilding, number: usize, frame: &DriveFrame) -> Option<Self> {
+        let mounting = building.mounting(&frame.frame.mounting.as_ref()?.robot_from_camera);
+        let map_from_camera = building.frames.get(number)?.pose.to_isometry3() * mounting;
+        let camera = building.intrinsics(frame.frame.intrinsics.as_ref()?);
+        Some(Self { camera_from_map: map_from_camera.inverse(), camera })
+    }
+
+    /// The objects that a frame is said to show where they are not.
+    fn named_elsewhere(
+        &self,
+        frame: &DriveFrame,
+        models: &ModelSet,
+        place: impl Fn(LandmarkId) -> Option<LandmarkPlace>,
+        params: &Params,
+    ) -> Vec<LandmarkId> {
+        let Ok(picture) = picture(frame) else { return Vec::new() };
+        let analysed = analysed(frame, &picture, models, params);
+        let named = analysed.quads.iter().filter_map(|quad| {
+            let result = quad.recognition.as_ref()?;
+            let id = taken_for(result)?;
+            let found = result.aligned_px.unwrap_or(quad.quad.corners_px);
+            let there = self.sees(&place(id)?);
+            let is_there = there.is_some_and(|there| polygon::iou(found.points(), &there) >= MIN_IOU);
+            (!is_there).then_some(id)
+        });
+        named.collect()
+    }
+
+    /// Corners of a landmark; `None` behind the camera.
+    fn sees(&self, place: &LandmarkPlace) -> Option<[Point2<f64>; 4]> {
+        let camera_from_landmark = self.camera_from_map * place.map_from_landmark();
+        let (w, h) = (0.5 * place.size.width_m, 0.5 * place.size.height_m);
+        let corner = |[y, z]: [f64; 2]| pixel(&camera_from_landmark, &Vector3::new(0.0, y, z), &self.camera);
+        let [a, b, c, d] = [[-w, h], [w, h], [w, -h], [-w, -h]].map(corner);
+        Some([a?, b?, c?, d?])
+    }
+}
+
+/// The object that a quad looks like: by its verdict, and where points agree but some other gate
+/// says no, which it may not say from another side. Of two objects that are both known the verdict
+/// already says that they look alike.
+fn taken_for(result: &RecognitionResult) -> Option<LandmarkId> {
+    match result.verdict {
+        Verdict::Unique(id) => Some(id),
+        Verdict::Ambiguous(id) if result.points.is_some() => {
+            let refusal = result.candidates.first()?.refusal?;
+            matches!(refusal, MatchRefusal::Similarity | MatchRefusal::Disagreement).then_some(id)
+        }
+        _ => None,
+    }
+}

@@ -1,0 +1,31 @@
+//! The first map by a robot that knows neither walls nor landmarks: one drive there and back, as
+//! `waymark survey` takes it. In: the building. Out: walls, and the landmarks that passed its gates.
+
+use super::world::{FirstMap, Photographed};
+use crate::evaluate::survey::truth_at;
+use cli::survey::{SimulatedDrive, simulated_drive, surveyed};
+use engine::survey::{ObjectView, SurveyedObject, picture};
+use sim::{building::Building, drive::DriveParams};
+use std::{collections::BTreeMap, sync::Arc};
+use vision::params::Params;
+
+/// Surveys the building; each landmark has at most so many photographs.
+pub(super) fn survey(building: &Arc<Building>, photographs: usize, seed: u64) -> anyhow::Result<FirstMap> {
+    let drive = DriveParams { seed, legs: 2, ..DriveParams::default() };
+    let SimulatedDrive { log, .. } = simulated_drive(building, drive, |_| ())?;
+    let found = surveyed(&log, &Params::default())?;
+    let mut named: BTreeMap<String, Photographed> = BTreeMap::new();
+    let accepted = found.objects.iter().filter(|object| object.refused.is_none());
+    for (number, SurveyedObject { place, views, .. }) in accepted.enumerate() {
+        let truth = truth_at(building, place);
+        let name = truth.map_or_else(|| format!("other-{number}"), |truth| truth.name.clone());
+        let every = views.len().div_ceil(photographs).max(1);
+        let photograph = |view: &ObjectView| {
+            let seen = picture(&log.drive.frames[view.frame]).ok()?;
+            Some((seen.grey().clone(), view.corners_px))
+        };
+        let pictures = views.iter().step_by(every).filter_map(photograph).collect();
+        named.insert(name.clone(), Photographed { name, place: *place, pictures });
+    }
+    Ok((found.walls, named.into_values().collect()))
+}
