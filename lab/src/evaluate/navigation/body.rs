@@ -3,7 +3,7 @@
 use super::{
     pilot::{Path, Pilot},
     server::Server,
-    world::World,
+    world::{FirstMapBy, World},
 };
 use crate::evaluate::experiment::mixed;
 use cli::survey::UNEVEN_M;
@@ -67,7 +67,7 @@ impl Body {
         let drive = DriveParams { seed, start_m, reverse, rate_hz, ..DriveParams::default() };
         let [near, far] = middle(&world.building, drive.end_gap_m);
         let path = if way.back { Path { from: far, to: near } } else { Path { from: near, to: far } };
-        let steered = world.course.closed.then(|| {
+        let steered = (world.course.first_map != FirstMapBy::Truth).then(|| {
             let mut random = Random::new(mixed(&[seed, 15]));
             let error = Vector3::from(START_SIGMA).map(|s| s * random.normal());
             let seconds = (far - near).norm() / drive.speed_mps;
@@ -80,7 +80,7 @@ impl Body {
             }
         });
         // The same walls as in the survey.
-        let uneven_m = if world.course.surveyed { UNEVEN_M } else { 0.0 };
+        let uneven_m = if world.course.first_map == FirstMapBy::Survey { UNEVEN_M } else { 0.0 };
         let laser = LaserParams { uneven_m, ..LaserParams::default() };
         let robot =
             Robot::new(world.building.clone(), &RobotParams { drive, laser, ..RobotParams::default() });

@@ -7,7 +7,7 @@ use super::{
     body::{Body, DriveSettings},
     kidnap::{Kidnap, KidnapOutcome},
     server::Server,
-    world::World,
+    world::{FirstMapBy, World},
 };
 use cli::simulated_errors::SimulatedRobotErrors;
 use engine::{
@@ -23,7 +23,7 @@ use nalgebra::{Matrix2, Point2, Vector3};
 use sim::{
     building::LandmarkKind,
     robot::SensorReadings,
-    truth::{LandmarkView, ViewState},
+    truth::{FrameTruth, LandmarkView, ViewState},
 };
 use std::collections::BTreeMap;
 use vision::{
@@ -105,7 +105,11 @@ pub(super) struct Named {
 /// Drives the length of the corridor once.
 pub(super) fn drive(world: &World, way: DriveSettings) -> anyhow::Result<Journey> {
     let mut body = Body::new(world, way);
-    let wrong = SimulatedRobotErrors::of(body.camera(), !world.course.closed, mixed(&[way.seed, 14]));
+    let wrong = SimulatedRobotErrors::of(
+        body.camera(),
+        world.course.first_map == FirstMapBy::Truth,
+        mixed(&[way.seed, 14]),
+    );
     let server = Server::new(&world.map)?;
     server.record()?;
     let mut journey = Journey::default();
@@ -176,16 +180,8 @@ impl Journey {
         guided: Option<&GuidedResult>,
     ) -> bool {
         let truth = &seen.frame.truth;
-        let is_there = |id: LandmarkId, found: &Corners| {
-            let there = match world.course.surveyed {
-                true => surveyed_at(world, id, seen),
-                false => truth.landmark(world.name(id)).map(|v| *v.corners_px.points()),
-            };
-            let least = if world.course.surveyed { IOU_SURVEYED } else { IOU_TRUE };
-            there.is_some_and(|there| polygon::iou(found.points(), &there) >= least)
-        };
-        // A survey takes what it finds: a panel of a door, the picture in a frame.
-        let border = |id| truth.landmark(world.name(id)).filter(|_| !world.course.surveyed);
+        let is_there = |id: LandmarkId, found: &Corners| is_there(world, id, seen, found);
+        let border = |id| exact_border(world, id, truth);
         let mut global = Vec::new();
         for quad in &analysis.quads {
             let Some(Verdict::Unique(id)) = quad.recognition.as_ref().map(|v| v.verdict) else {
@@ -250,6 +246,23 @@ impl Journey {
         self.recognised += shown.iter().filter(|v| global.contains(&v.name.as_str())).count();
         !shown.is_empty()
     }
+}
+
+/// Whether a frame shows a landmark there.
+fn is_there(world: &World, id: LandmarkId, seen: &SensorReadings, found: &Corners) -> bool {
+    let (there, least) = if world.course.first_map == FirstMapBy::Survey {
+        (surveyed_at(world, id, seen), IOU_SURVEYED)
+    } else {
+        let view = seen.frame.truth.landmark(world.name(id));
+        (view.map(|view| *view.corners_px.points()), IOU_TRUE)
+    };
+    there.is_some_and(|there| polygon::iou(found.points(), &there) >= least)
+}
+
+/// The landmark in a frame, where the border that was learnt is the one that the building names: a
+/// survey takes what it finds, a panel of a door or the picture in a frame.
+fn exact_border<'a>(world: &World, id: LandmarkId, truth: &'a FrameTruth) -> Option<&'a LandmarkView> {
+    truth.landmark(world.name(id)).filter(|_| world.course.first_map != FirstMapBy::Survey)
 }
 
 /// Where the true pose sees a surveyed landmark, whose border the building does not name.

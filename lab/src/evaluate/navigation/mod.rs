@@ -26,7 +26,7 @@ use reference_runs::learnt;
 use report::Report;
 use std::{path::PathBuf, sync::Arc};
 use vision::params::preset::Preset;
-use world::{Course, World};
+use world::{Course, FirstMapBy, World};
 
 /// `waymark-lab evaluate navigation`.
 #[derive(Debug, clap::Args)]
@@ -131,8 +131,11 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
         fittings: args.fittings,
         true_lessons: args.true_lessons,
         views: args.views as usize,
-        surveyed: args.survey,
-        closed: !args.open_loop,
+        first_map: match (args.open_loop, args.survey) {
+            (true, _) => FirstMapBy::Truth,
+            (false, true) => FirstMapBy::Survey,
+            (false, false) => FirstMapBy::Lesson,
+        },
         seed: args.seed,
     };
     let mut world = World::taught(course)?;

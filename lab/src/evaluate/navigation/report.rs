@@ -5,7 +5,7 @@ use super::{
     kidnap::KidnapOutcome,
     names::{CornerErrors, Row, corner_errors, rows},
     server::of,
-    world::World,
+    world::{FirstMapBy, World},
 };
 use crate::evaluate::statistics::quantile;
 use map::{
@@ -177,8 +177,8 @@ impl Report {
             preset: world.course.preset,
             fusion: world.map.modalities.mode(),
             runs,
-            closed: world.course.closed,
-            surveyed: world.course.surveyed,
+            closed: world.course.first_map != FirstMapBy::Truth,
+            surveyed: world.course.first_map == FirstMapBy::Survey,
             kidnapped: journeys.iter().filter_map(|j| j.kidnapped.clone()).collect(),
         }
     }

@@ -1,13 +1,23 @@
 //! The first map by a robot that knows neither walls nor landmarks: one drive there and back, as
 //! `waymark survey` takes it. In: the building. Out: walls, and the landmarks that passed its gates.
 
-use super::world::{FirstMap, Photographed};
 use crate::evaluate::survey::truth_at;
 use cli::survey::{SimulatedDrive, simulated_drive, surveyed};
 use engine::survey::{ObjectView, SurveyedObject, picture};
+use map::{place::LandmarkPlace, segments::LaserSegment};
 use sim::{building::Building, drive::DriveParams};
 use std::{collections::BTreeMap, sync::Arc};
-use vision::params::Params;
+use vision::{frame::GrayImage, geometry::Corners, params::Params};
+
+/// A landmark of the first drive, with its photographs.
+pub(super) struct Photographed {
+    pub(super) name: String,
+    pub(super) place: LandmarkPlace,
+    pub(super) pictures: Vec<(GrayImage, Corners)>,
+}
+
+/// Walls and landmarks.
+pub(super) type FirstMap = (Vec<LaserSegment>, Vec<Photographed>);
 
 /// Surveys the building; each landmark has at most so many photographs.
 pub(super) fn survey(building: &Arc<Building>, photographs: usize, seed: u64) -> anyhow::Result<FirstMap> {

@@ -4,7 +4,7 @@
 use super::{
     exploration::{Explored, explore},
     server::MAP,
-    surveying::survey,
+    surveying::{FirstMap, Photographed, survey},
 };
 use crate::evaluate::experiment::{lesson::points_of, mixed, of_each};
 use cli::{
@@ -42,6 +42,17 @@ const VIEWS: usize = 30;
 /// Icons of each landmark that are negatives of the others.
 const NEGATIVES: usize = 10;
 
+/// Where walls and landmarks come from, and with it how robots go.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum FirstMapBy {
+    /// The truth; robots go their true path with exact intrinsics and extrinsics.
+    Truth,
+    /// SLAM, then a lesson with poses by laser. Robots go by their own estimate, with errors.
+    Lesson,
+    /// One drive of a robot that knew neither. Robots go as with a lesson.
+    Survey,
+}
+
 /// A corridor and how it is taught.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Course {
@@ -60,11 +71,7 @@ pub(super) struct Course {
     pub(super) true_lessons: bool,
     /// Photographs of each landmark.
     pub(super) views: usize,
-    /// Walls and landmarks come from one drive of a robot that knew neither.
-    pub(super) surveyed: bool,
-    /// Walls are made by SLAM, the lesson's poses by laser; robots go by their own estimate, and
-    /// their intrinsics and extrinsics have errors. Otherwise the truth stands for all of these.
-    pub(super) closed: bool,
+    pub(super) first_map: FirstMapBy,
     pub(super) seed: u64,
 }
 
@@ -79,16 +86,6 @@ pub(super) struct World {
     /// corridor over its stated variance.
     pub(super) place_errors: Vec<(f64, f64)>,
 }
-
-/// A landmark of the first drive, with its photographs.
-pub(super) struct Photographed {
-    pub(super) name: String,
-    pub(super) place: LandmarkPlace,
-    pub(super) pictures: Vec<(GrayImage, Corners)>,
-}
-
-/// Walls and landmarks.
-pub(super) type FirstMap = (Vec<LaserSegment>, Vec<Photographed>);
 
 /// What is learnt of one landmark.
 struct Lesson {
@@ -113,7 +110,7 @@ impl World {
             ..CorridorParams::default()
         };
         let building = Arc::new(Building::corridor_with(&corridor, seed));
-        let (walls, photographed) = if course.surveyed {
+        let (walls, photographed) = if course.first_map == FirstMapBy::Survey {
             survey(&building, course.views, mixed(&[seed, 16]))?
         } else {
             taught_by_hand(&building, &course, &p)?
@@ -141,7 +138,8 @@ impl World {
 
 /// Walls, and the landmarks that a person taught.
 fn taught_by_hand(building: &Arc<Building>, course: &Course, p: &Params) -> anyhow::Result<FirstMap> {
-    let Course { true_lessons, views: photographs, closed, fittings, seed, .. } = *course;
+    let Course { true_lessons, views: photographs, first_map, fittings, seed, .. } = *course;
+    let closed = first_map != FirstMapBy::Truth;
     let robot = Robot::new(building.clone(), &RobotParams::default());
     let wrong = SimulatedRobotErrors::of(robot.camera().intrinsics(), !closed, mixed(&[seed, 13]));
     let camera = wrong.camera;
@@ -263,7 +261,8 @@ fn true_place(building: &Building, name: &str) -> Option<LandmarkPlace> {
 
 /// `None` of a landmark that is nothing of the building, or perhaps a part of a door or window.
 fn place_error(building: &Building, lesson: &Lesson, course: &Course) -> Option<(f64, f64)> {
-    let is_whole = |truth: &&LandmarkTruth| !course.surveyed || truth.kind == LandmarkKind::Poster;
+    let is_whole =
+        |truth: &&LandmarkTruth| course.first_map != FirstMapBy::Survey || truth.kind == LandmarkKind::Poster;
     let truth = building.landmark(&lesson.name).filter(is_whole)?;
     let place = &lesson.place;
     let error =

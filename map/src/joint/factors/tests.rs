@@ -105,13 +105,8 @@ fn factors() -> Vec<Factor> {
     };
     let on_wall = |wall| OnWall { landmark: 0, wall, distance_sigma_m: 0.01, angle_sigma_rad: 0.009 };
     let plan = WallLine { anchor: Point2::new(-3.0, 2.0), facing_rad: 3.1, offset_m: 0.2 };
-    let scan = PoseConstraint {
-        from: 0,
-        to: 1,
-        measured: Pose2::new(0.5, 0.1, -0.2),
-        information: full.try_inverse().unwrap(),
-        doubt_chi2: None,
-    };
+    let (measured, information) = (Pose2::new(0.5, 0.1, -0.2), full.try_inverse().unwrap());
+    let scan = PoseConstraint { from: 0, to: 1, measured, information, doubt_chi2: None };
     let steps = [0.01, 0.01, 0.01, 0.01, 0.01, 0.01, 3.5, 3.0, 3.0, 0.01];
     let mut all = vec![
         Factor::Odometry(OdometryMotion {
