@@ -12,11 +12,11 @@ use super::{
     surveyed::{SurveyedBuilding, SurveyedObject},
 };
 use map::place::LandmarkPlace;
-use nalgebra::{Isometry3, Point2, Vector3};
+use nalgebra::{Isometry3, Point2, Vector2, Vector3};
 use std::{collections::BTreeMap, sync::Arc};
 use vision::{
     frame::{GrayImage, Intrinsics},
-    geometry::{Corners, polygon},
+    geometry::Corners,
     learn::{TrainingView, learn},
     model::{LandmarkId, LandmarkModel, ModelSet, ModelStatus},
     params::Params,
@@ -27,8 +27,9 @@ use vision::{
 
 /// Views that an object is learnt from.
 const MAX_VIEWS: usize = 6;
-/// An object is where it is named if the quad covers this share of both together.
-const MIN_IOU: f64 = 0.3;
+/// An object is where it is named if the centre of the quad is so near to its own, as a share of its
+/// longest side in the image. A quad may be a part of it.
+const NEAR_SHARE: f64 = 0.5;
 /// Without one that was refused, others may be named in its place: so often they are tested again.
 const ROUNDS: usize = 3;
 
@@ -116,10 +117,9 @@ impl FrameLook {
         let named = analysed.quads.iter().filter_map(|quad| {
             let result = quad.recognition.as_ref()?;
             let id = taken_for(result)?;
-            let found = result.aligned_px.unwrap_or(quad.quad.corners_px);
+            // Where the quad is: corners by points of a part may be far off.
             let there = self.sees(&place(id)?);
-            let is_there = there.is_some_and(|there| polygon::iou(found.points(), &there) >= MIN_IOU);
-            (!is_there).then_some(id)
+            (!there.is_some_and(|there| is_at(quad.quad.corners_px.points(), &there))).then_some(id)
         });
         named.collect()
     }
@@ -134,6 +134,13 @@ impl FrameLook {
     }
 }
 
+fn is_at(quad: &[Point2<f64>; 4], there: &[Point2<f64>; 4]) -> bool {
+    let centre = |corners: &[Point2<f64>; 4]| corners.iter().map(|c| c.coords).sum::<Vector2<f64>>() / 4.0;
+    let side = |i: usize| (there[i] - there[(i + 1) % 4]).norm();
+    let longest_px = (0..4).map(side).fold(0.0, f64::max);
+    (centre(quad) - centre(there)).norm() <= NEAR_SHARE * longest_px
+}
+
 /// The object that a quad looks like: by its verdict, and where points agree but some other gate
 /// says no, which it may not say from another side. Of two objects that are both known the verdict
 /// already says that they look alike.
@@ -145,5 +152,20 @@ fn taken_for(result: &RecognitionResult) -> Option<LandmarkId> {
             matches!(refusal, MatchRefusal::Similarity | MatchRefusal::Disagreement).then_some(id)
         }
         _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_part_of_an_object_is_at_it_and_its_neighbour_is_not() {
+        let square = |x: f64, side: f64| {
+            [[x, 0.0], [x + side, 0.0], [x + side, side], [x, side]].map(|[x, y]| Point2::new(x, y))
+        };
+        let there = square(100.0, 80.0);
+        assert!(is_at(&square(105.0, 40.0), &there), "a panel of it");
+        assert!(!is_at(&square(185.0, 80.0), &there), "the door beside it");
     }
 }
