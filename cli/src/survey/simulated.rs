@@ -22,7 +22,8 @@ use vision::{pose::reprojection::perturbed, random::Random};
 /// Error of a mounting that was measured with a tape: each angle (radians) and coordinate (metres).
 const MOUNTING: [f64; 2] = [0.6 * std::f64::consts::PI / 180.0, 0.01];
 
-/// How far walls are off their lines, metres: so far lines of public laser logs spread about theirs.
+/// How far walls are off their lines, metres: so far lines of public laser logs spread about
+/// theirs.
 pub const UNEVEN_M: f64 = 0.01;
 
 /// A drive, and what its robot did not know.

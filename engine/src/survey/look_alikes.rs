@@ -27,8 +27,8 @@ use vision::{
 
 /// Views that an object is learnt from.
 const MAX_VIEWS: usize = 6;
-/// An object is where it is named if the centre of the quad is so near to its own, as a share of its
-/// longest side in the image. A quad may be a part of it.
+/// An object is where it is named if the centre of the quad is so near to its own, as a share of
+/// its longest side in the image. A quad may be a part of it.
 const NEAR_SHARE: f64 = 0.5;
 /// Without one that was refused, others may be named in its place: so often they are tested again.
 const ROUNDS: usize = 3;

@@ -80,8 +80,8 @@ pub(crate) struct Args {
     /// come from true poses, cameras and mountings are exact. For figures about names and corners.
     #[arg(long)]
     open_loop: bool,
-    /// Walls and landmarks come from one drive of a robot that knew neither, as `waymark survey` makes
-    /// them, in place of a map of walls and a lesson.
+    /// Walls and landmarks come from one drive of a robot that knew neither, as `waymark survey`
+    /// makes them, in place of a map of walls and a lesson.
     #[arg(long, conflicts_with = "open_loop")]
     survey: bool,
     /// Kidnap every robot: carry it so far forwards, while its odometry stands still, 8 s after its

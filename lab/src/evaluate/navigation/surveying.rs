@@ -1,5 +1,6 @@
 //! The first map by a robot that knows neither walls nor landmarks: one drive there and back, as
-//! `waymark survey` takes it. In: the building. Out: walls, and the landmarks that passed its gates.
+//! `waymark survey` takes it. In: the building. Out: walls, and the landmarks that passed its
+//! gates.
 
 use crate::evaluate::survey::truth_at;
 use cli::survey::{SimulatedDrive, simulated_drive, surveyed};

@@ -272,8 +272,8 @@ async fn every_column_of_a_map_is_in_its_history() {
                      AND f.\"table\" IN ('maps', 'landmarks') ORDER BY 1";
     let mut tables: Vec<String> = db::query_scalar(referring).fetch_all(store.reads()).await.unwrap();
     tables.dedup();
-    // Not of what the map knows: where robots are, what they were answered, who may see it, what was
-    // refused, what waits for a decision, and what is computed.
+    // Not of what the map knows: where robots are, what they were answered, who may see it, what
+    // was refused, what waits for a decision, and what is computed.
     let others = [
         "commits",
         "robots",
