@@ -172,13 +172,13 @@ impl MappingSessions {
         }
     }
 
-    /// Starts a mapping with a robot whose first pose is `origin` (map frame); its frames are taken
-    /// as well if `landmarks` are wanted.
+    /// Starts a mapping with a robot; `origin` is its first pose where that is known in the frame of
+    /// the map. Its frames are taken as well if `landmarks` are wanted.
     pub fn begin(
         &self,
         map: &Name,
         robot: &Name,
-        (origin, landmarks): (Pose2, bool),
+        (origin, landmarks): (Option<Pose2>, bool),
     ) -> Result<MappingProgress, MappingError> {
         let mut all = self.lock();
         if all.get(map.as_str()).is_some_and(Session::is_open) {
@@ -191,7 +191,7 @@ impl MappingSessions {
         if open().count() >= MAX_MAPPINGS {
             return Err(MappingError::TooMany);
         }
-        let head = JournalHeader::new(map, robot, (&origin, landmarks));
+        let head = JournalHeader::new(map, robot, (origin.as_ref(), landmarks));
         let journal = self.dir.get().map(|dir| Journal::create(dir, &head));
         let session = Session::begin(Start::New(head, journal), self.around()).ok_or(MappingError::Thread)?;
         let progress = session.progress();

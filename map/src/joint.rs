@@ -11,6 +11,7 @@ mod problem;
 mod linearise;
 mod solve;
 mod marginals;
+mod datum;
 mod start;
 mod params;
 mod survey;
@@ -23,6 +24,7 @@ mod laser_drive;
 mod laser_map;
 
 pub use build::SurveyProblem;
+pub use datum::Datum;
 pub use factor::{Factor, Kernels, Linearised};
 pub use factors::{
     camera_prior::CameraPrior,

@@ -326,7 +326,7 @@ async fn drives_are_recorded_mapped_and_gathered() {
     assert_eq!(maps.reference_runs("hall").await.expect("runs"), []);
 
     // A mapping that is cancelled, one without any wall, and one whose walls were to be held.
-    let new = NewMapping { robot: "r1".into(), origin: [1.0, 2.0, 0.0], landmarks: false };
+    let new = NewMapping { robot: "r1".into(), origin: Some([1.0, 2.0, 0.0]), landmarks: false };
     assert_eq!(maps.start_mapping("hall", &new).await.expect("begun").stage, MappingStageBody::Mapping);
     maps.cancel_mapping("hall").await.expect("given up");
     maps.start_mapping("hall", &new).await.expect("begun");

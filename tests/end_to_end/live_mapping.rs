@@ -145,7 +145,7 @@ async fn one_drive_over_zenoh_gives_walls_and_landmarks_in_use() {
     let options = RobotOptions::new(&inside.server.zenoh_endpoint, "default", "r1");
     let client = RobotClient::connect(&options).await.expect("connected");
     let first = robot.clone().next().expect("a step").step.map_from_robot;
-    let origin = [first.x_m, first.y_m, first.theta_rad];
+    let origin = Some([first.x_m, first.y_m, first.theta_rad]);
     let new = NewMapping { robot: "r1".into(), origin, landmarks: true };
     maps.start_mapping(MAP, &new).await.expect("begun");
     for (sent, readings) in (1_u64..).zip(robot) {

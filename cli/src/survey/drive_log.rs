@@ -23,8 +23,8 @@ use std::{
 /// A drive with its scans.
 #[derive(Debug, Clone, Default)]
 pub struct DriveLog {
-    /// Where the drive begins in the frame of the map.
-    pub origin: Pose2,
+    /// Where the drive begins, if that is known in the frame of the map.
+    pub origin: Option<Pose2>,
     /// Scans, those of the drive's stamps.
     pub scans: Vec<Scan>,
     /// The drive.
@@ -87,7 +87,7 @@ pub(super) fn read(path: &Path, drives: &DriveArgs, camera: Option<&Name>) -> an
     if drive.scans.is_empty() || drive.frames.is_empty() {
         return Err(nothing(path, drive.scans.is_empty(), &problems).into());
     }
-    Ok(FileDrive { log: DriveLog { origin: Pose2::default(), scans, drive }, problems })
+    Ok(FileDrive { log: DriveLog { origin: None, scans, drive }, problems })
 }
 
 fn nothing(path: &Path, no_scans: bool, problems: &BTreeMap<String, (u64, String)>) -> Failure {

@@ -34,9 +34,10 @@ pub(crate) struct Args {
     /// is sent.
     #[arg(long, value_name = "MAP")]
     into: Option<Name>,
-    /// Where the drive begins in the frame of the map: x and y in metres, heading in radians.
-    #[arg(long, value_name = "X,Y,THETA", value_parser = origin, allow_hyphen_values = true, default_value = "0,0,0")]
-    origin: Pose2,
+    /// Where the drive begins, if that is known in the frame of the map: x and y in metres, heading
+    /// in radians. Without it, the drive makes the frame, and errors are against it as a whole.
+    #[arg(long, value_name = "X,Y,THETA", value_parser = origin, allow_hyphen_values = true)]
+    origin: Option<Pose2>,
     /// The camera whose frames are used, if there are several.
     #[arg(long, value_name = "NAME")]
     camera: Option<Name>,
@@ -70,7 +71,8 @@ pub fn surveyed(log: &DriveLog, params: &Params) -> anyhow::Result<SurveyedBuild
         }
     };
     let threads = std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
-    let made = survey::surveyed(&log.drive, slam, &log.origin, (params, Effort { threads, told: &told }));
+    let made =
+        survey::surveyed(&log.drive, slam, log.origin.as_ref(), (params, Effort { threads, told: &told }));
     if let Some((_, bar)) = bars.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner) {
         bar.finish_and_clear();
     }

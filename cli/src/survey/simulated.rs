@@ -91,7 +91,7 @@ pub fn simulated_drive(
         scans.push(readings.scan);
     }
     let (origin, mounting) = first.context("a drive without a step")?;
-    Ok(SimulatedDrive { log: DriveLog { origin, scans, drive }, mounting })
+    Ok(SimulatedDrive { log: DriveLog { origin: Some(origin), scans, drive }, mounting })
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@
 //! bytes. The first record is the header as JSON; the others are those of `record`.
 
 use super::record::Record;
-use map::pose2::Pose2;
+use map::{check::OutOfRange, pose2::Pose2};
 use protos::{Name, convert::frame::MAX_FRAME_IMAGE_BYTES};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
@@ -36,23 +36,24 @@ pub(super) struct JournalHeader {
     pub map: Name,
     /// Name of the robot.
     pub robot: Name,
-    /// The robot's first pose: x, y (map frame, m), theta (rad).
-    pub origin: [f64; 3],
+    /// The robot's first pose where it is known: x, y (map frame, m), theta (rad).
+    pub origin: Option<[f64; 3]>,
     /// Whether frames are taken.
     pub landmarks: bool,
 }
 
 impl JournalHeader {
-    pub(super) fn new(map: &Name, robot: &Name, (origin, landmarks): (&Pose2, bool)) -> Self {
-        let origin = [origin.x_m, origin.y_m, origin.theta_rad];
+    pub(super) fn new(map: &Name, robot: &Name, (origin, landmarks): (Option<&Pose2>, bool)) -> Self {
+        let origin = origin.map(|pose| [pose.x_m, pose.y_m, pose.theta_rad]);
         Self { waymark_mapping: 2, map: map.clone(), robot: robot.clone(), origin, landmarks }
     }
 
-    /// The first pose, if it is in range.
-    pub(super) fn origin(&self) -> Option<Pose2> {
-        let [x_m, y_m, theta_rad] = self.origin;
-        let origin = Pose2 { x_m, y_m, theta_rad };
-        origin.check().ok().map(|()| origin)
+    /// The first pose where it is known; an error where it is out of range.
+    pub(super) fn origin(&self) -> Result<Option<Pose2>, OutOfRange> {
+        let pose = |[x_m, y_m, theta_rad]: [f64; 3]| Pose2 { x_m, y_m, theta_rad };
+        let origin = self.origin.map(pose);
+        origin.as_ref().map_or(Ok(()), Pose2::check)?;
+        Ok(origin)
     }
 }
 
@@ -156,7 +157,7 @@ impl JournalReader {
         let record = record(&mut from, &mut whole).ok_or_else(|| io::Error::other("it has no head"))?;
         let head: JournalHeader = serde_json::from_slice(&record)?;
         let named = path.file_stem().is_some_and(|stem| stem == head.map.as_str());
-        if !named || head.waymark_mapping != 2 || head.origin().is_none() {
+        if !named || head.waymark_mapping != 2 || head.origin().is_err() {
             return Err(io::Error::other("its head is not one of this map"));
         }
         Ok(Self { head, from, file, whole })
@@ -222,7 +223,7 @@ mod tests {
     }
 
     fn written(dir: &Path, scans: i64) {
-        let head = JournalHeader::new(&name("hall"), &name("r1"), (&Pose2::new(1.0, 2.0, 0.5), true));
+        let head = JournalHeader::new(&name("hall"), &name("r1"), (Some(&Pose2::new(1.0, 2.0, 0.5)), true));
         let mut journal = Journal::create(dir, &head).unwrap();
         for i in 1..=scans {
             journal.put_record(&Record::Scan(job(i))).unwrap();
@@ -242,7 +243,7 @@ mod tests {
         let mut reader = JournalReader::all(dir.path()).pop().unwrap();
         assert_eq!(
             (reader.head.robot.as_str(), reader.head.origin()),
-            ("r1", Some(Pose2::new(1.0, 2.0, 0.5)))
+            ("r1", Ok(Some(Pose2::new(1.0, 2.0, 0.5))))
         );
         let first = scan_of(reader.next().unwrap());
         assert_eq!((first.epoch, first.odom_from_robot), (7, job(1).odom_from_robot));

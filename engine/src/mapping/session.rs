@@ -78,7 +78,7 @@ impl Session {
             Start::New(head, _) => head.clone(),
             Start::Resumed(journal) => journal.head.clone(),
         };
-        let origin = head.origin()?;
+        let origin = head.origin().ok()?;
         let first = match &mut start {
             Start::New(..) => None,
             Start::Resumed(journal) => journal.next(),
@@ -226,7 +226,8 @@ impl Session {
 struct Mapper {
     slam: Slam,
     progress: Shared,
-    origin: Pose2,
+    /// Where its first pose is known to be.
+    origin: Option<Pose2>,
     last: Option<Pose2>,
     /// The drive, where landmarks are wanted.
     drive: Option<DriveReading>,
@@ -235,7 +236,7 @@ struct Mapper {
 }
 
 impl Mapper {
-    fn new(progress: Shared, (origin, landmarks): (Pose2, bool), no_room: Arc<AtomicBool>) -> Self {
+    fn new(progress: Shared, (origin, landmarks): (Option<Pose2>, bool), no_room: Arc<AtomicBool>) -> Self {
         let slam = Slam::new(SlamParams::default());
         let drive = landmarks.then(|| DriveReading::new(WHILE_DRIVING));
         Self { slam, progress, origin, last: None, drive, journal: None, no_room }
@@ -299,16 +300,21 @@ impl Mapper {
         Ok(())
     }
 
+    /// The first pose in the frame of the map.
+    fn begins(&self) -> Pose2 {
+        self.origin.unwrap_or_default()
+    }
+
     /// Fits everything once more, and looks at the frames.
     fn made(&mut self) -> Result<MadeMap, String> {
         let slam = std::mem::replace(&mut self.slam, Slam::new(SlamParams::default()));
         let map = slam.finish().map_err(|error| error.to_string())?;
         lock(&self.progress).loop_closures = Some(map.loops.len());
-        let alone = MadeMap { walls: walls(&map, &self.origin), survey: None };
+        let alone = MadeMap { walls: walls(&map, &self.begins()), survey: None };
         let drive = self.drive.take().map(|reading| reading.finished().0);
         let Some(drive) = drive.filter(|drive| !drive.frames.is_empty()) else { return Ok(alone) };
         let effort = Effort { threads: NonZeroUsize::MIN, told: &|_, _, _| {} };
-        match surveyed(&drive, map, &self.origin, (&Params::default(), effort)) {
+        match surveyed(&drive, map, self.origin.as_ref(), (&Params::default(), effort)) {
             Ok(building) => {
                 let proposed = building.objects.iter().filter(|object| object.refused.is_none()).count();
                 lock(&self.progress).landmarks = Some(proposed);
@@ -369,7 +375,7 @@ impl Mapper {
         if let Some(drive) = &mut self.drive {
             drive.scan(ScanStamp { captured_ns: job.captured_ns, odom: job.odom_from_robot });
         }
-        let on_map = self.origin.compose(&at);
+        let on_map = self.begins().compose(&at);
         let mut progress = lock(&self.progress);
         progress.scans += 1;
         let odom = job.odom_from_robot;

@@ -43,7 +43,7 @@ async fn scans_become_the_walls_that_mapping_them_gives() {
     let steps: Vec<_> = sim::drive::Drive::new(building.clone(), &drive).step_by(3).take(60).collect();
     let (mappings, mut slam) = (MappingSessions::default(), Slam::new(SlamParams::default()));
     let origin = Pose2::new(3.0, 1.0, 0.5);
-    mappings.begin(&name("hall"), &name("r1"), (origin, false)).unwrap();
+    mappings.begin(&name("hall"), &name("r1"), (Some(origin), false)).unwrap();
     for (i, step) in steps.iter().enumerate() {
         let seen = scan(&building, &step.map_from_robot, i as u64);
         slam.add(&step.odom_from_robot, &seen).unwrap();
@@ -74,7 +74,7 @@ async fn scans_become_the_walls_that_mapping_them_gives() {
     assert_eq!((held.stage, held.segments), (MappingStage::Found, Some(walls.len())));
     assert_eq!(mappings.held("hall").as_ref(), Some(&walls));
     assert_eq!(
-        mappings.begin(&name("hall"), &name("r1"), (origin, false)),
+        mappings.begin(&name("hall"), &name("r1"), (Some(origin), false)),
         Err(MappingError::AlreadyMapping)
     );
     let (_, again) = mappings.finish("hall").unwrap();
@@ -83,7 +83,7 @@ async fn scans_become_the_walls_that_mapping_them_gives() {
     mappings.stored("hall", Ok(walls.len()));
     assert_eq!(mappings.progress("hall").unwrap().stage, MappingStage::Done);
     assert_eq!(mappings.finish("hall").unwrap_err(), MappingError::None);
-    mappings.begin(&name("hall"), &name("r1"), (origin, false)).unwrap();
+    mappings.begin(&name("hall"), &name("r1"), (Some(origin), false)).unwrap();
     // Late word of the one before.
     mappings.hold("hall", Err("the mapping was given up".into()));
     assert_eq!(mappings.progress("hall").unwrap().stage, MappingStage::Mapping);
@@ -93,7 +93,7 @@ async fn scans_become_the_walls_that_mapping_them_gives() {
 fn mappings_are_bounded_and_one_robot_makes_one_map() {
     let mappings = MappingSessions::default();
     let begin = |map: usize, robot: &str| {
-        mappings.begin(&name(&format!("m{map}")), &name(robot), (Pose2::default(), false)).map(|p| p.stage)
+        mappings.begin(&name(&format!("m{map}")), &name(robot), (None, false)).map(|p| p.stage)
     };
     for i in 0..MAX_MAPPINGS {
         assert_eq!(begin(i, &format!("r{i}")), Ok(MappingStage::Mapping));
@@ -110,7 +110,7 @@ fn old_mappings_are_forgotten_at_the_bound() {
     let mappings = MappingSessions::default();
     for i in 0..=MAX_SESSIONS {
         let map = format!("m{i:03}");
-        mappings.begin(&name(&map), &name("r1"), (Pose2::default(), false)).unwrap();
+        mappings.begin(&name(&map), &name("r1"), (None, false)).unwrap();
         mappings.stored(&map, Err("planted".into()));
     }
     assert_eq!(mappings.progress("m000"), None);
@@ -122,7 +122,7 @@ fn old_mappings_are_forgotten_at_the_bound() {
 fn what_the_queue_does_not_hold_is_dropped_and_counted() {
     let mappings = MappingSessions::default();
     let building = Building::corridor(7);
-    mappings.begin(&name("hall"), &name("r1"), (Pose2::default(), false)).unwrap();
+    mappings.begin(&name("hall"), &name("r1"), (None, false)).unwrap();
     let sent = 4 * QUEUE as u64;
     for i in 0..sent {
         let at = Pose2::new(2.0 + 0.02 * i as f64, 0.0, 0.0);
@@ -145,7 +145,7 @@ async fn a_mapping_resumes_after_a_restart_as_if_there_had_been_none() {
     let (mut slam, origin) = (Slam::new(SlamParams::default()), Pose2::new(3.0, 1.0, 0.5));
     let mut mappings = MappingSessions::default();
     mappings.resume_in(dir.path().join("mapping"), |_, _| true);
-    mappings.begin(&name("hall"), &name("r1"), (origin, false)).unwrap();
+    mappings.begin(&name("hall"), &name("r1"), (Some(origin), false)).unwrap();
     for (i, step) in steps_of(&building).iter().enumerate() {
         if i == 25 {
             mappings = MappingSessions::default();
@@ -186,7 +186,7 @@ fn a_journal_error_is_reported_and_a_cancelled_journal_is_removed() {
     std::fs::write(&file, "not a folder").unwrap();
     let mappings = MappingSessions::default();
     mappings.resume_in(file, |_, _| true);
-    mappings.begin(&name("hall"), &name("r1"), (Pose2::default(), false)).unwrap();
+    mappings.begin(&name("hall"), &name("r1"), (None, false)).unwrap();
     let seen = scan(&building, &Pose2::new(3.0, 0.0, 0.0), 1);
     mappings.offer(&name("r1"), job("hall", 1, Pose2::default(), seen));
     wait(|| mappings.progress("hall").unwrap().scans == 1);
@@ -194,8 +194,8 @@ fn a_journal_error_is_reported_and_a_cancelled_journal_is_removed() {
     let folder = dir.path().join("mapping");
     let mappings = MappingSessions::default();
     mappings.resume_in(folder.clone(), |_, _| true);
-    mappings.begin(&name("hall"), &name("r1"), (Pose2::default(), false)).unwrap();
-    mappings.begin(&name("house"), &name("r2"), (Pose2::default(), false)).unwrap();
+    mappings.begin(&name("hall"), &name("r1"), (None, false)).unwrap();
+    mappings.begin(&name("house"), &name("r2"), (None, false)).unwrap();
     let files = || std::fs::read_dir(&folder).unwrap().count();
     assert!(files() == 2 && mappings.cancel("hall") && files() == 1);
     let again = MappingSessions::default();
@@ -211,7 +211,7 @@ fn offer_frame(mappings: &MappingSessions, frame: &CheckedFrame) {
 #[test]
 fn frames_that_wait_are_bounded_and_what_is_dropped_is_counted() {
     let (mappings, building) = (MappingSessions::default(), Arc::new(Building::corridor(7)));
-    mappings.begin(&name("hall"), &name("r1"), (Pose2::default(), true)).unwrap();
+    mappings.begin(&name("hall"), &name("r1"), (None, true)).unwrap();
     let mut robot = Robot::new(building.clone(), &RobotParams::default());
     let camera = *robot.camera().intrinsics();
     let sent = CheckedFrame { mounting: None, ..frame(&robot.next().unwrap(), &camera) };
@@ -261,7 +261,7 @@ async fn frames_of_a_drive_give_landmarks_also_after_a_restart() {
     let origin = robot.clone().next().unwrap().step.map_from_robot;
     let mut mappings = MappingSessions::default();
     mappings.resume_in(journals(), |_, _| true);
-    mappings.begin(&name("hall"), &name("r1"), (origin, true)).unwrap();
+    mappings.begin(&name("hall"), &name("r1"), (Some(origin), true)).unwrap();
     for (scans, readings) in (1_u64..).zip(robot) {
         if scans == 31 {
             mappings = MappingSessions::default();

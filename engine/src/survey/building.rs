@@ -14,8 +14,8 @@ use map::{
     extrinsics::CameraExtrinsics,
     fuse::FuseParams,
     joint::{
-        CameraState, CameraStated, FrameSeen, JointError, JointLaserMap, JointParams, LaserDrive, MappedWall,
-        ObjectSeen, QuadView,
+        CameraState, CameraStated, Datum, FrameSeen, JointError, JointLaserMap, JointParams, LaserDrive,
+        MappedWall, ObjectSeen, QuadView,
     },
     pose2::{Pose2, Pose2Covariance},
     segments::LaserSegment,
@@ -54,11 +54,13 @@ pub enum SurveyError {
     Camera,
 }
 
-/// Surveys a drive whose scans made this laser map; its first pose is `origin`.
+/// Surveys a drive whose scans made this laser map. `origin` is the first pose where it is known in
+/// the frame of the map; else the map begins at (0, 0, 0), and covariances are relative to the drive
+/// as a whole.
 pub fn surveyed(
     drive: &Drive,
     slam: SlamMap,
-    origin: &Pose2,
+    origin: Option<&Pose2>,
     (params, effort): (&Params, Effort<'_>),
 ) -> Result<SurveyedBuilding, SurveyError> {
     if drive.scans.is_empty() || drive.scans.len() != slam.path.len() {
@@ -67,7 +69,8 @@ pub fn surveyed(
     if let Some(i) = drive.scans.windows(2).position(|pair| pair[1].captured_ns <= pair[0].captured_ns) {
         return Err(SurveyError::Times(i + 1));
     }
-    let slam = &beginning_at(slam, origin);
+    let datum = if origin.is_some() { Datum::FirstPose } else { Datum::WholeDrive };
+    let slam = &beginning_at(slam, origin.unwrap_or(&Pose2::default()));
     let (seen, undecodable) = sightings(drive, params, effort);
     let camera = drive.frames.first().and_then(|first| first.frame.intrinsics).ok_or(SurveyError::NoFrame)?;
     let mountings: Vec<CameraExtrinsics> =
@@ -87,7 +90,7 @@ pub fn surveyed(
     loop {
         round += 1;
         let found = objects(drive, &seen, &known, (params, effort));
-        let map = solved(drive, slam, &found, &camera, &stated)?;
+        let map = solved((drive, slam, datum), &found, &camera, &stated)?;
         if round == ROUNDS {
             let mut building = SurveyedBuilding {
                 laser_walls: slam.walls.clone(),
@@ -139,8 +142,7 @@ fn state_of(camera: &Intrinsics, robot_from_camera: &Isometry3<f64>) -> CameraSt
 }
 
 fn solved(
-    drive: &Drive,
-    slam: &SlamMap,
+    (drive, slam, datum): (&Drive, &SlamMap, Datum),
     found: &[SeenObject],
     camera: &Intrinsics,
     stated: &CameraState,
@@ -168,7 +170,7 @@ fn solved(
     let sigmas = SVector::from([turn, turn, turn, shift, shift, shift, focal, centre, centre, K1_SIGMA]);
     let laser = LaserDrive { map: slam, scans_ns: &scans_ns, frames: &frames, objects: &objects };
     let camera = CameraStated { camera: *stated, sigmas: Some(sigmas) };
-    Ok(laser.joint_map(camera, &JointParams::default(), &FuseParams::default())?)
+    Ok(laser.joint_map(camera, (&JointParams::default(), &FuseParams::default()), datum)?)
 }
 
 /// What the next round starts from.
@@ -236,7 +238,7 @@ mod tests {
             let drive = Drive { scans: times.iter().map(stamp).collect(), frames: Vec::new() };
             let path = vec![Pose2::default(); times.len()];
             let slam = SlamMap { path, keys: Vec::new(), loops: Vec::new(), refused: 0, walls: Vec::new() };
-            surveyed(&drive, slam, &Pose2::default(), (&params, effort)).unwrap_err()
+            surveyed(&drive, slam, None, (&params, effort)).unwrap_err()
         };
         assert_eq!(surveyed_at(&[]), SurveyError::Scans(0, 0));
         assert_eq!(surveyed_at(&[5, 9, 8]), SurveyError::Times(2));

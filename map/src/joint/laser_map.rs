@@ -4,6 +4,7 @@
 use super::{
     build::SurveyProblem,
     closures::weights,
+    datum::{Datum, DriveFrame},
     laser_drive::{DriveSurvey, LaserDrive, Piece},
     marginals::Marginals,
     params::JointParams,
@@ -20,7 +21,7 @@ use crate::{
     segments::LaserSegment,
     slam::SlamMap,
 };
-use nalgebra::{Matrix2, Matrix3, Matrix6, Point2, SVector};
+use nalgebra::{DMatrix, Matrix2, Matrix3, Matrix6, Point2, SVector};
 
 /// Variables whose covariance is computed at once.
 const AT_ONCE: usize = 32;
@@ -49,12 +50,12 @@ pub struct MappedWall {
     pub from_m: f64,
 }
 
-/// The joint map of one drive.
+/// The joint map of one drive; covariances are relative to the datum.
 #[derive(Debug, Clone)]
 pub struct JointLaserMap {
     /// Walls.
     pub walls: Vec<MappedWall>,
-    /// `map_from_robot` of every frame, with its covariance relative to the first keyframe.
+    /// `map_from_robot` of every frame.
     pub frames: Vec<Pose2Covariance>,
     /// `map_from_robot` of every scan, in order.
     pub path: Vec<Pose2>,
@@ -74,13 +75,18 @@ impl LaserDrive<'_> {
     pub fn joint_map(
         &self,
         camera: CameraStated,
-        params: &JointParams,
-        odometry: &FuseParams,
+        (params, odometry): (&JointParams, &FuseParams),
+        datum: Datum,
     ) -> Result<JointLaserMap, JointError> {
         let made = self.survey(camera, odometry)?;
         let params = JointParams { line_doubt_chi2: Some(LINE_CHI2), ..params.clone() };
         let solved = opened_from(&made.survey, &params, made.keyframes.clone())?;
         let camera = Marginals::of(&solved.problem, &[Variable::Camera(0)])?.into_covariance();
+        let frame = match datum {
+            Datum::FirstPose => None,
+            Datum::WholeDrive => Some(DriveFrame::of(&solved.problem)?),
+        };
+        let solved = Solved { solved, frame };
         Ok(JointLaserMap {
             walls: walls(&solved, &made, &self.map.walls)?,
             frames: frames(&solved, &made.of_frame)?,
@@ -93,6 +99,39 @@ impl LaserDrive<'_> {
     }
 }
 
+/// The solution, and the frame of the drive as a whole where that is the datum.
+struct Solved {
+    solved: SurveyProblem,
+    frame: Option<DriveFrame>,
+}
+
+impl std::ops::Deref for Solved {
+    type Target = SurveyProblem;
+
+    fn deref(&self) -> &SurveyProblem {
+        &self.solved
+    }
+}
+
+impl Solved {
+    /// The covariance of each variable; that of a fixed one relative to the first pose is zero.
+    fn covariances(&self, variables: &[Variable]) -> Result<Vec<DMatrix<f64>>, JointError> {
+        let problem = &self.problem;
+        let mut made = Vec::with_capacity(variables.len());
+        for some in variables.chunks(AT_ONCE) {
+            let free: Vec<Variable> = some.iter().copied().filter(|v| !problem.fixed.contains(v)).collect();
+            let marginals = Marginals::of(problem, &free)?;
+            made.extend(some.iter().map(|&variable| {
+                let zeros = || DMatrix::zeros(variable.size(), variable.size());
+                let covariance = marginals.block(variable, variable).unwrap_or_else(zeros);
+                let relative = |frame: &DriveFrame| frame.relative(&problem.state, variable, &covariance);
+                self.frame.as_ref().map_or_else(|| covariance.clone(), relative)
+            }));
+        }
+        Ok(made)
+    }
+}
+
 /// Every scan moves with the keyframe before it.
 fn path(map: &SlamMap, of_key: &[usize], keyframes: &[Pose2]) -> Vec<Pose2> {
     let scan = |(scan, pose): (usize, &Pose2)| {
@@ -102,34 +141,22 @@ fn path(map: &SlamMap, of_key: &[usize], keyframes: &[Pose2]) -> Vec<Pose2> {
     map.path.iter().enumerate().map(scan).collect()
 }
 
-fn frames(solved: &SurveyProblem, of_frame: &[usize]) -> Result<Vec<Pose2Covariance>, JointError> {
-    let mut poses = Vec::with_capacity(of_frame.len());
-    for some in of_frame.chunks(AT_ONCE) {
-        // The first keyframe is fixed.
-        let free: Vec<usize> = some.iter().copied().filter(|k| *k != 0).collect();
-        let chosen: Vec<Variable> = free.iter().map(|k| Variable::Keyframe(*k)).collect();
-        let marginals = Marginals::of(&solved.problem, &chosen)?;
-        poses.extend(some.iter().map(|&k| {
-            let of = Variable::Keyframe(k);
-            let block = marginals.block(of, of);
-            let covariance = block.map_or_else(Matrix3::zeros, |b| Matrix3::from_fn(|r, c| b[(r, c)]));
-            Pose2Covariance { pose: solved.problem.state.keyframes[k], covariance }
-        }));
-    }
-    Ok(poses)
+fn frames(solved: &Solved, of_frame: &[usize]) -> Result<Vec<Pose2Covariance>, JointError> {
+    let chosen: Vec<Variable> = of_frame.iter().map(|k| Variable::Keyframe(*k)).collect();
+    let pose = |(keyframe, covariance): (&usize, DMatrix<f64>)| Pose2Covariance {
+        pose: solved.problem.state.keyframes[*keyframe],
+        covariance: Matrix3::from_fn(|r, c| covariance[(r, c)]),
+    };
+    Ok(of_frame.iter().zip(solved.covariances(&chosen)?).map(pose).collect())
 }
 
-fn objects(solved: &SurveyProblem) -> Result<Vec<Option<MappedObject>>, JointError> {
+fn objects(solved: &Solved) -> Result<Vec<Option<MappedObject>>, JointError> {
     let (agreements, _) = weights(solved);
     let known: Vec<usize> = solved.landmark_of.iter().flatten().copied().collect();
+    let chosen: Vec<Variable> = known.iter().map(|landmark| Variable::Landmark(*landmark)).collect();
     let mut covariances = vec![Matrix6::zeros(); solved.problem.state.landmarks.len()];
-    for some in known.chunks(AT_ONCE) {
-        let chosen: Vec<Variable> = some.iter().map(|l| Variable::Landmark(*l)).collect();
-        let marginals = Marginals::of(&solved.problem, &chosen)?;
-        for (landmark, variable) in some.iter().zip(chosen) {
-            let Some(block) = marginals.block(variable, variable) else { continue };
-            covariances[*landmark] = Matrix6::from_fn(|r, c| block[(OF_PLACE[r], OF_PLACE[c])]);
-        }
+    for (landmark, block) in known.iter().zip(solved.covariances(&chosen)?) {
+        covariances[*landmark] = Matrix6::from_fn(|r, c| block[(OF_PLACE[r], OF_PLACE[c])]);
     }
     let made = |landmark: usize| {
         let place = place(&solved.problem.state.landmarks[landmark], &covariances[landmark]);
@@ -160,19 +187,14 @@ fn place(landmark: &LandmarkState, covariance: &Matrix6<f64>) -> LandmarkPlace {
 /// The pieces of walls, each on its line; one that no line of a scan lies on moves with the nearest
 /// keyframe.
 fn walls(
-    solved: &SurveyProblem,
+    solved: &Solved,
     made: &DriveSurvey,
     before: &[LaserSegment],
 ) -> Result<Vec<MappedWall>, JointError> {
     let mut covariances = vec![Matrix2::zeros(); made.pieces.len()];
-    let known: Vec<(usize, usize)> = solved.wall_of.iter().map(|(piece, wall)| (*piece, *wall)).collect();
-    for some in known.chunks(AT_ONCE) {
-        let chosen: Vec<Variable> = some.iter().map(|(_, wall)| Variable::Wall(*wall)).collect();
-        let marginals = Marginals::of(&solved.problem, &chosen)?;
-        for ((piece, _), variable) in some.iter().zip(chosen) {
-            let Some(block) = marginals.block(variable, variable) else { continue };
-            covariances[*piece] = Matrix2::from_fn(|r, c| block[(r, c)]);
-        }
+    let chosen: Vec<Variable> = solved.wall_of.values().map(|wall| Variable::Wall(*wall)).collect();
+    for (piece, block) in solved.wall_of.keys().zip(solved.covariances(&chosen)?) {
+        covariances[*piece] = Matrix2::from_fn(|r, c| block[(r, c)]);
     }
     let moved = Moved { before: &made.keyframes, after: &solved.problem.state.keyframes };
     let segment = |(number, piece): (usize, &Piece)| {

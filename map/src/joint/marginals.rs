@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 
 /// Information of every parameter besides, against a factor that is singular: far below any that a
 /// factor gives.
-const FLOOR: f64 = 1e-6;
+pub(super) const FLOOR: f64 = 1e-6;
 
 /// Joint covariance of chosen variables, relative to what is fixed.
 #[derive(Debug, Clone, PartialEq)]

@@ -5,6 +5,7 @@
 
 mod bounds;
 mod closures;
+mod datum;
 mod golden;
 mod laser_drive;
 mod window;

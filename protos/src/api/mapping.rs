@@ -10,11 +10,12 @@ use serde::{Deserialize, Serialize};
 pub struct NewMapping {
     /// A robot that stands on this map; its scans must come with odometry.
     pub robot: String,
-    /// Where on the map its first pose is: x, y in metres, heading in radians. The origin, if
-    /// absent.
-    #[serde(default)]
-    #[cfg_attr(feature = "openapi", schema(value_type = super::arrays::Triple))]
-    pub origin: [f64; 3],
+    /// Where its first pose is in the frame of the map: x, y in metres, heading in radians. If
+    /// absent, the drive makes the frame: it begins at the origin, and what a survey finds is known
+    /// relative to the drive as a whole.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "openapi", schema(value_type = Option<super::arrays::Triple>))]
+    pub origin: Option<[f64; 3]>,
     /// Look for landmarks, too: its frames, with intrinsics and mounting, are kept until the end,
     /// and objects on walls become tracks of a gathering.
     #[serde(default)]

@@ -102,9 +102,9 @@ async fn begin(
         let detail = format!("robot {} stands on map {}", row.name, row.map);
         return Err(ApiError::new(StatusCode::CONFLICT, "in_use", detail).field("robot"));
     }
-    let [x_m, y_m, theta_rad] = new.origin;
-    let origin = Pose2::new(x_m, y_m, theta_rad);
-    origin.check().map_err(|e| ApiError::invalid("out_of_range", "origin", e.to_string()))?;
+    let origin = new.origin.map(|[x_m, y_m, theta_rad]| Pose2::new(x_m, y_m, theta_rad));
+    let checked = origin.as_ref().map_or(Ok(()), Pose2::check);
+    checked.map_err(|e| ApiError::invalid("out_of_range", "origin", e.to_string()))?;
     let (map, robot) = (name("map", map)?, name("robot", new.robot)?);
     // It opens a file.
     let what = (origin, new.landmarks);

@@ -3,7 +3,7 @@
 
 use map::{
     fuse::FuseParams,
-    joint::{CameraState, CameraStated, JointParams, LaserDrive},
+    joint::{CameraState, CameraStated, Datum, JointParams, LaserDrive},
     pose2::Pose2,
     slam::SlamMap,
 };
@@ -22,5 +22,5 @@ pub(super) fn path(map: &SlamMap) -> anyhow::Result<Vec<Pose2>> {
         k1: 0.0,
     };
     let camera = CameraStated { camera, sigmas: Some(SVector::repeat(1.0)) };
-    Ok(drive.joint_map(camera, &JointParams::default(), &FuseParams::default())?.path)
+    Ok(drive.joint_map(camera, (&JointParams::default(), &FuseParams::default()), Datum::FirstPose)?.path)
 }

@@ -2,6 +2,7 @@
 
 use crate::evaluate::experiment::mixed;
 use cli::survey::{SimulatedDrive, simulated_drive};
+use map::pose2::Pose2;
 use sim::{
     building::{Building, LandmarkTruth},
     corridor::CorridorParams,
@@ -32,6 +33,8 @@ pub(super) struct Course {
 pub(super) struct Driven {
     pub(super) building: Arc<Building>,
     pub(super) drive: SimulatedDrive,
+    /// True poses of the frames.
+    pub(super) path: Vec<Pose2>,
     /// Posters that some frame shows in full.
     pub(super) shown: BTreeSet<String>,
     first_poster: u64,
@@ -64,17 +67,20 @@ pub(super) fn drive(course: &Course) -> anyhow::Result<Driven> {
         gaze: GazeParams { look_at_posters: !course.ahead, ..GazeParams::default() },
         ..DriveParams::default()
     };
-    let mut shown = BTreeSet::new();
+    let (mut shown, mut path) = (BTreeSet::new(), Vec::new());
     let is_shown = |view: &&LandmarkView| {
         view.state == ViewState::Full
             && view.min_side_px() >= MIN_SIDE_PX
             && view.view_angle_rad <= MAX_ANGLE_RAD
     };
-    let drive = simulated_drive(&building, drive, |readings: &SensorReadings| {
+    let mut drive = simulated_drive(&building, drive, |readings: &SensorReadings| {
+        path.push(readings.step.map_from_robot);
         let views = readings.frame.truth.landmarks.iter().filter(is_shown);
         shown.extend(views.map(|view| view.name.clone()));
     })?;
     let posters: BTreeSet<&str> = building.posters().map(|poster| poster.name.as_str()).collect();
     shown.retain(|name| posters.contains(name.as_str()));
-    Ok(Driven { building, drive, shown, first_poster: corridor.first_poster })
+    // As of a building that nobody has a plan of.
+    drive.log.origin = None;
+    Ok(Driven { building, drive, path, shown, first_poster: corridor.first_poster })
 }

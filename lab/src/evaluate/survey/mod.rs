@@ -4,6 +4,7 @@
 mod drive;
 
 use super::{
+    alignment::{laid_on, moved},
     experiment::{of_each, say},
     statistics::quantile,
 };
@@ -61,7 +62,8 @@ struct Figures {
     lost: Vec<String>,
     /// Landmarks that are no poster, door or window.
     strangers: usize,
-    /// Distances on the floor in the frame of the first pose, and after a rigid alignment, m.
+    /// Distances on the floor in the frame of the first pose, and after a rigid alignment on the
+    /// landmarks, m.
     joint_m: Vec<f64>,
     joint_aligned_m: Vec<f64>,
     two_steps_m: Vec<f64>,
@@ -69,7 +71,8 @@ struct Figures {
     /// Errors of the sides of the border that was taken, %.
     size_percent: Vec<f64>,
     two_steps_size_percent: Vec<f64>,
-    /// Squared errors on the floor over their covariance, for each degree of freedom.
+    /// Squared errors on the floor over their covariance, for each degree of freedom, in the frame
+    /// of the whole drive.
     nees: Vec<f64>,
     /// Errors of the mounting's rotation as stated and as found, degrees.
     stated_deg: Vec<f64>,
@@ -125,7 +128,10 @@ impl Figures {
                 quantile(&self.found_deg, 0.5),
                 quantile(&self.found_deg, 0.95)
             ),
-            format!("NEES of landmarks for each degree of freedom: {:.2}", mean(&self.nees)),
+            format!(
+                "NEES of landmarks for each degree of freedom, in the frame of the whole drive: {:.2}",
+                mean(&self.nees)
+            ),
         ];
         lines.extend(self.lost.iter().map(|lost| format!("  lost: {lost}")));
         lines
@@ -155,8 +161,14 @@ fn figures(driven: &Driven, building: &SurveyedBuilding) -> Figures {
     let mut made = Figures { shown: driven.shown.len(), ..Figures::default() };
     let (mut joint, mut two) = (Vec::new(), Vec::new());
     let mut named = std::collections::BTreeSet::new();
+    let points = |poses: &mut dyn Iterator<Item = &Pose2>| poses.map(|p| p.position().into()).collect();
+    let (found, path): (Vec<Point2<f64>>, Vec<Point2<f64>>) =
+        (points(&mut building.frames.iter().map(|f| &f.pose)), points(&mut driven.path.iter()));
+    let by_drive = laid_on(&found, &path);
+    let by_first = driven.path.first().copied().unwrap_or_default();
     for object in building.objects.iter().filter(|object| object.refused.is_none()) {
-        let Some(truth) = truth_at(&driven.building, &object.place) else {
+        let at_first = moved(&object.place, &by_first);
+        let Some(truth) = truth_at(&driven.building, &at_first) else {
             made.strangers += 1;
             continue;
         };
@@ -165,14 +177,16 @@ fn figures(driven: &Driven, building: &SurveyedBuilding) -> Figures {
         }
         named.insert(truth.name.clone());
         let at = floor(truth);
-        let here = Vector2::new(object.place.x_m, object.place.y_m);
-        let covariance = object.place.covariance.fixed_view::<2, 2>(0, 0).into_owned();
-        let d = here - at;
-        made.joint_m.push(d.norm());
+        let here = Vector2::new(at_first.x_m, at_first.y_m);
+        made.joint_m.push((here - at).norm());
+        let place = moved(&object.place, &by_drive);
+        let covariance = place.covariance.fixed_view::<2, 2>(0, 0).into_owned();
+        let d = Vector2::new(place.x_m, place.y_m) - at;
         made.nees.extend(covariance.cholesky().map(|c| d.dot(&c.solve(&d)) / 2.0));
         made.size_percent.extend(size_errors(&object.place, &driven.borders(truth)));
         joint.push((here, at));
         if let Some(place) = two_steps(driven, building, object) {
+            let place = moved(&place, &by_first);
             let here = Vector2::new(place.x_m, place.y_m);
             made.two_steps_m.push((here - at).norm());
             made.two_steps_size_percent.extend(size_errors(&place, &driven.borders(truth)));
@@ -204,8 +218,10 @@ pub(super) fn truth_at<'a>(building: &'a Building, place: &LandmarkPlace) -> Opt
 
 /// Why a poster is no landmark.
 fn why_lost(driven: &Driven, building: &SurveyedBuilding, name: &str) -> String {
-    let of_it =
-        |object: &&SurveyedObject| truth_at(&driven.building, &object.place).is_some_and(|t| t.name == name);
+    let by_first = driven.path.first().copied().unwrap_or_default();
+    let of_it = |object: &&SurveyedObject| {
+        truth_at(&driven.building, &moved(&object.place, &by_first)).is_some_and(|t| t.name == name)
+    };
     let refused: Vec<&str> =
         building.objects.iter().filter(of_it).filter_map(|object| object.refused.as_deref()).collect();
     if refused.is_empty() { "no object was followed there".to_owned() } else { refused.join("; ") }
@@ -249,20 +265,8 @@ fn two_steps(driven: &Driven, building: &SurveyedBuilding, object: &SurveyedObje
 
 /// Distances after the rigid motion that lays the found points best on the true ones.
 fn aligned(pairs: &[(Vector2<f64>, Vector2<f64>)]) -> Vec<f64> {
-    if pairs.is_empty() {
-        return Vec::new();
-    }
-    let n = pairs.len() as f64;
-    let found = pairs.iter().map(|p| p.0).sum::<Vector2<f64>>() / n;
-    let truth = pairs.iter().map(|p| p.1).sum::<Vector2<f64>>() / n;
-    let (mut dot, mut cross) = (0.0, 0.0);
-    for (a, b) in pairs {
-        let (a, b) = (a - found, b - truth);
-        (dot, cross) = (dot + a.dot(&b), cross + a.perp(&b));
-    }
-    let turn = Pose2::new(0.0, 0.0, cross.atan2(dot));
-    let off = |(a, b): &(Vector2<f64>, Vector2<f64>)| {
-        (turn.apply(&Point2::from(a - found)).coords + truth - b).norm()
-    };
-    pairs.iter().map(off).collect()
+    let (found, truth): (Vec<Point2<f64>>, Vec<Point2<f64>>) =
+        pairs.iter().map(|(a, b)| (Point2::from(*a), Point2::from(*b))).unzip();
+    let laid = laid_on(&found, &truth);
+    found.iter().zip(&truth).map(|(a, b)| (laid.apply(a) - b).norm()).collect()
 }

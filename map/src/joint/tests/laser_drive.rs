@@ -4,7 +4,7 @@
 use crate::{
     fuse::FuseParams,
     joint::{
-        CameraState, CameraStated, FrameSeen, JointLaserMap, JointParams, LaserDrive, MappedObject,
+        CameraState, CameraStated, Datum, FrameSeen, JointLaserMap, JointParams, LaserDrive, MappedObject,
         ObjectSeen, QuadView,
     },
     pose2::Pose2,
@@ -166,7 +166,7 @@ fn solved(driven: &Driven, stated: &CameraState) -> JointLaserMap {
         SVector::from([half_degree, half_degree, half_degree, 0.01, 0.01, 0.01, 3.0, 1e-3, 1e-3, 1e-6]);
     let camera = CameraStated { camera: *stated, sigmas: Some(sigmas) };
     let params = JointParams { border_sigma_px: 0.0, ..JointParams::default() };
-    driven.drive().joint_map(camera, &params, &FuseParams::default()).unwrap()
+    driven.drive().joint_map(camera, (&params, &FuseParams::default()), Datum::FirstPose).unwrap()
 }
 
 #[test]

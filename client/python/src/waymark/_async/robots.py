@@ -188,11 +188,11 @@ class AsyncRobots(AsyncBase):
         return await self._send(AreaStatsBody, "modalities_at", map, params=query)
 
     async def start_mapping(
-        self, map: str, robot: str, origin: tuple[float, float, float] = (0.0, 0.0, 0.0), *, landmarks: bool = False
+        self, map: str, robot: str, origin: tuple[float, float, float] | None = None, *, landmarks: bool = False
     ) -> MappingProgressBody:
-        """Begins to make the walls of a map from the scans of a robot; `origin` is its first pose on the map. With
-        `landmarks` it looks for them in the robot's frames, too."""
-        body = {"robot": robot, "origin": list(origin), "landmarks": landmarks}
+        """Begins to make the walls of a map from the scans of a robot; `origin` is its first pose where it is known in
+        the frame of the map. With `landmarks` it looks for them in the robot's frames, too."""
+        body = {"robot": robot, "landmarks": landmarks} | ({"origin": list(origin)} if origin else {})
         return await self._send(MappingProgressBody, "start_mapping", map, json=body)
 
     async def mapping(self, map: str) -> MappingProgressBody:
