@@ -22,6 +22,8 @@ const NEAR_M: f64 = 0.15;
 const NEAR_RAD: f64 = 0.06;
 /// ...and this far beyond its ends, metres.
 const BEYOND_M: f64 = 0.3;
+/// So many keyframes see a wall from about the same place, and its unevenness there is one error.
+const SHARED: f64 = 2.0;
 /// Standard deviation of a motion besides, for one of nothing: metres and radians.
 const STILL: f64 = 1e-4;
 
@@ -212,7 +214,7 @@ fn line_seen(line: &LaserSegment, keyframe: usize, wall: usize) -> LineSeen {
     let facing = line.facing();
     // About the middle of the line: an offset there and a turn are independent.
     let along = nalgebra::Vector2::new(-facing.y, facing.x).dot(&middle);
-    let turn = p.rough_rad.powi(2);
-    let rough = Matrix2::new(turn, along * turn, along * turn, along * along * turn + p.rough_m.powi(2));
+    let (turn, offset) = (SHARED * p.rough_rad.powi(2), SHARED * p.rough_m.powi(2));
+    let rough = Matrix2::new(turn, along * turn, along * turn, along * along * turn + offset);
     LineSeen { keyframe, wall, facing_rad: at.x, offset_m: at.y, covariance: covariance + rough }
 }

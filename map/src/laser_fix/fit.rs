@@ -10,7 +10,7 @@ use crate::{
     pose2::{Pose2, Pose2Covariance},
     slam::cloud::Cloud,
 };
-use nalgebra::{Matrix3, Matrix3x2, Point2, SymmetricEigen, Vector2, Vector3};
+use nalgebra::{Matrix2, Matrix3, Matrix3x2, Point2, SymmetricEigen, Vector2, Vector3};
 
 /// Variance of an undetermined coordinate: (100 m)^2, and about pi^2 for the heading.
 const UNKNOWN: [f64; 3] = [1e4, 1e4, 10.0];
@@ -92,16 +92,14 @@ pub(super) fn descend(
     let information =
         points.iter().fold(Matrix3::zeros(), |h, m| h + m.j * m.j.transpose() * (scale * m.weight));
     let spread = spread(&information)?;
-    let [floor_m, floor_rad] = p.floor.map(|sigma| sigma * sigma);
-    let floor = Matrix3::from_diagonal(&Vector3::new(floor_m, floor_m, floor_rad));
-    let mut parts = by_walls(walls, &points, &(spread * scale));
+    let (mut parts, uneven) = by_walls(walls, &points, &(spread * scale), p);
     let all = |parts: &[WallPart]| parts.iter().map(WallPart::spread).sum::<Matrix3<f64>>();
-    let (known, unknown) = known(&(spread + all(&parts) + floor));
+    let (known, unknown) = known(&(spread + all(&parts) + uneven));
     let noise = known * spread * known.transpose() + unknown;
     for part in &mut parts {
         part.by_wall = known * part.by_wall;
     }
-    let covariance = noise + floor + all(&parts);
+    let covariance = noise + known * uneven * known.transpose() + all(&parts);
     parts.truncate(NAMED_WALLS);
     let (count, flat) = (points.len(), cloud.points.len());
     let pose = Pose2Covariance { pose, covariance };
@@ -110,27 +108,42 @@ pub(super) fn descend(
     Some(LaserFix { pose, noise, walls: parts, matched, points: count, rms_m: variance.sqrt() })
 }
 
-/// The effect of the walls' own errors on the pose, each propagated through the fit; the largest
-/// first. Many points on one wall do not make its place more certain than the map says.
-fn by_walls(walls: &WallIndex, points: &[Matched], gain: &Matrix3<f64>) -> Vec<WallPart> {
+/// The effect of the walls' own errors on the pose, each propagated through the fit, the largest
+/// first; and that of their unevenness where the scan sees them. Many points on one wall do not
+/// make its place more certain than the map says, nor the wall straight.
+fn by_walls(
+    walls: &WallIndex,
+    points: &[Matched],
+    gain: &Matrix3<f64>,
+    p: &LaserFixParams,
+) -> (Vec<WallPart>, Matrix3<f64>) {
+    let rough = Matrix2::from_diagonal(&Vector2::new(p.rough_rad.powi(2), p.rough_m.powi(2)));
     let mut order: Vec<usize> = (0..points.len()).collect();
     order.sort_by_key(|&i| points[i].wall);
-    let mut parts = Vec::new();
+    let (mut parts, mut uneven) = (Vec::new(), Matrix3::zeros());
     for group in order.chunk_by(|&a, &b| points[a].wall == points[b].wall) {
         let Some(&first) = group.first() else { continue };
         let mut pull = Matrix3x2::zeros();
+        let (weights, weighted_m) = group.iter().fold((0.0, 0.0), |(weights, sum), &i| {
+            (weights + points[i].weight, sum + points[i].weight * points[i].along_m)
+        });
         for &i in group {
             let m = &points[i];
             // A turn of the wall moves a point by its distance from the middle, an offset by the
             // same everywhere.
             pull += m.j * Vector2::new(m.along_m, 1.0).transpose() * m.weight;
         }
+        let by_wall = -gain * pull;
+        // Uneven about the middle of what is seen of it.
+        let seen = Matrix2::new(1.0, 0.0, -weighted_m / weights.max(1e-9), 1.0);
+        let by_seen = by_wall * seen;
+        uneven += by_seen * rough * by_seen.transpose();
         let wall = &walls.walls[points[first].wall];
-        parts.push(WallPart { wall: wall.name, by_wall: -gain * pull, covariance: wall.covariance });
+        parts.push(WallPart { wall: wall.name, by_wall, covariance: wall.covariance });
     }
     let weight = |part: &WallPart| part.spread().diagonal().dot(&Vector3::new(1.0, 1.0, LEVER_M * LEVER_M));
     parts.sort_by(|a, b| weight(b).total_cmp(&weight(a)).then(a.wall.cmp(&b.wall)));
-    parts
+    (parts, uneven)
 }
 
 /// The determined part of a covariance, as a projection, and the covariance of the rest: directions

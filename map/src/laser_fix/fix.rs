@@ -6,8 +6,9 @@ use crate::{
 };
 use nalgebra::{Matrix2, Matrix3, Matrix3x2, Matrix3x6, Matrix6, SymmetricEigen};
 
-/// Side of the squares of floor in which all unnamed walls share one error, metres.
-const AREA_M: f64 = 10.0;
+/// Side of the squares of floor in which unnamed walls and the unevenness of all share one error,
+/// metres: walls bow within a few metres.
+const AREA_M: f64 = 2.0;
 
 /// The robot's pose by one scan.
 #[derive(Debug, Clone, PartialEq)]

@@ -3,6 +3,7 @@
 use crate::{
     check::{self, OutOfRange},
     slam::cloud::CloudParams,
+    walls::WallParams,
 };
 use serde::{Deserialize, Serialize};
 
@@ -26,9 +27,10 @@ pub struct LaserFixParams {
     pub outlier_m: f64,
     /// Number of points with a common error; the information is divided by it.
     pub correlated: f64,
-    /// Smallest standard deviations, whatever the number of points: position, metres, and heading,
-    /// radians.
-    pub floor: [f64; 2],
+    /// Unevenness of walls where a scan sees them: standard deviation of their offset, metres,
+    pub rough_m: f64,
+    /// and of their direction, radians, whatever the number of points.
+    pub rough_rad: f64,
     /// Least number of points with a wall.
     pub min_points: usize,
     /// Least share of points with a wall, 0 to 1.
@@ -57,7 +59,8 @@ impl Default for LaserFixParams {
             sigma_m: 0.02,
             outlier_m: 0.06,
             correlated: 3.0,
-            floor: [0.003, 0.001],
+            rough_m: WallParams::default().rough_m,
+            rough_rad: WallParams::default().rough_rad,
             min_points: 20,
             min_matched: 0.5,
             prior_gate: 16.27,

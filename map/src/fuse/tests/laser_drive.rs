@@ -101,7 +101,7 @@ fn drive(random: &mut Random, scans: Option<&LaserFixParams>) -> Driven {
 fn scans_make_the_pose_more_certain_and_keep_it_consistent() {
     // The simulated ranges have independent errors; by default errors of points count as shared, as
     // with real lasers.
-    let exact = LaserFixParams { correlated: 1.0, floor: [0.0; 2], ..LaserFixParams::default() };
+    let exact = LaserFixParams { correlated: 1.0, rough_m: 0.0, rough_rad: 0.0, ..LaserFixParams::default() };
     let careful = LaserFixParams::default();
     let mut random = Random::new(3);
     let drives = 60;
