@@ -105,9 +105,9 @@ mod tests {
     use vision::params::Params;
 
     #[test]
-    fn doors_that_look_alike_are_no_landmarks_and_posters_are() {
+    fn doors_and_look_alikes_are_no_landmarks_and_posters_are() {
         let corridor = CorridorParams { posters: 4, ..CorridorParams::default() };
-        let building = Arc::new(Building::corridor_with(&corridor, 12));
+        let building = Arc::new(Building::corridor_with(&corridor, 22));
         let drive = DriveParams { seed: 3, legs: 2, rate_hz: 3.0, ..DriveParams::default() };
         let log = simulated_drive(&building, drive, |_| ()).unwrap().log;
         let found = surveyed(&log, &Params::default()).unwrap();
@@ -121,8 +121,13 @@ mod tests {
         assert!(kinds.iter().filter(|kind| **kind == Some(LandmarkKind::Poster)).count() >= 2, "{kinds:?}");
         assert!(!kinds.contains(&Some(LandmarkKind::Door)), "{kinds:?}");
         let why: Vec<_> = found.objects.iter().map(|object| (there(object), &object.refused)).collect();
-        let alike = |why: &&Option<String>| why.as_ref().is_some_and(|why| why.contains("looks like it"));
-        let doors = why.iter().filter(|(kind, _)| *kind == Some(LandmarkKind::Door)).map(|(_, why)| *why);
-        assert!(doors.filter(alike).count() >= 2, "{why:?}");
+        let because = |of: LandmarkKind, word: &str| {
+            let those = why.iter().filter(|(kind, why)| {
+                *kind == Some(of) && why.as_ref().is_some_and(|why| why.contains(word))
+            });
+            those.count()
+        };
+        assert!(because(LandmarkKind::Door, "stands on the floor") >= 2, "{why:?}");
+        assert!(because(LandmarkKind::Window, "looks like it") >= 1, "{why:?}");
     }
 }

@@ -12,6 +12,8 @@ const MAX_SIGMA_M: f64 = 0.25;
 const MIN_PARALLAX_RAD: f64 = 0.14;
 const MIN_BASELINE_M: f64 = 0.5;
 const MIN_VIEWS: usize = 4;
+/// An object whose lower edge is below this height stands on the floor, metres.
+const FLOOR_M: f64 = 0.15;
 
 /// Why an object is no landmark by its own views.
 pub(super) fn refusal(place: &LandmarkPlace, agreement: f64, poses: &[Pose2]) -> Option<String> {
@@ -29,27 +31,41 @@ pub(super) fn refusal(place: &LandmarkPlace, agreement: f64, poses: &[Pose2]) ->
         Some(format!("its views contradict each other: {:.0} % agree", 100.0 * agreement))
     } else if sigma_m > MAX_SIGMA_M {
         Some(format!("its place is known to {sigma_m:.2} m only"))
+    } else if stands_on_floor(place) {
+        Some("it stands on the floor, as doors do: they open, and look alike".to_owned())
     } else {
         None
     }
 }
 
-/// Of objects at one place, that with most views stays: the others are its frame or its mat.
+fn stands_on_floor(place: &LandmarkPlace) -> bool {
+    place.z_m - 0.5 * place.size.height_m < FLOOR_M
+}
+
+/// Of objects at one place, that with most views stays: the others are its frame or its mat. Of
+/// what stands on the floor no part stays.
 pub(super) fn refuse_twins(objects: &mut [SurveyedObject]) {
     let reach = |place: &LandmarkPlace| 0.5 * place.size.width_m.max(place.size.height_m);
     let at = |place: &LandmarkPlace| place.map_from_landmark().translation.vector;
     for i in 0..objects.len() {
-        let rival = (0..objects.len()).find(|&j| {
+        if objects[i].refused.is_some() {
+            continue;
+        }
+        let why = (0..objects.len()).filter(|j| *j != i).find_map(|j| {
             let (own, other) = (&objects[i], &objects[j]);
             let apart = (at(&own.place) - at(&other.place)).norm();
             let is_near = apart < reach(&own.place).max(reach(&other.place));
-            let is_better =
+            let more_views =
                 (other.views.len(), std::cmp::Reverse(j)) > (own.views.len(), std::cmp::Reverse(i));
-            i != j && is_near && is_better && own.refused.is_none() && other.refused.is_none()
+            if is_near && stands_on_floor(&other.place) {
+                Some("it is a part of something that stands on the floor")
+            } else if is_near && more_views && other.refused.is_none() {
+                Some("another one with more views is at its place")
+            } else {
+                None
+            }
         });
-        if rival.is_some() {
-            objects[i].refused = Some("another one with more views is at its place".to_owned());
-        }
+        objects[i].refused = why.map(str::to_owned);
     }
 }
 
@@ -88,6 +104,24 @@ mod tests {
         vague.covariance[(0, 0)] = 0.09;
         let why = refusal(&vague, 0.9, &poses(&[-0.5, 0.0, 0.5, 1.0])).unwrap();
         assert_eq!(why, "its place is known to 0.30 m only");
+    }
+
+    #[test]
+    fn a_door_and_its_panels_are_no_landmarks() {
+        let poses: Vec<Pose2> = [-0.5, 0.0, 0.5, 1.0].iter().map(|y| Pose2::new(2.0, *y, 0.0)).collect();
+        let size = LandmarkSize { width_m: 0.9, height_m: 2.1 };
+        let of = |z_m| LandmarkPlace { z_m, size, ..place(0.0, 0.9) };
+        assert!(refusal(&of(1.1), 0.9, &poses).unwrap().contains("stands on the floor"));
+        assert_eq!(refusal(&of(1.3), 0.9, &poses), None, "0.25 m above it");
+        let door = SurveyedObject {
+            place: of(1.1),
+            refused: Some("3 views, 4 needed".into()),
+            ..object(0.0, 0.9, 3)
+        };
+        let mut objects = vec![object(0.1, 0.4, 9), door, object(3.0, 0.6, 4)];
+        refuse_twins(&mut objects);
+        let refused: Vec<bool> = objects.iter().map(|object| object.refused.is_some()).collect();
+        assert_eq!(refused, [true, true, false]);
     }
 
     #[test]

@@ -141,15 +141,15 @@ fn is_at(quad: &[Point2<f64>; 4], there: &[Point2<f64>; 4]) -> bool {
     (centre(quad) - centre(there)).norm() <= NEAR_SHARE * longest_px
 }
 
-/// The object that a quad looks like: by its verdict, and where points agree but some other gate
-/// says no, which it may not say from another side. Of two objects that are both known the verdict
-/// already says that they look alike.
+/// The object that a quad looks like: by its verdict, and where points or the icon agree but some
+/// other gate says no, which it may not say from another side. Of two objects that are both known
+/// the verdict already says that they look alike.
 fn taken_for(result: &RecognitionResult) -> Option<LandmarkId> {
     match result.verdict {
         Verdict::Unique(id) => Some(id),
-        Verdict::Ambiguous(id) if result.points.is_some() => {
+        Verdict::Ambiguous(id) => {
             let refusal = result.candidates.first()?.refusal?;
-            matches!(refusal, MatchRefusal::Similarity | MatchRefusal::Disagreement).then_some(id)
+            (refusal != MatchRefusal::Margin).then_some(id)
         }
         _ => None,
     }
