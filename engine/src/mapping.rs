@@ -6,8 +6,10 @@
 
 mod record;
 mod journal;
+mod fitted;
 mod session;
 
+pub use fitted::{LeftOut, MAX_LEFT_OUT};
 pub use session::{FRAMES_WAITING, MAX_SCANS, QUEUE};
 
 use crate::scan_job::ScanJob;
@@ -32,7 +34,7 @@ pub const MAX_MAPPINGS: usize = 4;
 /// Maps with a stored mapping; a further one replaces the first by name that is over.
 pub const MAX_SESSIONS: usize = 64;
 
-/// Walls in the map frame, with their covariance relative to the map's first pose.
+/// Walls in the map frame.
 pub type Walls = Vec<map::segments::LaserSegment>;
 
 /// What a mapping made.
@@ -92,6 +94,8 @@ pub struct MappingProgress {
     pub frames_dropped: u64,
     /// Landmarks that are proposed, once they are found.
     pub landmarks: Option<usize>,
+    /// Objects that are no landmarks, [`MAX_LEFT_OUT`] at most.
+    pub left_out: Vec<LeftOut>,
     /// Number of the gathering that has them, once they are stored.
     pub gathering: Option<i64>,
     /// Distance driven by odometry, m.

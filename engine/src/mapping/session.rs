@@ -1,7 +1,8 @@
 //! One mapping: its queue, its thread, its progress.
 
 use super::{
-    MadeMap, MadeSurvey, MappingProgress, MappingStage, Shared, Walls,
+    MadeMap, MappingProgress, MappingStage, Shared,
+    fitted::{fitted, no_landmarks},
     journal::{Journal, JournalHeader, JournalReader},
     record::Record,
 };
@@ -11,17 +12,15 @@ use crate::{
         panics::{Edge, Panics},
         threads::{self, Class},
     },
-    survey::{DriveReading, Effort, ScanStamp, WHILE_DRIVING, surveyed},
+    survey::{DriveReading, ScanStamp, WHILE_DRIVING},
 };
 use map::{
-    pose2::{Pose2, Pose2Covariance},
-    slam::{Slam, SlamMap, SlamParams},
+    pose2::Pose2,
+    slam::{Slam, SlamParams},
 };
-use nalgebra::Matrix3;
 use protos::{CheckedFrame, Name};
 use std::{
     io,
-    num::NonZeroUsize,
     sync::{
         Arc, Mutex, MutexGuard, PoisonError,
         atomic::{AtomicBool, AtomicUsize, Ordering},
@@ -29,7 +28,6 @@ use std::{
     },
 };
 use tokio::sync::oneshot;
-use vision::params::Params;
 
 /// Scans and frames that wait to be mapped; more are dropped and counted.
 pub const QUEUE: usize = 64;
@@ -97,6 +95,7 @@ impl Session {
             frames_refused: None,
             frames_dropped: 0,
             landmarks: None,
+            left_out: Vec::new(),
             gathering: None,
             distance_m: 0.0,
             pose: None,
@@ -300,33 +299,17 @@ impl Mapper {
         Ok(())
     }
 
-    /// The first pose in the frame of the map.
-    fn begins(&self) -> Pose2 {
-        self.origin.unwrap_or_default()
-    }
-
     /// Fits everything once more, and looks at the frames.
     fn made(&mut self) -> Result<MadeMap, String> {
         let slam = std::mem::replace(&mut self.slam, Slam::new(SlamParams::default()));
         let map = slam.finish().map_err(|error| error.to_string())?;
         lock(&self.progress).loop_closures = Some(map.loops.len());
-        let alone = MadeMap { walls: walls(&map, &self.begins()), survey: None };
         let drive = self.drive.take().map(|reading| reading.finished().0);
-        let Some(drive) = drive.filter(|drive| !drive.frames.is_empty()) else { return Ok(alone) };
-        let effort = Effort { threads: NonZeroUsize::MIN, told: &|_, _, _| {} };
-        match surveyed(&drive, map, self.origin.as_ref(), (&Params::default(), effort)) {
-            Ok(building) => {
-                let proposed = building.objects.iter().filter(|object| object.refused.is_none()).count();
-                lock(&self.progress).landmarks = Some(proposed);
-                let walls = building.walls.clone();
-                Ok(MadeMap { walls, survey: Some(Arc::new(MadeSurvey { drive, building })) })
-            }
-            // The walls of the scans alone are none the worse.
-            Err(error) => {
-                lock(&self.progress).reason = Some(no_landmarks(&error.to_string()));
-                Ok(alone)
-            }
-        }
+        let fitted = fitted(map, drive, self.origin.as_ref());
+        let mut progress = lock(&self.progress);
+        (progress.landmarks, progress.left_out) = (fitted.landmarks, fitted.left_out);
+        progress.reason = fitted.reason;
+        Ok(fitted.made)
     }
 
     fn write(&mut self, record: &Record) {
@@ -375,7 +358,7 @@ impl Mapper {
         if let Some(drive) = &mut self.drive {
             drive.scan(ScanStamp { captured_ns: job.captured_ns, odom: job.odom_from_robot });
         }
-        let on_map = self.begins().compose(&at);
+        let on_map = self.origin.unwrap_or_default().compose(&at);
         let mut progress = lock(&self.progress);
         progress.scans += 1;
         let odom = job.odom_from_robot;
@@ -383,17 +366,6 @@ impl Mapper {
         progress.pose = Some([on_map.x_m, on_map.y_m, on_map.theta_rad]);
         Ok(())
     }
-}
-
-fn no_landmarks(reason: &str) -> String {
-    format!("no landmarks are proposed: {reason}")
-}
-
-/// The walls in the map frame, for a map whose first pose is `origin`.
-fn walls(map: &SlamMap, origin: &Pose2) -> Walls {
-    // Where the first pose lies in the map is a definition: it adds no error.
-    let origin = Pose2Covariance { pose: *origin, covariance: Matrix3::zeros() };
-    map.walls.iter().map(|wall| wall.transformed(&origin)).collect()
 }
 
 fn fail(progress: &Shared, reason: &str) {

@@ -289,6 +289,9 @@ async fn frames_of_a_drive_give_landmarks_also_after_a_restart() {
     let survey = made.survey.unwrap();
     let found: Vec<_> = survey.building.objects.iter().filter(|object| object.refused.is_none()).collect();
     assert_eq!(mappings.progress("hall").unwrap().landmarks, Some(found.len()));
+    let left_out = mappings.progress("hall").unwrap().left_out;
+    assert_eq!(left_out.len(), survey.building.objects.len() - found.len());
+    assert!(left_out.iter().all(|object| !object.reason.is_empty()), "{left_out:?}");
     assert!(found.len() >= 3 && !made.walls.is_empty(), "{}", found.len());
     for object in found {
         // What hangs there: in the frame of the building, since the origin was told.

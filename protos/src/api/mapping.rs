@@ -42,6 +42,26 @@ pub enum MappingStageBody {
     Failed,
 }
 
+/// An object of a drive that is no landmark.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct LeftOutBody {
+    /// Its centre in the map, metres.
+    pub x_m: f64,
+    /// Metres.
+    pub y_m: f64,
+    /// Over the floor, metres.
+    pub z_m: f64,
+    /// Metres.
+    pub width_m: f64,
+    /// Metres.
+    pub height_m: f64,
+    /// Number of its views.
+    pub views: usize,
+    /// Why it is none.
+    pub reason: String,
+}
+
 /// A mapping as it stands.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
@@ -66,6 +86,9 @@ pub struct MappingProgressBody {
     /// Number of landmarks that are proposed, once they are found.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub landmarks: Option<usize>,
+    /// What hangs there and is no landmark, and why: the 64 with the most views.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub left_out: Vec<LeftOutBody>,
     /// The gathering whose tracks these are, once the walls are stored.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gathering: Option<i64>,

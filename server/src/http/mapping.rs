@@ -17,12 +17,14 @@ use crate::{
 };
 use axum::{Extension, Json, extract::State, http::StatusCode};
 use engine::{
-    mapping::{FRAMES_WAITING, MadeMap, MadeSurvey, MappingError, MappingProgress, MappingStage},
+    mapping::{FRAMES_WAITING, LeftOut, MadeMap, MadeSurvey, MappingError, MappingProgress, MappingStage},
     panics::Edge,
 };
 use futures::FutureExt;
 use map::pose2::Pose2;
-use protos::api::{FinishMappingQuery, MappingProgressBody, MappingStageBody, NewMapping, Problem, WallBody};
+use protos::api::{
+    FinishMappingQuery, LeftOutBody, MappingProgressBody, MappingStageBody, NewMapping, Problem, WallBody,
+};
 use std::{panic::AssertUnwindSafe, sync::Arc};
 use tokio::sync::oneshot;
 use utoipa_axum::{router::OpenApiRouter, routes};
@@ -49,6 +51,11 @@ fn frames_refused(progress: &MappingProgress) -> Option<String> {
     (!told.is_empty()).then(|| told.join("; "))
 }
 
+fn left_out(object: LeftOut) -> LeftOutBody {
+    let LeftOut { centre_m: [x_m, y_m, z_m], size_m: [width_m, height_m], views, reason } = object;
+    LeftOutBody { x_m, y_m, z_m, width_m, height_m, views, reason }
+}
+
 fn shown(progress: MappingProgress) -> MappingProgressBody {
     let frames_refused = frames_refused(&progress);
     MappingProgressBody {
@@ -67,6 +74,7 @@ fn shown(progress: MappingProgress) -> MappingProgressBody {
         frames: progress.frames,
         frames_refused,
         landmarks: progress.landmarks,
+        left_out: progress.left_out.into_iter().map(left_out).collect(),
         gathering: progress.gathering,
         distance_m: progress.distance_m,
         pose: progress.pose,

@@ -186,7 +186,7 @@ for (const [size, where] of [[undefined, "desk"], [PHONE, "phone"]]) {
     const found = [[0, 0.1, 8.1, 0.1], [8.1, 0.1, 8.1, 5]].map(([ax, ay, bx, by]) => ({ a: [ax, ay], b: [bx, by], covariance: [1e-6, 0, 1e-4] }));
     const asked = [];
     let stage = "mapping";
-    const told = () => ({ map, robot: `sweeper-${where}`, stage, scans: 400, dropped: 0, distance_m: 31.5, frames: 60, ...(stage !== "mapping" && { segments: 2, landmarks: 3 }), ...(stage === "found" && { walls: found }), ...(stage === "done" && { gathering: 5 }) });
+    const told = () => ({ map, robot: `sweeper-${where}`, stage, scans: 400, dropped: 0, distance_m: 31.5, frames: 60, ...(stage !== "mapping" && { segments: 2, landmarks: 3, left_out: [{ x_m: 4.04, y_m: -1.3, z_m: 1.05, width_m: 0.95, height_m: 2.1, views: 12, reason: "it stands on the floor" }] }), ...(stage === "found" && { walls: found }), ...(stage === "done" && { gathering: 5 }) });
     await page.route(new RegExp(`/maps/${map}/mapping(/finish)?(\\?.*)?$`), async (route) => {
       const request = route.request();
       const { pathname, search } = new URL(request.url());
@@ -209,6 +209,8 @@ for (const [size, where] of [[undefined, "desk"], [PHONE, "phone"]]) {
     };
     await finish();
     await page.getByText("3 landmarks found; they are proposed once the walls are taken").waitFor();
+    await page.getByText("1 object, and why").click();
+    await page.getByText("0.95 x 2.10 m at 4.0, -1.3, 12 views: it stands on the floor").waitFor();
     await page.getByText(/Dashed: what the scans were taken for\. Plain: the 1 wall of the map, which they replace\. Nothing is replaced so far\./).waitFor();
     await page.getByRole("application").scrollIntoViewIfNeeded();
     await page.waitForTimeout(500);
