@@ -6,6 +6,7 @@ use super::{
     error::ApiError,
     extract::{Body, PathParams, QueryParams, name},
     gathering::accept_passing,
+    walls::shown as shown_wall,
 };
 use crate::{
     identity::Principal,
@@ -23,7 +24,7 @@ use engine::{
 use futures::FutureExt;
 use map::pose2::Pose2;
 use protos::api::{
-    FinishMappingQuery, LeftOutBody, MappingProgressBody, MappingStageBody, NewMapping, Problem, WallBody,
+    FinishMappingQuery, LeftOutBody, MappingProgressBody, MappingStageBody, NewMapping, Problem,
 };
 use std::{panic::AssertUnwindSafe, sync::Arc};
 use tokio::sync::oneshot;
@@ -132,11 +133,7 @@ async fn get(
     maps::get(app.store.reads(), &map).await?;
     let mappings = app.motion.mappings();
     let progress = mappings.progress(&map).map(shown).ok_or_else(|| refused(MappingError::None))?;
-    let wall = |wall: &StoredWall| {
-        let StoredWall { ends: [ax, ay, bx, by], covariance } = *wall;
-        WallBody { a: [ax, ay], b: [bx, by], covariance }
-    };
-    let walls = mappings.held(&map).map(|walls| walls.iter().map(|held| wall(&held.into())).collect());
+    let walls = mappings.held(&map).map(|walls| walls.iter().map(|held| shown_wall(held.into())).collect());
     Ok(Json(MappingProgressBody { walls, ..progress }))
 }
 

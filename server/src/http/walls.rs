@@ -30,7 +30,7 @@ fn checked(index: usize, WallBody { a, b, covariance }: &WallBody) -> Result<Sto
     wall.segment().map(|_| wall).map_err(|e| out_of_range(&e, &format!("segments[{index}]")))
 }
 
-fn shown(StoredWall { ends: [ax, ay, bx, by], covariance }: StoredWall) -> WallBody {
+pub(super) fn shown(StoredWall { ends: [ax, ay, bx, by], covariance }: StoredWall) -> WallBody {
     WallBody { a: [ax, ay], b: [bx, by], covariance }
 }
 

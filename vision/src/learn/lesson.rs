@@ -110,7 +110,6 @@ pub fn learn(
         status: ModelStatus::Candidate(vec![]),
         waived: vec![],
         points: vec![],
-        knows_points: false,
         exemplars,
     };
     Ok(refit_thresholds(&model, negatives, p))

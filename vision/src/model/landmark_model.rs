@@ -105,11 +105,8 @@ pub struct LandmarkModel {
     pub status: ModelStatus,
     /// Gates that it does not pass and that do not keep it out of use.
     pub waived: Vec<GateFailure>,
-    /// Points of up to three photographed views (`points/`). Empty where none were given: see
-    /// [`LandmarkModel::knows_points`].
+    /// Points of up to three photographed views (`points/`). Empty where none were given.
     pub points: Vec<TaughtPoint>,
-    /// Whether points were extracted, even if none were found.
-    pub knows_points: bool,
 }
 
 impl LandmarkModel {
@@ -118,7 +115,6 @@ impl LandmarkModel {
     #[must_use]
     pub fn with_points(mut self, views: &[Vec<TaughtPoint>]) -> Self {
         self.points = landmark_points(views);
-        self.knows_points = true;
         self
     }
 

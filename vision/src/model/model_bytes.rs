@@ -24,7 +24,7 @@ const MAX_BYTES: usize = MAX_EXEMPLARS * MAX_ICON_SIZE * MAX_ICON_SIZE
     + Components::MAX_BYTES
     + 8 * 1024;
 const MAGIC: [u8; 4] = *b"WMLM";
-const VERSION: u16 = 4;
+const VERSION: u16 = 5;
 const DIGEST_BYTES: usize = 8;
 /// Where the landmark's number is, in every format: after the magic, the version and the hash of
 /// the parameters.
@@ -91,7 +91,6 @@ impl LandmarkModel {
             out.extend(exemplar.source_scale().to_le_bytes());
             out.extend(exemplar.pixels());
         }
-        out.push(u8::from(self.knows_points));
         out.extend((self.points.len() as u16).to_le_bytes());
         self.points.iter().for_each(|p| p.write(&mut out));
         self.components.write(&mut out);
@@ -122,7 +121,7 @@ impl LandmarkModel {
         }
         let mut model = reader.model(expected, p)?;
         model.components = components;
-        (model.knows_points, model.points) = reader.points()?;
+        model.points = reader.points()?;
         if !reader.rest.is_empty() {
             return Err(StoredModelError::Malformed { field: "length" });
         }
@@ -217,18 +216,15 @@ impl Reader<'_> {
             status: ModelStatus::Candidate(vec![]),
             waived: vec![],
             points: vec![],
-            knows_points: false,
         })
     }
 
-    fn points(&mut self) -> Result<(bool, Vec<TaughtPoint>), StoredModelError> {
-        let known = self.byte("points", 1)? == 1;
+    fn points(&mut self) -> Result<Vec<TaughtPoint>, StoredModelError> {
         let count = usize::from(u16::from_le_bytes(self.take("points")?));
-        if count > MAX_LANDMARK_POINTS || (count > 0 && !known) {
+        if count > MAX_LANDMARK_POINTS {
             return Err(StoredModelError::Malformed { field: "points" });
         }
-        let points = (0..count).map(|_| self.take("points").map(|b| TaughtPoint::read(&b)));
-        Ok((known, points.collect::<Result<_, _>>()?))
+        (0..count).map(|_| self.take("points").map(|b| TaughtPoint::read(&b))).collect()
     }
 
     fn evidence(&mut self) -> Result<DistanceSamples, StoredModelError> {
