@@ -1,8 +1,11 @@
 //! The place of a landmark: a rectangle on a wall or under a ceiling, with the covariance of its
 //! pose and size (method 11).
 
-use crate::check::{self, MAX_COORDINATE_M, OutOfRange};
-use nalgebra::{Isometry3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3, Vector6};
+use crate::{
+    check::{self, MAX_COORDINATE_M, OutOfRange},
+    pose2::{Pose2, wrap_rad},
+};
+use nalgebra::{Isometry3, Matrix2, Matrix6, Point2, Point3, Translation3, UnitQuaternion, Vector3, Vector6};
 use std::f64::consts::{FRAC_PI_2, TAU};
 use vision::pose::LandmarkSize;
 
@@ -85,6 +88,22 @@ impl LandmarkPlace {
         check::covariance("covariance", &self.covariance)
     }
 
+    /// The place in another frame of the floor, whose relation to this one is exact.
+    #[must_use]
+    pub fn moved(&self, there_from_here: &Pose2) -> Self {
+        let at = there_from_here.apply(&Point2::new(self.x_m, self.y_m));
+        let (s, c) = there_from_here.theta_rad.sin_cos();
+        let mut turn = Matrix6::identity();
+        turn.fixed_view_mut::<2, 2>(0, 0).copy_from(&Matrix2::new(c, -s, s, c));
+        Self {
+            x_m: at.x,
+            y_m: at.y,
+            theta_rad: wrap_rad(self.theta_rad + there_from_here.theta_rad),
+            covariance: turn * self.covariance * turn.transpose(),
+            ..*self
+        }
+    }
+
     /// Angle between the outward normal and the direction from the landmark's centre to a camera,
     /// radians.
     pub fn incidence_rad(&self, camera_m: &Point3<f64>) -> f64 {
@@ -118,6 +137,23 @@ mod tests {
         assert!((right - Point3::new(2.3, 5.0, 1.92)).norm() < 1e-12);
         let front = place.map_from_landmark() * Point3::new(1.0, 0.0, 0.0);
         assert!((front - Point3::new(2.0, 4.0, 1.5)).norm() < 1e-12);
+    }
+
+    #[test]
+    fn a_moved_place_by_hand() {
+        let mut place =
+            LandmarkPlace::by_hand(Vector3::new(2.0, 5.0, 1.5), 3.0, SIZE, PlaceSigmas::default()).unwrap();
+        (place.covariance[(0, 0)], place.covariance[(1, 1)]) = (0.04, 0.01);
+        let moved = place.moved(&Pose2::new(1.0, 0.0, std::f64::consts::FRAC_PI_2));
+        let wanted = Vector3::new(-4.0, 2.0, 1.5);
+        assert!((moved.map_from_landmark().translation.vector - wanted).norm() < 1e-12, "{moved:?}");
+        assert!(
+            (moved.theta_rad - (3.0 + std::f64::consts::FRAC_PI_2 - std::f64::consts::TAU)).abs() < 1e-12
+        );
+        assert!(
+            (moved.covariance[(0, 0)] - 0.01).abs() < 1e-12
+                && (moved.covariance[(1, 1)] - 0.04).abs() < 1e-12
+        );
     }
 
     #[test]

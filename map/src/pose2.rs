@@ -151,6 +151,23 @@ impl Pose2Covariance {
     }
 }
 
+/// The motion that lays points best on the same points of another frame: `there_from_here` by least
+/// squares; the identity for none.
+pub fn laid_on(here: &[Point2<f64>], there: &[Point2<f64>]) -> Pose2 {
+    let mean = |points: &[Point2<f64>]| {
+        points.iter().map(|p| p.coords).sum::<Vector2<f64>>() / points.len().max(1) as f64
+    };
+    let (from, to) = (mean(here), mean(there));
+    let (mut dot, mut perp) = (0.0, 0.0);
+    for (a, b) in here.iter().zip(there) {
+        let (a, b) = (a.coords - from, b.coords - to);
+        (dot, perp) = (dot + a.dot(&b), perp + a.perp(&b));
+    }
+    let turn = Pose2::new(0.0, 0.0, perp.atan2(dot));
+    let shift = to - turn.apply(&from.into()).coords;
+    Pose2::new(shift.x, shift.y, turn.theta_rad)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -222,5 +239,19 @@ mod tests {
         assert!((at(0.0).distance2(&at(3.0)).unwrap() - 9.0).abs() < 1e-12);
         let sure = Pose2Covariance { pose: Pose2::default(), covariance: Matrix3::zeros() };
         assert_eq!(sure.distance2(&sure), None);
+    }
+
+    #[test]
+    fn a_moved_map_is_laid_back() {
+        let there = [[0.0, 0.0], [4.0, 1.0], [3.0, -2.0]].map(Point2::from);
+        let truth = Pose2::new(2.0, -1.0, 2.5);
+        let here = there.map(|p| truth.inverse().apply(&p));
+        assert!(laid_on(&here, &there).minus(&truth).norm() < 1e-12);
+        // A point that is off by 3 draws the others by a third of it.
+        let mut off = there;
+        off[0].y += 3.0;
+        let to_mean = laid_on(&there, &off).apply(&Point2::new(7.0 / 3.0, -1.0 / 3.0));
+        assert!((to_mean - Point2::new(7.0 / 3.0, 2.0 / 3.0)).norm() < 1e-12);
+        assert_eq!(laid_on(&[], &[]), Pose2::default());
     }
 }

@@ -1,7 +1,6 @@
 //! `waymark-lab evaluate`: the paper's experiments on labelled pictures. Tables for people, one
 //! JSON object for programs.
 
-pub(crate) mod alignment;
 pub(crate) mod chart;
 pub(crate) mod experiment;
 pub(crate) mod grids;

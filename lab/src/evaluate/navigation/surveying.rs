@@ -2,14 +2,11 @@
 //! `waymark survey` takes it. In: the building. Out: walls, and the landmarks that passed its
 //! gates, laid on the building by the whole drive, as a person lays a map on a floor plan.
 
-use crate::evaluate::{
-    alignment::{laid_on, moved},
-    survey::truth_at,
-};
+use crate::evaluate::survey::truth_at;
 use cli::survey::{SimulatedDrive, simulated_drive, surveyed};
 use engine::survey::{ObjectView, SurveyedObject, picture};
-use map::{place::LandmarkPlace, pose2::Pose2Covariance, segments::LaserSegment};
-use nalgebra::{Matrix3, Point2};
+use map::{place::LandmarkPlace, segments::LaserSegment};
+use nalgebra::Point2;
 use sim::{building::Building, drive::DriveParams};
 use std::{collections::BTreeMap, sync::Arc};
 use vision::{frame::GrayImage, geometry::Corners, params::Params};
@@ -32,14 +29,11 @@ pub(super) fn survey(building: &Arc<Building>, photographs: usize, seed: u64) ->
         truth.push(Point2::from(readings.step.map_from_robot.position()));
     })?;
     log.origin = None;
-    let found = surveyed(&log, &Params::default())?;
-    let path: Vec<Point2<f64>> = found.frames.iter().map(|f| f.pose.position().into()).collect();
-    let laid = laid_on(&path, &truth);
+    let found = surveyed(&log, &Params::default())?.laid_on_path(&truth);
     let mut named: BTreeMap<String, Photographed> = BTreeMap::new();
     let accepted = found.objects.iter().filter(|object| object.refused.is_none());
     for (number, SurveyedObject { place, views, .. }) in accepted.enumerate() {
-        let place = moved(place, &laid);
-        let truth = truth_at(building, &place);
+        let truth = truth_at(building, place);
         let name = truth.map_or_else(|| format!("other-{number}"), |truth| truth.name.clone());
         let every = views.len().div_ceil(photographs).max(1);
         let photograph = |view: &ObjectView| {
@@ -47,8 +41,7 @@ pub(super) fn survey(building: &Arc<Building>, photographs: usize, seed: u64) ->
             Some((seen.grey().clone(), view.corners_px))
         };
         let pictures = views.iter().step_by(every).filter_map(photograph).collect();
-        named.insert(name.clone(), Photographed { name, place, pictures });
+        named.insert(name.clone(), Photographed { name, place: *place, pictures });
     }
-    let by = Pose2Covariance { pose: laid, covariance: Matrix3::zeros() };
-    Ok((found.walls.iter().map(|wall| wall.transformed(&by)).collect(), named.into_values().collect()))
+    Ok((found.walls, named.into_values().collect()))
 }

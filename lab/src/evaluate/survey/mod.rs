@@ -4,7 +4,6 @@
 mod drive;
 
 use super::{
-    alignment::{laid_on, moved},
     experiment::{of_each, say},
     statistics::quantile,
 };
@@ -14,7 +13,7 @@ use engine::survey::{ObjectView, SurveyedBuilding, SurveyedObject};
 use map::{
     place::LandmarkPlace,
     placement::{PlacementParams, PosedView, placement, view_on_wall},
-    pose2::{Pose2, Pose2Covariance},
+    pose2::{Pose2, Pose2Covariance, laid_on},
 };
 use nalgebra::{Matrix3, Point2, Vector2, Vector3};
 use serde::Serialize;
@@ -167,7 +166,7 @@ fn figures(driven: &Driven, building: &SurveyedBuilding) -> Figures {
     let by_drive = laid_on(&found, &path);
     let by_first = driven.path.first().copied().unwrap_or_default();
     for object in building.objects.iter().filter(|object| object.refused.is_none()) {
-        let at_first = moved(&object.place, &by_first);
+        let at_first = object.place.moved(&by_first);
         let Some(truth) = truth_at(&driven.building, &at_first) else {
             made.strangers += 1;
             continue;
@@ -179,14 +178,14 @@ fn figures(driven: &Driven, building: &SurveyedBuilding) -> Figures {
         let at = floor(truth);
         let here = Vector2::new(at_first.x_m, at_first.y_m);
         made.joint_m.push((here - at).norm());
-        let place = moved(&object.place, &by_drive);
+        let place = object.place.moved(&by_drive);
         let covariance = place.covariance.fixed_view::<2, 2>(0, 0).into_owned();
         let d = Vector2::new(place.x_m, place.y_m) - at;
         made.nees.extend(covariance.cholesky().map(|c| d.dot(&c.solve(&d)) / 2.0));
         made.size_percent.extend(size_errors(&object.place, &driven.borders(truth)));
         joint.push((here, at));
         if let Some(place) = two_steps(driven, building, object) {
-            let place = moved(&place, &by_first);
+            let place = place.moved(&by_first);
             let here = Vector2::new(place.x_m, place.y_m);
             made.two_steps_m.push((here - at).norm());
             made.two_steps_size_percent.extend(size_errors(&place, &driven.borders(truth)));
@@ -220,7 +219,7 @@ pub(super) fn truth_at<'a>(building: &'a Building, place: &LandmarkPlace) -> Opt
 fn why_lost(driven: &Driven, building: &SurveyedBuilding, name: &str) -> String {
     let by_first = driven.path.first().copied().unwrap_or_default();
     let of_it = |object: &&SurveyedObject| {
-        truth_at(&driven.building, &moved(&object.place, &by_first)).is_some_and(|t| t.name == name)
+        truth_at(&driven.building, &object.place.moved(&by_first)).is_some_and(|t| t.name == name)
     };
     let refused: Vec<&str> =
         building.objects.iter().filter(of_it).filter_map(|object| object.refused.as_deref()).collect();
