@@ -22,7 +22,11 @@ const OPTIONS: [(&str, &[&str], &[&str]); 68] = [
         &["--robots", "--rate-hz", "--legs", "--seed", "--survey", "--http", "--data", "--stay", "--json"],
     ),
     ("sample", &[], &["<FOLDER>"]),
-    ("serve", &[], &["--config", "--data", "--http", "--zenoh", "--fleet", "--workers", "--insecure"]),
+    (
+        "serve",
+        &[],
+        &["--config", "--data", "--store", "--http", "--zenoh", "--fleet", "--workers", "--insecure"],
+    ),
     (
         "detect",
         &[],

@@ -70,6 +70,8 @@ pub(crate) struct Backups {
     data: PathBuf,
     folder: PathBuf,
     settings: BackupSettings,
+    /// The database is PostgreSQL, whose own programs copy it.
+    is_of_postgres: bool,
     panics: Arc<Panics>,
     events: Arc<EventLog>,
     disk: Arc<DiskGuard>,
@@ -90,6 +92,7 @@ impl Backups {
             data: config.data.clone(),
             folder,
             settings: config.backup,
+            is_of_postgres: config.store.is_some(),
             panics,
             events,
             disk,
@@ -104,7 +107,7 @@ impl Backups {
     }
 
     async fn keep_timetable(self: Arc<Self>, mut stopping: watch::Receiver<bool>) {
-        let Some(every) = timetable::every(self.settings) else { return };
+        let Some(every) = timetable::every(self.settings).filter(|_| !self.is_of_postgres) else { return };
         loop {
             let wait = {
                 let state = self.state();
@@ -123,8 +126,11 @@ impl Backups {
         }
     }
 
-    /// Begins a backup. Errors: `InUse` while another one is being made.
+    /// Begins a backup. Errors: `InUse` while another one is being made; `CopiedByPostgres`.
     pub(crate) fn begin(self: &Arc<Self>) -> Result<(Backup, JoinHandle<()>), StoreError> {
+        if self.is_of_postgres {
+            return Err(StoreError::CopiedByPostgres);
+        }
         let created_ms = now_ms();
         let name = {
             let mut state = self.state();
@@ -265,7 +271,8 @@ impl Backups {
         let state = self.state();
         let (newest, newest_ms) = state.newest.clone().unzip();
         let failed = state.failed.as_ref().map(|(.., reason)| reason.clone());
-        BackupHealth { every_hours: self.settings.every_hours, newest, newest_ms, failed }
+        let every_hours = if self.is_of_postgres { 0 } else { self.settings.every_hours };
+        BackupHealth { every_hours, newest, newest_ms, failed }
     }
 }
 

@@ -15,6 +15,7 @@ mod readiness;
 mod revision;
 mod refused_views;
 mod stored_answers;
+mod stores;
 mod teaching;
 mod topology;
 mod uploads;
@@ -23,7 +24,7 @@ use super::*;
 use crate::{
     config::{Limits, RawConfig, RawTls},
     identity::{Secret, TokenText, certificates::Certificates},
-    publication::CatalogueTasks,
+    publication::{CatalogueTasks, tests::raw_config},
     store::{StoreError, maps},
 };
 use axum::{
@@ -59,7 +60,7 @@ impl Service {
 
     /// On the database of this directory.
     async fn on(data: tempfile::TempDir, limits: Limits) -> Self {
-        let raw = RawConfig { limits, data: data.path().to_owned(), ..RawConfig::default() };
+        let raw = RawConfig { limits, ..raw_config(data.path()) };
         let config = Arc::new(crate::config::Config::try_from(raw).unwrap());
         let (store, writer) = Catalogue::open(&config).await.unwrap();
         let (stop, stopping) = watch::channel(false);

@@ -8,7 +8,9 @@
 pub(crate) mod db;
 mod error;
 pub(crate) mod kind;
+mod postgres;
 pub(crate) mod sqlite;
+mod transactions;
 mod derived_schema;
 mod writer;
 mod statements;
@@ -50,6 +52,7 @@ pub(crate) mod drafts;
 
 pub(crate) use error::StoreError;
 pub(crate) use on_commit::{CommittedChange, OnCommit};
+pub(crate) use postgres::open::OpenError as PostgresError;
 pub(crate) use sqlite::{
     copies, disk_guard, integrity,
     open::{self, OpenError},
@@ -73,6 +76,7 @@ use std::{
     time::{Duration, Instant, SystemTime},
 };
 use tokio::sync::{Mutex, MutexGuard, Notify, mpsc, oneshot};
+use transactions::Transactions;
 
 /// The open store. Cheap to clone.
 #[derive(Debug, Clone)]
@@ -144,7 +148,19 @@ impl Store {
         on_commit: Arc<dyn OnCommit>,
         vitals: Arc<Vitals>,
     ) -> Result<(Self, WriterTask), OpenError> {
-        let opened = open::open(&config.data, config.sqlite_vfs()).await?;
+        let (opened, transactions) = match &config.store {
+            None => (open::open(&config.data, config.sqlite_vfs()).await?, Transactions::Sqlite),
+            Some(address) => {
+                let lock = open::lock(&config.data)?;
+                let holder = transactions::random().map_err(OpenError::Open)?;
+                let (mut writer, reads) = postgres::open::open(address.secret(), &holder).await?;
+                history::close_outside(&mut writer).await.map_err(OpenError::Open)?;
+                tracing::info!(store = %address, "store_opened");
+                let transactions =
+                    transactions::Postgres { address: address.secret().to_owned(), holder, turn: None };
+                (open::Opened { writer, reads, lock }, Transactions::Postgres(transactions))
+            }
+        };
         let disk = Arc::new(DiskGuard::new(&config.data, &config.limits));
         let jobs = Arc::new(Notify::new());
         let mut conn = opened.writer;
@@ -158,7 +174,7 @@ impl Store {
         let commits = Arc::<AtomicU64>::default();
         let parts = (on_commit, vitals.clone(), jobs.clone(), commits.clone());
         let heart = vitals.hearts().begin(WRITER);
-        let with = (heart.clone(), config.log_pages().unwrap_or(sqlite::checkpoint::LOG_PAGES));
+        let with = (heart.clone(), config.log_pages().unwrap_or(sqlite::checkpoint::LOG_PAGES), transactions);
         let writer = writer::Writer::new(conn, received, history, parts, with);
         let (close, closed) = oneshot::channel();
         let task = tokio::spawn(writer.run(closed, vitals.begin(WRITER)));
@@ -182,6 +198,12 @@ impl Store {
             last_check: integrity::LastCheck::default(),
         };
         Ok((store, task))
+    }
+
+    /// Whether it is the file in the data directory, which is checked and copied here. PostgreSQL
+    /// does both itself.
+    pub(crate) fn has_file(&self) -> bool {
+        matches!(self.reads, Pool::Sqlite(_))
     }
 
     /// The check of the whole database after this start.
@@ -301,4 +323,4 @@ mod io_errors;
 #[cfg(test)]
 mod power_cuts;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
