@@ -70,8 +70,8 @@ pub(super) struct Serve {
     /// ~/.local/share/waymark on Linux].
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
-    /// A database of PostgreSQL that maps are stored in, postgres://USER@HOST/NAME [default: SQLite in
-    /// the data directory].
+    /// A database of PostgreSQL that maps are stored in, `postgres://USER@HOST/NAME` [default:
+    /// SQLite in the data directory].
     #[arg(long, value_name = "URL")]
     store: Option<String>,
     /// Where HTTP listens; port 0 takes a free one [default: 127.0.0.1:8080].

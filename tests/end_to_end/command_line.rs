@@ -78,7 +78,7 @@ const OPTIONS: [(&str, &[&str], &[&str]); 68] = [
     ("logout", SERVER, &[]),
     ("open", SERVER, &[]),
     ("backup", SERVER, &["[FILE]"]),
-    ("restore", &[], &["<FILE>", "--data", "--dry-run", "--yes", "--json"]),
+    ("restore", &[], &["<FILE>", "--data", "--store", "--dry-run", "--yes", "--json"]),
     ("map create", SERVER, &["--preset", "--distance", "--site", "--building", "--floor", "<MAP>"]),
     ("map pipeline", SERVER, &["--preset", "--distance", "<MAP>"]),
     ("map list", SERVER, &[]),

@@ -3,8 +3,8 @@
 use std::{collections::BTreeSet, fs, path::Path};
 use tests::documents::root;
 
-/// Names of all tests: functions after an attribute that ends in `test]` or `test(...)]`, those that
-/// run on each store, and those of Python.
+/// Names of all tests: functions after an attribute that ends in `test]` or `test(...)]`, those
+/// that run on each store, and those of Python.
 fn tests_in(folder: &Path, found: &mut BTreeSet<String>) {
     for entry in fs::read_dir(folder).expect("a folder") {
         let path = entry.expect("an entry").path();

@@ -9,7 +9,7 @@ pub struct PostgresAddress(String);
 
 impl PostgresAddress {
     /// Of the setting `store`; `None` if it is empty.
-    pub(super) fn checked(text: String) -> Result<Option<Self>, ConfigError> {
+    pub fn checked(text: String) -> Result<Option<Self>, ConfigError> {
         match text.split_once("://") {
             None if text.is_empty() => Ok(None),
             Some(("postgres" | "postgresql", _)) => Ok(Some(Self(text))),

@@ -31,7 +31,7 @@ pub(super) fn router() -> OpenApiRouter<AppState> {
 /// meanwhile. The oldest backups beyond `backup.keep` are removed when it is complete.
 #[utoipa::path(post, path = "/backups", operation_id = "createBackup",
     tag = "backups", responses((status = 202, body = Backup),
-    (status = 409, body = Problem, description = "in_use: another one is being made; backups_by_postgresql: pg_dump makes them")))]
+    (status = 409, body = Problem, description = "in_use: another one is being made")))]
 async fn create(State(app): State<AppState>) -> Result<(StatusCode, Json<Backup>), ApiError> {
     // It goes on without the request.
     let (backup, _task) = app.backups.begin()?;

@@ -156,7 +156,6 @@ impl From<StoreError> for ApiError {
                     .with("stored", size(stored))
                     .with("given", size(given))
             }
-            StoreError::CopiedByPostgres => Self::new(StatusCode::CONFLICT, "backups_by_postgresql", detail),
             StoreError::InUse(_) => Self::new(StatusCode::CONFLICT, "in_use", detail),
             StoreError::ChangedSince { by, .. } => {
                 Self::new(StatusCode::CONFLICT, "changed_since", detail).field("commit").with("by", json!(by))

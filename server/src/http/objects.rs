@@ -1,5 +1,5 @@
-//! Objects alone where a field is known by its name, and text that every store takes. In: any reader
-//! of serde. Out: the same, but for structs from lists and for U+0000.
+//! Objects alone where a field is known by its name, and text that every store takes. In: any
+//! reader of serde. Out: the same, but for structs from lists and for U+0000.
 //!
 //! serde's derive takes a list of values in the order of the fields for a struct. No schema of this
 //! interface says so, the order is no promise, and a body that is taken by accident is a change
@@ -274,6 +274,8 @@ mod tests {
             let wanted = format!("{path}: invalid type: sequence, expected an object with fields by name");
             assert!(refused.starts_with(&wanted), "{refused}");
         }
+        let refused = read(&WHOLE.replace(r#""a""#, r#""a\u0000""#)).unwrap_err();
+        assert!(refused.contains("a text has no U+0000"), "{refused}");
         let refused = read("[[1, 2], [], {}, null, []]").unwrap_err();
         assert!(refused.starts_with(".: invalid type: sequence"), "{refused}");
     }

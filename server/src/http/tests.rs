@@ -67,7 +67,8 @@ impl Service {
         let (jobs, _) = Jobs::start(store.clone(), config.clone(), stopping.clone()).await.unwrap();
         let (tap, frames) = crate::gather::gathering_tap();
         let (gatherer, _) = Gatherer::start(store.clone(), &config, &tap, frames).await.unwrap();
-        let told = (store.vitals().panics().clone(), store.events().clone(), store.disk().clone());
+        let told =
+            (store.vitals().panics().clone(), store.events().clone(), store.disk().clone(), store.database());
         let (backups, _) = crate::backup::Backups::start(&config, told, stopping.clone());
         let hall = Arc::new(MapSnapshot::empty("hall", 1));
         let (mut engine, observers) = scene::engine(&[hall]);

@@ -52,11 +52,6 @@ pub(crate) enum StoreError {
         /// Why.
         source: Box<StoreError>,
     },
-    /// A copy of the whole store was asked for, which is in PostgreSQL.
-    #[error(
-        "the store is in PostgreSQL, which makes its own backups: pg_dump --format=custom --file=FILE ADDRESS"
-    )]
-    CopiedByPostgres,
     /// Something else rests on it.
     #[error("{0}")]
     InUse(String),

@@ -52,7 +52,10 @@ pub(crate) mod drafts;
 
 pub(crate) use error::StoreError;
 pub(crate) use on_commit::{CommittedChange, OnCommit};
-pub(crate) use postgres::open::OpenError as PostgresError;
+pub(crate) use postgres::{
+    copies::{bytes as database_bytes, copy as copy_database, restore as restore_database},
+    open::OpenError as PostgresError,
+};
 pub(crate) use sqlite::{
     copies, disk_guard, integrity,
     open::{self, OpenError},
@@ -148,19 +151,7 @@ impl Store {
         on_commit: Arc<dyn OnCommit>,
         vitals: Arc<Vitals>,
     ) -> Result<(Self, WriterTask), OpenError> {
-        let (opened, transactions) = match &config.store {
-            None => (open::open(&config.data, config.sqlite_vfs()).await?, Transactions::Sqlite),
-            Some(address) => {
-                let lock = open::lock(&config.data)?;
-                let holder = transactions::random().map_err(OpenError::Open)?;
-                let (mut writer, reads) = postgres::open::open(address.secret(), &holder).await?;
-                history::close_outside(&mut writer).await.map_err(OpenError::Open)?;
-                tracing::info!(store = %address, "store_opened");
-                let transactions =
-                    transactions::Postgres { address: address.secret().to_owned(), holder, turn: None };
-                (open::Opened { writer, reads, lock }, Transactions::Postgres(transactions))
-            }
-        };
+        let (opened, transactions) = Box::pin(opened(config)).await?;
         let disk = Arc::new(DiskGuard::new(&config.data, &config.limits));
         let jobs = Arc::new(Notify::new());
         let mut conn = opened.writer;
@@ -200,10 +191,9 @@ impl Store {
         Ok((store, task))
     }
 
-    /// Whether it is the file in the data directory, which is checked and copied here. PostgreSQL
-    /// does both itself.
-    pub(crate) fn has_file(&self) -> bool {
-        matches!(self.reads, Pool::Sqlite(_))
+    /// The database, if it is not the file in the data directory.
+    pub(crate) fn database(&self) -> Option<Pool> {
+        Some(self.reads.clone()).filter(|reads| matches!(reads, Pool::Postgres(_)))
     }
 
     /// The check of the whole database after this start.
@@ -285,6 +275,20 @@ impl Store {
     pub(crate) fn vitals(&self) -> &Arc<Vitals> {
         &self.vitals
     }
+}
+
+/// The database of the settings, on the present schema, and how it is written.
+async fn opened(config: &Config) -> Result<(open::Opened, Transactions), OpenError> {
+    let Some(address) = &config.store else {
+        return Ok((open::open(&config.data, config.sqlite_vfs()).await?, Transactions::Sqlite));
+    };
+    let lock = open::lock(&config.data)?;
+    let holder = transactions::random().map_err(OpenError::Open)?;
+    let (mut writer, reads) = postgres::open::open(address.secret(), &holder).await?;
+    history::close_outside(&mut writer).await.map_err(OpenError::Open)?;
+    tracing::info!(store = %address, "store_opened");
+    let transactions = transactions::Postgres { address: address.secret().to_owned(), holder, turn: None };
+    Ok((open::Opened { writer, reads, lock }, Transactions::Postgres(transactions)))
 }
 
 /// Writes the newest place of the audit log to the server's own log: a note outside of the

@@ -70,8 +70,8 @@ impl Transactions {
         })
     }
 
-    /// Commits it. Errors: it was not done. Where the answer is lost, this returns once it is known:
-    /// until then nothing else is written.
+    /// Commits it. Errors: it was not done. Where the answer is lost, this returns once it is
+    /// known: until then nothing else is written.
     pub(super) async fn commit(&mut self, conn: &mut Conn) -> Result<(), StoreError> {
         let at = || StoreError::during("commit");
         let Self::Postgres(Postgres { address, holder, turn }) = self else {

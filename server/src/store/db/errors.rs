@@ -32,8 +32,8 @@ pub(crate) enum ErrorClass {
 /// answer by then has lost it.
 pub(super) const ANSWER_TIMEOUT: Duration = Duration::from_secs(12);
 
-/// A connection to PostgreSQL that was lost. Its errors of reading and writing have a class of their
-/// own: those of a file end the process.
+/// A connection to PostgreSQL that was lost. Its errors of reading and writing have a class of
+/// their own: those of a file end the process.
 #[derive(Debug, thiserror::Error)]
 #[error("the connection to the store was lost: {0}")]
 struct ConnectionLost(Error);
@@ -48,8 +48,8 @@ pub(super) fn of_postgres(error: Error) -> Error {
     }
 }
 
-/// The answer of PostgreSQL. Errors: also that there is none. It is boxed, so that futures of SQLite
-/// do not have its size.
+/// The answer of PostgreSQL. Errors: also that there is none. It is boxed, so that futures of
+/// SQLite do not have its size.
 pub(super) fn answered<'a, T>(
     work: impl Future<Output = Result<T, Error>> + Send + 'a,
 ) -> BoxFuture<'a, Result<T, Error>> {

@@ -75,8 +75,8 @@ impl Conn {
         matches!(self, Self::Postgres(..))
     }
 
-    /// How many rows were changed on it since it was opened. Reads it from SQLite; of PostgreSQL
-    /// it is what the statements said.
+    /// How many rows were changed on it since it was opened. Reads it from SQLite; of PostgreSQL it
+    /// is what the statements said.
     pub(crate) async fn total_changes(&mut self) -> Result<i64, Error> {
         match self {
             Self::Sqlite(conn) => sqlx::query_scalar("SELECT total_changes()").fetch_one(conn.conn()).await,

@@ -9,9 +9,9 @@ use crate::store::{
 };
 use sqlx::{
     ConnectOptions as _,
-    postgres::{PgConnectOptions, PgPoolOptions},
+    postgres::{PgConnectOptions, PgPoolOptions, PgSslMode},
 };
-use std::{str::FromStr as _, time::Duration};
+use std::{net::IpAddr, str::FromStr as _, time::Duration};
 use tokio::time::{sleep, timeout};
 
 /// First version that is taken: 14.
@@ -50,11 +50,14 @@ const SETTINGS: [(&str, &str); 4] = [
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum OpenError {
     /// The address is none.
-    #[error("setting `store` is not the address of a database")]
-    Address(#[source] db::Error),
+    #[error("setting `store` is not the address of a database: {0}")]
+    Address(db::Error),
+    /// What is stored would be in plain text on a network.
+    #[error("setting `store` has sslmode=disable, which is for a database on this machine alone")]
+    PlainText,
     /// It cannot be reached, or refuses.
-    #[error("the store cannot be reached")]
-    Unreachable(#[source] db::Error),
+    #[error("the store cannot be reached: {0}")]
+    Unreachable(db::Error),
     /// It is too old.
     #[error("PostgreSQL {0} is too old: 14 or newer is needed")]
     Version(String),
@@ -79,17 +82,37 @@ pub(crate) enum OpenError {
     /// A server is connected to it.
     #[error("the store is in use by another server: one server uses a store at a time")]
     InUse,
+    /// A backup would be mixed with what is there.
+    #[error("the database has a store already: restore into an empty one")]
+    NotEmpty,
     /// Its schema cannot be read.
     #[error("the store does not open")]
     Read(#[source] StoreError),
     /// Anything else at opening.
-    #[error("the store does not open")]
-    Open(#[source] db::Error),
+    #[error("the store does not open: {0}")]
+    Open(db::Error),
 }
 
-/// How its connections are made.
-fn options(address: &str) -> Result<PgConnectOptions, OpenError> {
-    let options = PgConnectOptions::from_str(address).map_err(OpenError::Address)?;
+/// Whether the way to it leaves this machine.
+fn is_beyond_loopback(options: &PgConnectOptions) -> bool {
+    let host = options.get_host().trim_matches(['[', ']']);
+    // A folder has a socket.
+    let is_here = host.starts_with('/')
+        || host == "localhost"
+        || host.parse::<IpAddr>().is_ok_and(|address| address.is_loopback());
+    !is_here && options.get_socket().is_none()
+}
+
+/// How its connections are made: encrypted beyond loopback.
+pub(in crate::store) fn options(address: &str) -> Result<PgConnectOptions, OpenError> {
+    let mut options = PgConnectOptions::from_str(address).map_err(OpenError::Address)?;
+    if is_beyond_loopback(&options) {
+        match options.get_ssl_mode() {
+            PgSslMode::Disable => return Err(OpenError::PlainText),
+            PgSslMode::Allow | PgSslMode::Prefer => options = options.ssl_mode(PgSslMode::Require),
+            PgSslMode::Require | PgSslMode::VerifyCa | PgSslMode::VerifyFull => {}
+        }
+    }
     let options = options.statement_cache_capacity(PREPARED).application_name(PROGRAM).options(OPTIONS);
     Ok(options.disable_statement_logging())
 }
@@ -115,7 +138,7 @@ pub(in crate::store) async fn open(address: &str, holder: &[u8]) -> Result<(Conn
 }
 
 /// Errors: another server is connected, which would not see what this one writes.
-async fn check_alone(conn: &mut Conn) -> Result<(), OpenError> {
+pub(super) async fn check_alone(conn: &mut Conn) -> Result<(), OpenError> {
     let others = "SELECT count(*) FROM pg_catalog.pg_stat_activity WHERE datname = current_database() \
                   AND application_name = $1 AND pid <> pg_backend_pid()";
     let all_left = async {
@@ -127,7 +150,7 @@ async fn check_alone(conn: &mut Conn) -> Result<(), OpenError> {
     timeout(LEAVE_TIMEOUT, all_left).await.map_or(Err(OpenError::InUse), |left| left.map_err(OpenError::Open))
 }
 
-async fn check_settings(conn: &mut Conn) -> Result<(), OpenError> {
+pub(super) async fn check_settings(conn: &mut Conn) -> Result<(), OpenError> {
     let setting = async |conn: &mut Conn, name: &'static str| -> Result<String, OpenError> {
         let value = db::query_scalar("SELECT current_setting($1)").bind(name).fetch_one(conn).await;
         value.map_err(OpenError::Open)
@@ -147,11 +170,15 @@ async fn check_settings(conn: &mut Conn) -> Result<(), OpenError> {
     Ok(())
 }
 
+/// Whether a store was made in it.
+pub(super) async fn has_tables(conn: &mut Conn) -> Result<bool, OpenError> {
+    let there = "SELECT count(*) > 0 FROM pg_catalog.pg_tables WHERE schemaname = current_schema() AND tablename = 'turn'";
+    db::query_scalar(there).fetch_one(conn).await.map_err(OpenError::Open)
+}
+
 /// Makes the tables in one transaction, unless they are there. Errors: they are of another schema.
 async fn make_schema(conn: &mut Conn) -> Result<(), OpenError> {
-    let there = "SELECT count(*) FROM pg_catalog.pg_tables WHERE schemaname = current_schema() AND tablename = 'turn'";
-    let there: i64 = db::query_scalar(there).fetch_one(&mut *conn).await.map_err(OpenError::Open)?;
-    if there == 0 {
+    if !has_tables(conn).await? {
         let made = made().await.map_err(OpenError::Open)?;
         for sql in ["BEGIN".to_owned()].into_iter().chain(made).chain(["COMMIT".to_owned()]) {
             db::raw_sql(db::AssertSqlSafe(sql)).execute(&mut *conn).await.map_err(OpenError::Open)?;

@@ -98,5 +98,5 @@ const OWN_TABLES: &str = "\
     CREATE TABLE _sqlx_migrations (version BIGINT NOT NULL, success BOOLEAN NOT NULL)";
 
 /// The rows that a new database has.
-const FIRST_ROWS: &str =
+pub(super) const FIRST_ROWS: &str =
     "INSERT INTO audit_start (id, seq, sha256) VALUES (1, 0, decode(repeat('00', 32), 'hex'))";

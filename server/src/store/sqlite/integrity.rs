@@ -87,7 +87,7 @@ impl LastCheck {
 
 /// Checks the database once, if it is a file. Ends early when the server stops.
 pub(crate) async fn check(store: Store, stopping: watch::Receiver<bool>) {
-    if !store.has_file() {
+    if store.database().is_some() {
         return;
     }
     let started = Instant::now();

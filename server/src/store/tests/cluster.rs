@@ -1,6 +1,7 @@
-//! PostgreSQL for the tests of this program: alone on a new data directory, on a socket in it, ended
-//! and removed with the program. Each data directory of a server has a database of its own. Where
-//! PostgreSQL is not installed, the tests say so and pass, unless `WAYMARK_REQUIRE_POSTGRES=1`.
+//! PostgreSQL for the tests of this program: alone on a new data directory, on a socket in it,
+//! ended and removed with the program. Each data directory of a server has a database of its own.
+//! Where PostgreSQL is not installed, the tests say so and pass, unless
+//! `WAYMARK_REQUIRE_POSTGRES=1`.
 
 use crate::store::{pictures, postgres::schema};
 use std::{
@@ -79,8 +80,8 @@ impl Cluster {
         Some(cluster)
     }
 
-    /// A command that runs in its folder: as the user `postgres`, whom the folder is given to, where
-    /// the tests run as root, which PostgreSQL refuses.
+    /// A command that runs in its folder: as the user `postgres`, whom the folder is given to,
+    /// where the tests run as root, which PostgreSQL refuses.
     fn command(&self, name: &str) -> Command {
         let program = program(name).unwrap_or_else(|| panic!("{name} is not installed"));
         let mut command = Command::new(&program);
@@ -111,13 +112,14 @@ impl Cluster {
         self.ran("pg_ctl", &["-D", "data", "-w", "-m", "fast", "stop"]);
     }
 
-    /// The address of the database for a data directory of a server. It is made first.
-    pub(super) fn database_of(&self, data: &Path) -> String {
+    /// The address of the database for a data directory of a server. It is made first, of a
+    /// template of the cluster.
+    fn database_of(&self, data: &Path, template: &str) -> String {
         let text = data.as_os_str().as_encoded_bytes();
         let name = format!("t{}", pictures::hex(&pictures::digest(text)[..12]));
         if self.databases.lock().unwrap().insert(name.clone()) {
             let folder = self.folder.to_string_lossy();
-            self.ran("createdb", &["-h", &folder, "-U", "postgres", &name]);
+            self.ran("createdb", &["-h", &folder, "-U", "postgres", "-T", template, &name]);
         }
         format!("postgres://postgres@localhost/{name}?host={}", self.folder.display())
     }
@@ -183,7 +185,12 @@ pub(crate) async fn on_cluster(cluster: &'static Cluster, test: impl Future<Outp
 
 /// The setting `store` of a server with this data directory.
 pub(crate) fn store_of(data: &Path) -> String {
-    IN.try_with(|cluster| cluster.database_of(data)).unwrap_or_default()
+    IN.try_with(|cluster| cluster.database_of(data, "template1")).unwrap_or_default()
+}
+
+/// The address of a database without tables.
+pub(crate) fn empty_store(data: &Path) -> String {
+    IN.with(|cluster| cluster.database_of(data, "template0"))
 }
 
 /// Has each test run on SQLite, and again on PostgreSQL. A test that is not listed is not used,

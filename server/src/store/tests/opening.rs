@@ -6,12 +6,13 @@ use crate::{
     store::{
         OpenError, PostgresError, StoreError, db, maps,
         postgres::{
-            open::connect,
+            open::{connect, options},
             turn::{self, Commit},
         },
         schema::known_schema,
     },
 };
+use sqlx::postgres::PgSslMode;
 use vision::recognise::DistanceKind;
 
 /// Why the database at `address` does not open.
@@ -42,6 +43,21 @@ async fn a_database_that_could_lose_a_write_or_is_of_others_is_refused_by_name()
         assert!(matches!(error, PostgresError::Schema { found, .. } if found == known + 1), "{error}");
     }))
     .await;
+}
+
+#[test]
+fn a_connection_beyond_loopback_is_encrypted() {
+    let mode = |address: &str| options(address).map(|options| options.get_ssl_mode());
+    for here in ["localhost", "127.0.0.1", "[::1]"] {
+        let mode = mode(&format!("postgres://kim@{here}/maps?sslmode=disable"));
+        assert!(matches!(mode, Ok(PgSslMode::Disable)), "{here}: {mode:?}");
+    }
+    assert!(matches!(mode("postgres:///maps?host=/run&sslmode=disable"), Ok(PgSslMode::Disable)));
+    assert!(matches!(mode("postgres://kim@192.0.2.1/maps"), Ok(PgSslMode::Require)));
+    let verified = mode("postgres://kim@db.example.org/maps?sslmode=verify-full");
+    assert!(matches!(verified, Ok(PgSslMode::VerifyFull)));
+    let refused = mode("postgres://kim@192.0.2.1/maps?sslmode=disable");
+    assert!(matches!(refused, Err(PostgresError::PlainText)), "{refused:?}");
 }
 
 #[tokio::test]
