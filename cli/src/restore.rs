@@ -9,7 +9,7 @@ use client::api::BackupManifest;
 use serde_json::json;
 use server::{
     backup::{RestoreError, StoppedServer, Verified, verify},
-    config::default_data,
+    config::{PostgresAddress, default_data},
 };
 use std::{
     io,
@@ -25,6 +25,10 @@ pub(crate) struct Args {
     /// The data directory of the server; made if missing.
     #[arg(long, env = "WAYMARK_DATA", value_name = "DIR", default_value_os_t = default_data())]
     data: PathBuf,
+    /// An empty database of PostgreSQL that it is put into, in place of the data directory:
+    /// `postgres://USER@HOST/NAME`.
+    #[arg(long, value_name = "URL")]
+    store: Option<String>,
     /// Only verify the backup.
     #[arg(long)]
     dry_run: bool,
@@ -37,12 +41,18 @@ pub(crate) struct Args {
 
 /// Runs the command.
 pub(crate) async fn run(args: &Args) -> anyhow::Result<()> {
+    let database = PostgresAddress::checked(args.store.clone().unwrap_or_default())?;
     let take = || StoppedServer::of(&args.data).map_err(failure);
     // First, as verification may take long; but nothing is made for a file that is no backup.
-    let held = (!args.dry_run && args.data.exists()).then(take).transpose()?;
+    let is_of_data = !args.dry_run && database.is_none();
+    let held = (is_of_data && args.data.exists()).then(take).transpose()?;
     let backup = verified(&args.file).await?;
     if args.dry_run {
         return args.show(&backup, None, &format!("{} is sound", args.file.display()));
+    }
+    if let Some(database) = database {
+        backup.restore_into(&database).await.map_err(failure)?;
+        return args.show(&backup, None, &format!("restored into {database}"));
     }
     let stopped = held.map_or_else(take, Ok)?;
     if stopped.has_data() {
@@ -84,6 +94,7 @@ fn failure(error: RestoreError) -> Failure {
             failure.advise("Nothing was changed. Take another backup: waymark restore OTHER --dry-run")
         }
         RestoreError::Newer { .. } => Failure::new(Class::Refused, "newer_schema", sentence),
+        RestoreError::Database(_) => Failure::new(Class::Refused, "store_refused", sentence),
         RestoreError::Directory(_) => Failure::new(Class::Conflict, "in_use", sentence),
         RestoreError::File { source, .. } if source.kind() == io::ErrorKind::NotFound => {
             Failure::new(Class::NotFound, "no_file", sentence)

@@ -10,7 +10,7 @@ use clap::Args;
 use engine::vitals;
 use server::{
     RunningServer, Server, StartError,
-    config::{Config, RawConfig},
+    config::{Config, PostgresAddress, RawConfig},
 };
 use std::{
     io::{IsTerminal as _, Write as _},
@@ -37,6 +37,11 @@ Teach a first landmark from a photograph of a picture on a wall:
 
 Commands and SDKs of the same user on the same machine find the token that `serve` writes to local-token in its data
 directory. `waymark open` prints a link that opens the page; `waymark token create` makes tokens for others.
+
+Maps are in a database of PostgreSQL instead (docs/OPERATIONS.md) with its address; its password belongs into
+WAYMARK_STORE, PGPASSWORD or ~/.pgpass, as others see the command line:
+
+  waymark serve --store postgres://waymark@db.example.org/waymark
 
 For other machines, encrypted, with a certificate for each robot (`waymark robot enrol`):
 
@@ -65,6 +70,10 @@ pub(super) struct Serve {
     /// ~/.local/share/waymark on Linux].
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
+    /// A database of PostgreSQL that maps are stored in, `postgres://USER@HOST/NAME` [default:
+    /// SQLite in the data directory].
+    #[arg(long, value_name = "URL")]
+    store: Option<String>,
     /// Where HTTP listens; port 0 takes a free one [default: 127.0.0.1:8080].
     #[arg(long, value_name = "ADDR")]
     http: Option<String>,
@@ -121,6 +130,9 @@ impl Serve {
         if let Some(data) = self.data {
             raw.data = data;
         }
+        if let Some(store) = self.store {
+            raw.store = store;
+        }
         if let Some(http) = self.http {
             raw.http = http;
         }
@@ -160,10 +172,10 @@ impl Serve {
             tracing::warn!(variable, follows, "unknown_variable");
         }
         end_after_a_panic_of_zenoh();
-        let data = config.data.clone();
+        let (data, store) = (config.data.clone(), config.store.clone());
         let server = Server::start(config).await.map_err(not_started)?;
         let signals = StopSignals::heard()?;
-        ready(&server, &data);
+        ready(&server, &data, store.as_ref());
         let metrics = server.metrics_addr.map(|address| address.to_string()).unwrap_or_default();
         tracing::info!(data = %data.display(), http = %server.http_addr, zenoh = server.zenoh_endpoint, metrics, "ready");
         let supervisor = Supervisor::of_environment();
@@ -195,6 +207,11 @@ fn warn_of_plain_text(config: &Config) {
 
 /// An address that another program has is told with the option that names another.
 fn not_started(error: StartError) -> anyhow::Error {
+    if let StartError::StoreAway(_) = error {
+        let advice =
+            "Check that PostgreSQL runs there and takes connections from here, and the address in --store.";
+        return Failure::new(Class::Unreachable, "store_away", error.to_string()).advise(advice).into();
+    }
     let Some(option) = error.taken_address() else { return error.into() };
     let advice = format!("Another program listens there: end it, or choose another address with {option}.");
     Failure::new(Class::Conflict, "address_taken", error.to_string()).advise(advice).into()
@@ -211,11 +228,12 @@ async fn after(failure: &vitals::Failure, server: RunningServer) -> anyhow::Erro
 
 /// The first lines on stdout, for people and for programs that started this one on port 0. The link
 /// is a secret: where standard output is no terminal it may be a log.
-fn ready(server: &RunningServer, data: &Path) {
+fn ready(server: &RunningServer, data: &Path, store: Option<&PostgresAddress>) {
     let link = server.page_link().filter(|_| std::io::stdout().is_terminal());
     let open = link.unwrap_or_else(|| "waymark open prints a link that opens the page".to_owned());
+    let store = store.map(|store| format!("store   {store}\n")).unwrap_or_default();
     let text = format!(
-        "pages   {}/\nrobots  {}\ntoken   {}\nopen    {open}\nserver  {}\ndata    {}\n",
+        "pages   {}/\nrobots  {}\ntoken   {}\nopen    {open}\nserver  {}\ndata    {}\n{store}",
         server.url(),
         server.zenoh_endpoint,
         server.local_token_file().display(),

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 pub enum AuditFileError {
     /// It is not there.
-    #[error("there is no {0}")]
+    #[error("there is no {0}; of a store in PostgreSQL ask its server")]
     Missing(PathBuf),
     /// It cannot be read as a database with an audit log.
     #[error("{path}: {reason}")]

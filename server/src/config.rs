@@ -11,6 +11,7 @@ mod error;
 mod frame_search;
 mod limits;
 mod memory;
+mod postgres;
 mod ros2;
 mod router;
 mod tls;
@@ -22,6 +23,7 @@ pub use error::ConfigError;
 pub use frame_search::{BUSY_FRAMES_PER_WORKER, FrameSearch};
 pub use limits::Limits;
 pub use memory::MemoryShare;
+pub use postgres::PostgresAddress;
 pub use ros2::{
     MAX_DOMAIN, MAX_KEY_PREFIX_BYTES, MAX_ROS2_ROBOTS, MAX_TRANSFORM_TOLERANCE_S, Middleware, PoseSource,
     RawRos2, RawRos2Camera, RawRos2Robot, Ros2Outputs, Ros2Robot,
@@ -57,6 +59,9 @@ pub const MAX_WORKERS: usize = 256;
 pub struct RawConfig {
     /// Directory of the database; empty: [`default_data`].
     pub data: PathBuf,
+    /// A database of PostgreSQL that maps are stored in, `postgres://USER@HOST/NAME`; empty: SQLite
+    /// in `data`.
+    pub store: String,
     /// Address and port of the HTTP interface; port 0 takes a free one.
     pub http: String,
     /// Where the zenoh router listens, as zenoh writes it; port 0 takes a free one. Empty:
@@ -97,6 +102,7 @@ impl Default for RawConfig {
     fn default() -> Self {
         Self {
             data: PathBuf::new(),
+            store: String::new(),
             http: "127.0.0.1:8080".into(),
             zenoh: String::new(),
             metrics: String::new(),
@@ -154,6 +160,8 @@ impl RawConfig {
 pub struct Config {
     /// Directory of the database.
     pub data: PathBuf,
+    /// The database that maps are stored in; `None`: SQLite in `data`.
+    pub store: Option<PostgresAddress>,
     /// Where HTTP listens; port 0 takes a free one.
     pub http_addr: SocketAddr,
     /// Where the zenoh router listens, `tcp/HOST:PORT` or `tls/HOST:PORT`; port 0 takes a free one.
@@ -268,6 +276,7 @@ impl TryFrom<RawConfig> for Config {
         raw.limits.check()?;
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         Ok(Self {
+            store: PostgresAddress::checked(raw.store)?,
             data: if raw.data.as_os_str().is_empty() { default_data() } else { raw.data },
             http_addr,
             zenoh_endpoint,

@@ -22,6 +22,7 @@ use crate::{
     store::{
         StoreError,
         actor::Actor,
+        db::Pool,
         disk_guard::{self, DiskGuard},
         integrity, landmarks, now_ms, pictures,
     },
@@ -276,9 +277,10 @@ fn recorders(
     [tokio::spawn(findings), tokio::spawn(answers), tokio::spawn(events)]
 }
 
-/// Whom a backup tells of its panics and of its end, and whether there is room for it.
-fn told(store: &Catalogue) -> (Arc<Panics>, Arc<EventLog>, Arc<DiskGuard>) {
-    (store.vitals().panics().clone(), store.events().clone(), store.disk().clone())
+/// Whom a backup tells of its panics and of its end, whether there is room for it, and the database
+/// that is not in the data directory.
+fn told(store: &Catalogue) -> (Arc<Panics>, Arc<EventLog>, Arc<DiskGuard>, Option<Pool>) {
+    (store.vitals().panics().clone(), store.events().clone(), store.disk().clone(), store.database())
 }
 
 /// What is to be stored: findings of robots, and answers.

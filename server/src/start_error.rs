@@ -1,6 +1,9 @@
 //! Why a server does not start.
 
-use crate::{bus::BusError, store::OpenError};
+use crate::{
+    bus::BusError,
+    store::{OpenError, PostgresError},
+};
 use std::net::SocketAddr;
 
 /// Why the server did not start.
@@ -9,6 +12,9 @@ pub enum StartError {
     /// The database does not open.
     #[error("{0}")]
     Store(String),
+    /// The database cannot be reached.
+    #[error("{0}")]
+    StoreAway(String),
     /// Robots cannot connect.
     #[error(transparent)]
     Bus(#[from] BusError),
@@ -56,6 +62,10 @@ impl From<OpenError> for StartError {
             text = format!("{text}: {error}");
             cause = error.source();
         }
-        Self::Store(text)
+        if matches!(error, OpenError::Postgres(PostgresError::Unreachable(_))) {
+            Self::StoreAway(text)
+        } else {
+            Self::Store(text)
+        }
     }
 }

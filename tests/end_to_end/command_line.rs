@@ -22,7 +22,11 @@ const OPTIONS: [(&str, &[&str], &[&str]); 68] = [
         &["--robots", "--rate-hz", "--legs", "--seed", "--survey", "--http", "--data", "--stay", "--json"],
     ),
     ("sample", &[], &["<FOLDER>"]),
-    ("serve", &[], &["--config", "--data", "--http", "--zenoh", "--fleet", "--workers", "--insecure"]),
+    (
+        "serve",
+        &[],
+        &["--config", "--data", "--store", "--http", "--zenoh", "--fleet", "--workers", "--insecure"],
+    ),
     (
         "detect",
         &[],
@@ -74,7 +78,7 @@ const OPTIONS: [(&str, &[&str], &[&str]); 68] = [
     ("logout", SERVER, &[]),
     ("open", SERVER, &[]),
     ("backup", SERVER, &["[FILE]"]),
-    ("restore", &[], &["<FILE>", "--data", "--dry-run", "--yes", "--json"]),
+    ("restore", &[], &["<FILE>", "--data", "--store", "--dry-run", "--yes", "--json"]),
     ("map create", SERVER, &["--preset", "--distance", "--site", "--building", "--floor", "<MAP>"]),
     ("map pipeline", SERVER, &["--preset", "--distance", "<MAP>"]),
     ("map list", SERVER, &[]),

@@ -3,8 +3,8 @@
 use std::{collections::BTreeSet, fs, path::Path};
 use tests::documents::root;
 
-/// Names of all tests: functions after an attribute that ends in `test]` or `test(...)]`, and those
-/// of Python.
+/// Names of all tests: functions after an attribute that ends in `test]` or `test(...)]`, those
+/// that run on each store, and those of Python.
 fn tests_in(folder: &Path, found: &mut BTreeSet<String>) {
     for entry in fs::read_dir(folder).expect("a folder") {
         let path = entry.expect("an entry").path();
@@ -21,8 +21,13 @@ fn tests_in(folder: &Path, found: &mut BTreeSet<String>) {
             continue;
         }
         let text = fs::read_to_string(&path).expect("UTF-8");
-        let mut is_next = is_python;
+        let (mut is_next, mut is_list) = (is_python, false);
         for line in text.lines().map(str::trim) {
+            is_list = line.ends_with("on_each_store! {") || (is_list && line != "}");
+            if is_list {
+                found.extend(line.split(',').map(|name| name.trim().to_owned()));
+                continue;
+            }
             if line.starts_with("#[") {
                 is_next |= line.contains("test]") || line.contains("test(");
                 continue;

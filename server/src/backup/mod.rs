@@ -16,7 +16,10 @@ use crate::{
     config::{BackupSettings, Config, MAX_KEPT},
     events::EventLog,
     private_file,
-    store::{StoreError, copies, disk_guard::DiskGuard, kind::Kind, now_ms, open, pictures, restored},
+    store::{
+        StoreError, copies, copy_database, database_bytes, db::Pool, disk_guard::DiskGuard, kind::Kind,
+        now_ms, open, pictures, restored,
+    },
 };
 use archive::{ArchiveError, Manifest};
 use engine::panics::{Edge, Panics};
@@ -70,6 +73,8 @@ pub(crate) struct Backups {
     data: PathBuf,
     folder: PathBuf,
     settings: BackupSettings,
+    /// The database, if it is not the file in `data`.
+    database: Option<Pool>,
     panics: Arc<Panics>,
     events: Arc<EventLog>,
     disk: Arc<DiskGuard>,
@@ -80,7 +85,7 @@ impl Backups {
     /// Begins to keep the timetable. Removes what an earlier server has left half written.
     pub(crate) fn start(
         config: &Config,
-        (panics, events, disk): (Arc<Panics>, Arc<EventLog>, Arc<DiskGuard>),
+        (panics, events, disk, database): (Arc<Panics>, Arc<EventLog>, Arc<DiskGuard>, Option<Pool>),
         stopping: watch::Receiver<bool>,
     ) -> (Arc<Self>, JoinHandle<()>) {
         let folder = config.data.join("backups");
@@ -90,6 +95,7 @@ impl Backups {
             data: config.data.clone(),
             folder,
             settings: config.backup,
+            database,
             panics,
             events,
             disk,
@@ -166,10 +172,19 @@ impl Backups {
     }
 
     async fn written(&self, part: &Path, created_ms: i64) -> Result<(), BackupError> {
-        // About as large as the file that it is copied from.
-        self.disk.check_for(fs::metadata(self.data.join(open::FILE))?.len())?;
+        let bytes = if let Some(database) = &self.database {
+            database_bytes(database).await?
+        } else {
+            // About as large as the file that it is copied from.
+            fs::metadata(self.data.join(open::FILE))?.len()
+        };
+        self.disk.check_for(bytes)?;
         private_file::folder(&self.folder)?;
-        copies::copy(&self.data, part).await?;
+        if let Some(database) = &self.database {
+            copy_database(database, part).await?;
+        } else {
+            copies::copy(&self.data, part).await?;
+        }
         let (contents, faults) = copies::examine(part).await?;
         for fault in &faults {
             tracing::error!(fault, follows = "the backup has it, too", "stored_data_is_damaged");

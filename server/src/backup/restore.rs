@@ -5,11 +5,14 @@ use super::{
     BackupManifest,
     archive::{self, ArchiveError},
 };
-use crate::store::{
-    OpenError, StoreError,
-    copies::{self, Contents, MapDigest},
-    now_ms, open, restored,
-    schema::known_schema,
+use crate::{
+    config::PostgresAddress,
+    store::{
+        OpenError,
+        copies::{self, Contents, MapDigest},
+        now_ms, open, restore_database, restored,
+        schema::known_schema,
+    },
 };
 use std::{
     fs, io,
@@ -43,6 +46,9 @@ pub enum RestoreError {
         /// The newest known one.
         known: i64,
     },
+    /// The database does not take it.
+    #[error("{0}")]
+    Database(String),
     /// A server runs on the data directory, or it cannot be used.
     #[error(transparent)]
     Directory(#[from] DirectoryError),
@@ -102,8 +108,16 @@ pub async fn verify(file: &Path) -> Result<Verified, RestoreError> {
     Ok(Verified { manifest: manifest_shown, file: file.to_owned(), database_bytes, database_sha256: sha256 })
 }
 
-fn with_cause(error: &StoreError) -> String {
-    match std::error::Error::source(error) {
+impl Verified {
+    /// Puts it into an empty database of PostgreSQL.
+    pub async fn restore_into(&self, address: &PostgresAddress) -> Result<(), RestoreError> {
+        let restored = restore_database(&self.file, address.secret()).await;
+        restored.map_err(|error| RestoreError::Database(with_cause(&error)))
+    }
+}
+
+fn with_cause(error: &dyn std::error::Error) -> String {
+    match error.source() {
         Some(cause) => format!("{error}: {cause}"),
         None => error.to_string(),
     }

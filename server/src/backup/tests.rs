@@ -1,3 +1,5 @@
+mod stores;
+
 use super::*;
 use crate::{
     publication::{Catalogue, CatalogueTasks, tests::config},

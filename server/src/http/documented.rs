@@ -30,7 +30,7 @@ const ANY: Refusal = refusal(
     "Refused",
     "Any request: 400 bad_query, bad_json, bad_multipart, bad_body, repeated_header, foreign_authority; 401 unauthenticated; \
      403 forbidden, page_header_missing, host_not_allowed, origin_not_allowed; 408 timeout; 429 rate_limited; 500 internal, \
-     not_published; 503 busy, storage_failed, too_many_uploads; 507 storage_full, storage_nearly_full, storage_read_only",
+     not_published; 503 busy, storage_failed, store_away, too_many_uploads; 507 storage_full, storage_nearly_full, storage_read_only",
 );
 /// Statuses that only some operations have, each with a response of its own.
 const REFUSALS: [Refusal; 7] = [

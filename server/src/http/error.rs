@@ -131,6 +131,14 @@ fn unknown(what: Kind) -> (&'static str, &'static str) {
     }
 }
 
+fn link_code(error: &MapLinkError) -> &'static str {
+    match error {
+        MapLinkError::Cycle => "cycle",
+        MapLinkError::TooDeep => "too_deep",
+        MapLinkError::NotRelated => "not_related",
+    }
+}
+
 impl From<StoreError> for ApiError {
     fn from(error: StoreError) -> Self {
         let detail = error.to_string();
@@ -156,12 +164,7 @@ impl From<StoreError> for ApiError {
                 .field("draft")
                 .with("conflicts", json!(with)),
             StoreError::Frames(error) => {
-                let code = match error {
-                    MapLinkError::Cycle => "cycle",
-                    MapLinkError::TooDeep => "too_deep",
-                    MapLinkError::NotRelated => "not_related",
-                };
-                Self::new(StatusCode::CONFLICT, code, detail).field("parent.map")
+                Self::new(StatusCode::CONFLICT, link_code(&error), detail).field("parent.map")
             }
             StoreError::Full => Self::new(StatusCode::INSUFFICIENT_STORAGE, "storage_full", detail),
             StoreError::ReadOnly => Self::new(StatusCode::INSUFFICIENT_STORAGE, "storage_read_only", detail),
@@ -171,6 +174,7 @@ impl From<StoreError> for ApiError {
                     .with("limit_percent", json!(space.limit_percent))
                     .with("free_bytes", json!(space.free_bytes))
             }
+            StoreError::Away => Self::new(StatusCode::SERVICE_UNAVAILABLE, "store_away", detail),
             StoreError::Closed => Self::new(StatusCode::SERVICE_UNAVAILABLE, "storage_failed", detail),
             StoreError::NotPublished { .. } => {
                 Self::new(StatusCode::INTERNAL_SERVER_ERROR, "not_published", detail)

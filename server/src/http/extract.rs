@@ -123,11 +123,18 @@ impl<T: DeserializeOwned + Send> FromRequestParts<AppState> for PathParams<T> {
     type Rejection = ApiError;
 
     async fn from_request_parts(parts: &mut Parts, app: &AppState) -> Result<Self, ApiError> {
+        if parts.uri.path().contains(NUL) {
+            let detail = "nothing has U+0000 in its name";
+            return Err(ApiError::new(StatusCode::NOT_FOUND, "not_found", detail).field("path"));
+        }
         let path = Path::<T>::from_request_parts(parts, app).await;
         path.map(|Path(value)| Self(value))
             .map_err(|e| ApiError::new(StatusCode::NOT_FOUND, "not_found", e.body_text()).field("path"))
     }
 }
+
+/// U+0000 in an address, which no text of the store has.
+const NUL: &str = "%00";
 
 pub(super) struct QueryParams<T>(pub(super) T);
 
@@ -135,6 +142,12 @@ impl<T: DeserializeOwned> FromRequestParts<AppState> for QueryParams<T> {
     type Rejection = ApiError;
 
     async fn from_request_parts(parts: &mut Parts, app: &AppState) -> Result<Self, ApiError> {
+        let mut given = parts.uri.query().unwrap_or_default().split('&');
+        if let Some(nul) = given.find(|parameter| parameter.contains(NUL)) {
+            let field = nul.split('=').next().unwrap_or_default();
+            let error = ApiError::new(StatusCode::BAD_REQUEST, "bad_query", "a text has no U+0000");
+            return Err(error.field(field));
+        }
         let query = Query::<T>::from_request_parts(parts, app).await;
         query
             .map(|Query(value)| Self(value))

@@ -82,7 +82,7 @@ async fn readyz(State(app): State<AppState>, parts: Parts) -> Result<Json<Readin
         damaged_pictures,
         router,
         maps_not_served,
-        database_check: Some(database_check),
+        database_check: app.store.database().is_none().then_some(database_check),
         backup,
         parts_still_s,
         storage,

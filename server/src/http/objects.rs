@@ -1,5 +1,5 @@
-//! Objects alone where a field is known by its name. In: any reader of serde. Out: the same, but
-//! for structs from lists.
+//! Objects alone where a field is known by its name, and text that every store takes. In: any
+//! reader of serde. Out: the same, but for structs from lists and for U+0000.
 //!
 //! serde's derive takes a list of values in the order of the fields for a struct. No schema of this
 //! interface says so, the order is no promise, and a body that is taken by accident is a change
@@ -15,6 +15,11 @@ pub(super) struct Objects<T>(pub(super) T);
 
 /// A visitor of a struct: it takes an object, and no list.
 struct OfStruct<V>(V);
+
+/// Refuses text that not every store takes: PostgreSQL has no U+0000.
+fn storable<E: Error>(text: &str) -> Result<&str, E> {
+    if text.contains('\0') { Err(E::custom("a text has no U+0000")) } else { Ok(text) }
+}
 
 /// Hands a value of each of these types on as it is.
 macro_rules! handed_on {
@@ -96,13 +101,23 @@ impl<'de, V: Visitor<'de>> Visitor<'de> for Objects<V> {
         visit_f32(f32),
         visit_f64(f64),
         visit_char(char),
-        visit_str(&str),
-        visit_borrowed_str(&'de str),
-        visit_string(String),
         visit_bytes(&[u8]),
         visit_borrowed_bytes(&'de [u8]),
         visit_byte_buf(Vec<u8>)
     );
+
+    fn visit_str<E: Error>(self, text: &str) -> Result<V::Value, E> {
+        self.0.visit_str(storable(text)?)
+    }
+
+    fn visit_borrowed_str<E: Error>(self, text: &'de str) -> Result<V::Value, E> {
+        self.0.visit_borrowed_str(storable(text)?)
+    }
+
+    fn visit_string<E: Error>(self, text: String) -> Result<V::Value, E> {
+        storable(&text)?;
+        self.0.visit_string(text)
+    }
 
     fn visit_none<E: Error>(self) -> Result<V::Value, E> {
         self.0.visit_none()
@@ -259,6 +274,8 @@ mod tests {
             let wanted = format!("{path}: invalid type: sequence, expected an object with fields by name");
             assert!(refused.starts_with(&wanted), "{refused}");
         }
+        let refused = read(&WHOLE.replace(r#""a""#, r#""a\u0000""#)).unwrap_err();
+        assert!(refused.contains("a text has no U+0000"), "{refused}");
         let refused = read("[[1, 2], [], {}, null, []]").unwrap_err();
         assert!(refused.starts_with(".: invalid type: sequence"), "{refused}");
     }

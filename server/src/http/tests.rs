@@ -15,6 +15,7 @@ mod readiness;
 mod revision;
 mod refused_views;
 mod stored_answers;
+mod stores;
 mod teaching;
 mod topology;
 mod uploads;
@@ -23,7 +24,7 @@ use super::*;
 use crate::{
     config::{Limits, RawConfig, RawTls},
     identity::{Secret, TokenText, certificates::Certificates},
-    publication::CatalogueTasks,
+    publication::{CatalogueTasks, tests::raw_config},
     store::{StoreError, maps},
 };
 use axum::{
@@ -59,14 +60,15 @@ impl Service {
 
     /// On the database of this directory.
     async fn on(data: tempfile::TempDir, limits: Limits) -> Self {
-        let raw = RawConfig { limits, data: data.path().to_owned(), ..RawConfig::default() };
+        let raw = RawConfig { limits, ..raw_config(data.path()) };
         let config = Arc::new(crate::config::Config::try_from(raw).unwrap());
         let (store, writer) = Catalogue::open(&config).await.unwrap();
         let (stop, stopping) = watch::channel(false);
         let (jobs, _) = Jobs::start(store.clone(), config.clone(), stopping.clone()).await.unwrap();
         let (tap, frames) = crate::gather::gathering_tap();
         let (gatherer, _) = Gatherer::start(store.clone(), &config, &tap, frames).await.unwrap();
-        let told = (store.vitals().panics().clone(), store.events().clone(), store.disk().clone());
+        let told =
+            (store.vitals().panics().clone(), store.events().clone(), store.disk().clone(), store.database());
         let (backups, _) = crate::backup::Backups::start(&config, told, stopping.clone());
         let hall = Arc::new(MapSnapshot::empty("hall", 1));
         let (mut engine, observers) = scene::engine(&[hall]);

@@ -98,6 +98,7 @@ impl Publisher {
                 }
                 return Ok(());
             }
+            Ok(Err(error @ (StoreError::Away | StoreError::Busy))) => return Err(error),
             Ok(Err(error)) if error.is_fatal() => return Err(error),
             Ok(Err(error)) => {
                 tracing::error!(map = id, error = &error as &dyn std::error::Error, "map_build_failed");

@@ -9,14 +9,19 @@ use crate::store::db;
 use crate::store::kind::Kind;
 use crate::{
     config::RawConfig,
-    store::{StoreError, WRITER, jobs, landmarks, maps, models, robots, walls},
+    store::{StoreError, WRITER, jobs, landmarks, maps, models, robots, tests::cluster::store_of, walls},
 };
 use engine::panics::Edge;
 use tokio::sync::oneshot;
 use vision::recognise::DistanceKind;
 
+/// The settings of a server with this data directory.
+pub(crate) fn raw_config(dir: &std::path::Path) -> RawConfig {
+    RawConfig { data: dir.to_owned(), store: store_of(dir), ..RawConfig::default() }
+}
+
 pub(crate) fn config(dir: &std::path::Path) -> Config {
-    Config::try_from(RawConfig { data: dir.to_owned(), ..RawConfig::default() }).unwrap()
+    Config::try_from(raw_config(dir)).unwrap()
 }
 
 #[tokio::test]

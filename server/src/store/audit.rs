@@ -19,7 +19,6 @@ use protos::api::{AuditCheck, AuditEntry, AuditHead};
 use sha2::{Digest as _, Sha256};
 
 statements! {
-    TOTAL_CHANGES = "SELECT total_changes()";
     HEAD = "SELECT seq, sha256 FROM audit WHERE seq = (SELECT max(seq) FROM audit) \
             UNION ALL SELECT seq, sha256 FROM audit_start ORDER BY seq DESC LIMIT 1";
     START = "SELECT seq, sha256 FROM audit_start";
@@ -121,8 +120,7 @@ fn audit_row(row: &Row) -> Result<AuditRow, db::Error> {
 
 /// How many rows this connection has changed since it was opened.
 pub(super) async fn total_changes(tx: &mut Tx) -> Result<i64, StoreError> {
-    let total = db::query_scalar(TOTAL_CHANGES).fetch_one(&mut tx.conn).await;
-    total.map_err(StoreError::during("count changes"))
+    tx.conn.total_changes().await.map_err(StoreError::during("count changes"))
 }
 
 /// Adds the entry of a transaction. Of more than `max` entries the oldest are forgotten.

@@ -79,6 +79,9 @@ pub(crate) enum StoreError {
     /// The map links are impossible.
     #[error(transparent)]
     Frames(#[from] map::map_links::MapLinkError),
+    /// The database cannot be reached; reading what is in memory goes on. Nothing was changed.
+    #[error("the store cannot be reached: robots are served and nothing is stored; try again")]
+    Away,
     /// The disk is full; reading goes on.
     #[error("the disk of the data directory is full: free some space, then this goes on by itself")]
     Full,
@@ -159,6 +162,8 @@ impl StoreError {
         move |source| match class(&source) {
             ErrorClass::Full => Self::Full,
             ErrorClass::ReadOnly => Self::ReadOnly,
+            ErrorClass::Away => Self::Away,
+            ErrorClass::Busy => Self::Busy,
             _ => Self::Database { operation, source },
         }
     }
@@ -182,6 +187,7 @@ impl StoreError {
                 matches!(class(source), ErrorClass::Damaged | ErrorClass::Lost)
             }
             Self::At { source, .. } => source.is_fatal(),
+            Self::Closed => true,
             _ => false,
         }
     }

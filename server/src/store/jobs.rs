@@ -16,8 +16,8 @@ statements! {
               VALUES ($1, $2, $3, 'queued', $4, $5, $6) RETURNING id";
     GET = "SELECT id, kind, map, request, state, message, result, attempts, author, why, created_ms, started_ms, ended_ms FROM jobs WHERE id = $1";
     LIST = "SELECT id, kind, map, request, state, message, result, attempts, author, why, created_ms, started_ms, ended_ms FROM jobs WHERE id < $1 \
-            AND ($2 IS NULL OR state = $2) AND ($3 IS NULL OR map IN (SELECT value FROM json_each($3))) ORDER BY id DESC LIMIT $4";
-    COUNT = "SELECT count(*) FROM jobs WHERE ($1 IS NULL OR state = $1) AND ($2 IS NULL OR map IN (SELECT value FROM json_each($2)))";
+            AND (CAST($2 AS TEXT) IS NULL OR state = $2) AND (CAST($3 AS TEXT) IS NULL OR map IN (SELECT value FROM json_each($3))) ORDER BY id DESC LIMIT $4";
+    COUNT = "SELECT count(*) FROM jobs WHERE (CAST($1 AS TEXT) IS NULL OR state = $1) AND (CAST($2 AS TEXT) IS NULL OR map IN (SELECT value FROM json_each($2)))";
     OPEN = "SELECT id, kind, map, request, state, message, result, attempts, author, why, created_ms, started_ms, ended_ms FROM jobs \
             WHERE state IN ('queued', 'running') ORDER BY id";
     BEGIN = "UPDATE jobs SET state = 'running', attempts = attempts + 1, started_ms = $2 \

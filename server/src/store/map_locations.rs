@@ -115,6 +115,10 @@ mod tests {
     use nalgebra::Vector3;
     use vision::recognise::DistanceKind;
 
+    crate::store::tests::cluster::on_each_store! {
+        locations_survive_and_no_map_is_linked_to_itself,
+    }
+
     fn linked_to(parent: &str) -> MapLocation {
         let covariance = Matrix3::from_diagonal(&Vector3::new(1e-2, 2e-2, 3e-4));
         let pose = Pose2::new(1.5, -2.0, 0.7);
@@ -132,7 +136,6 @@ mod tests {
         store.write(move |tx| Box::pin(async move { set(tx, map, |_| location).await })).await
     }
 
-    #[tokio::test]
     async fn locations_survive_and_no_map_is_linked_to_itself() {
         let dir = tempfile::tempdir().unwrap();
         let config = crate::publication::tests::config(dir.path());

@@ -19,7 +19,7 @@ statements! {
     ROWS = "SELECT coalesce(string_agg(id || ' ' || revision || ' ' || changed_ms || ' ' || health, ';'), '') \
             FROM landmarks WHERE map_id = $1";
     LANDMARKS = concat!("SELECT id, name, learning, ", geometry_columns!(""), " FROM landmarks WHERE map_id = $1 \
-                AND id IN (SELECT value FROM json_each($2))");
+                AND id IN (SELECT CAST(value AS BIGINT) FROM json_each($2))");
 }
 
 /// A map without what belongs to it.

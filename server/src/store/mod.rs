@@ -8,7 +8,9 @@
 pub(crate) mod db;
 mod error;
 pub(crate) mod kind;
+mod postgres;
 pub(crate) mod sqlite;
+mod transactions;
 mod derived_schema;
 mod writer;
 mod statements;
@@ -50,6 +52,10 @@ pub(crate) mod drafts;
 
 pub(crate) use error::StoreError;
 pub(crate) use on_commit::{CommittedChange, OnCommit};
+pub(crate) use postgres::{
+    copies::{bytes as database_bytes, copy as copy_database, restore as restore_database},
+    open::OpenError as PostgresError,
+};
 pub(crate) use sqlite::{
     copies, disk_guard, integrity,
     open::{self, OpenError},
@@ -73,6 +79,7 @@ use std::{
     time::{Duration, Instant, SystemTime},
 };
 use tokio::sync::{Mutex, MutexGuard, Notify, mpsc, oneshot};
+use transactions::Transactions;
 
 /// The open store. Cheap to clone.
 #[derive(Debug, Clone)]
@@ -144,7 +151,7 @@ impl Store {
         on_commit: Arc<dyn OnCommit>,
         vitals: Arc<Vitals>,
     ) -> Result<(Self, WriterTask), OpenError> {
-        let opened = open::open(&config.data, config.sqlite_vfs()).await?;
+        let (opened, transactions) = Box::pin(opened(config)).await?;
         let disk = Arc::new(DiskGuard::new(&config.data, &config.limits));
         let jobs = Arc::new(Notify::new());
         let mut conn = opened.writer;
@@ -158,7 +165,7 @@ impl Store {
         let commits = Arc::<AtomicU64>::default();
         let parts = (on_commit, vitals.clone(), jobs.clone(), commits.clone());
         let heart = vitals.hearts().begin(WRITER);
-        let with = (heart.clone(), config.log_pages().unwrap_or(sqlite::checkpoint::LOG_PAGES));
+        let with = (heart.clone(), config.log_pages().unwrap_or(sqlite::checkpoint::LOG_PAGES), transactions);
         let writer = writer::Writer::new(conn, received, history, parts, with);
         let (close, closed) = oneshot::channel();
         let task = tokio::spawn(writer.run(closed, vitals.begin(WRITER)));
@@ -182,6 +189,11 @@ impl Store {
             last_check: integrity::LastCheck::default(),
         };
         Ok((store, task))
+    }
+
+    /// The database, if it is not the file in the data directory.
+    pub(crate) fn database(&self) -> Option<Pool> {
+        Some(self.reads.clone()).filter(|reads| matches!(reads, Pool::Postgres(_)))
     }
 
     /// The check of the whole database after this start.
@@ -265,6 +277,20 @@ impl Store {
     }
 }
 
+/// The database of the settings, on the present schema, and how it is written.
+async fn opened(config: &Config) -> Result<(open::Opened, Transactions), OpenError> {
+    let Some(address) = &config.store else {
+        return Ok((open::open(&config.data, config.sqlite_vfs()).await?, Transactions::Sqlite));
+    };
+    let lock = open::lock(&config.data)?;
+    let holder = transactions::random().map_err(OpenError::Open)?;
+    let (mut writer, reads) = postgres::open::open(address.secret(), &holder).await?;
+    history::close_outside(&mut writer).await.map_err(OpenError::Open)?;
+    tracing::info!(store = %address, "store_opened");
+    let transactions = transactions::Postgres { address: address.secret().to_owned(), holder, turn: None };
+    Ok((open::Opened { writer, reads, lock }, Transactions::Postgres(transactions)))
+}
+
 /// Writes the newest place of the audit log to the server's own log: a note outside of the
 /// database.
 async fn note_head(conn: &mut Conn, at: &str) -> Result<(), StoreError> {
@@ -301,4 +327,4 @@ mod io_errors;
 #[cfg(test)]
 mod power_cuts;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

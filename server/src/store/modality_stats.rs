@@ -182,6 +182,11 @@ mod tests {
     use std::sync::Arc;
     use vision::recognise::DistanceKind;
 
+    crate::store::tests::cluster::on_each_store! {
+        runs_and_areas_survive_and_are_published,
+        runs_are_bounded,
+    }
+
     fn statistics(x: i32) -> BTreeMap<PoseCell, StatsByModality> {
         [(PoseCell { x, y: -2, heading: 3 }, StatsByModality::default())].into()
     }
@@ -197,7 +202,6 @@ mod tests {
         (map.version, map.modalities.clone())
     }
 
-    #[tokio::test]
     async fn runs_and_areas_survive_and_are_published() {
         let dir = tempfile::tempdir().unwrap();
         let config = config(dir.path());
@@ -238,7 +242,6 @@ mod tests {
         task.close().await;
     }
 
-    #[tokio::test]
     async fn runs_are_bounded() {
         let dir = tempfile::tempdir().unwrap();
         let (store, task) = Catalogue::open(&config(dir.path())).await.unwrap();

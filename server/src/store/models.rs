@@ -24,7 +24,7 @@ statements! {
            params_hash = excluded.params_hash, active = excluded.active, reasons = excluded.reasons, \
            facts = excluded.facts, views = excluded.views, generated_views = excluded.generated_views, \
            learnt_ms = excluded.learnt_ms, looks_like = excluded.looks_like";
-    DIGESTS = "SELECT coalesce(group_concat(m.landmark_id || ' ' || hex(m.sha256), ';'), '') FROM models m \
+    DIGESTS = "SELECT coalesce(string_agg(m.landmark_id || ' ' || hex(m.sha256), ';'), '') FROM models m \
                JOIN landmarks l ON l.id = m.landmark_id WHERE l.map_id = $1 AND m.looks_like IS NULL";
     REFUSED = "SELECT m.landmark_id FROM models m JOIN landmarks l ON l.id = m.landmark_id \
                WHERE l.map_id = $1 AND m.looks_like IS NOT NULL";

@@ -28,7 +28,7 @@ pub(crate) enum CommittedChange {
 
 /// Makes committed data visible. The writer calls it between commit and acknowledgement, so it is
 /// short: long computations come later. `NotPublished` is an answer to the caller of the write; any
-/// other error stops the store.
+/// other error stops the store, unless the database is away: then it is called again.
 pub(crate) trait OnCommit: Send + Sync + std::fmt::Debug {
     /// The store is open: everything in it is new.
     fn opened<'c>(&'c self, conn: &'c mut Conn) -> BoxFuture<'c, Result<(), StoreError>>;

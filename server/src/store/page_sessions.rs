@@ -75,13 +75,16 @@ mod tests {
     use super::*;
     use crate::{config::Config, publication::Catalogue};
 
+    crate::store::tests::cluster::on_each_store! {
+        ended_sessions_go_and_the_oldest_make_room,
+    }
+
     fn row(number: u32, ends_ms: i64) -> PageSessionRow {
         let mut sha256 = [0; 32];
         sha256[..4].copy_from_slice(&number.to_be_bytes());
         PageSessionRow { sha256, token: TokenId::Local, ends_ms }
     }
 
-    #[tokio::test]
     async fn ended_sessions_go_and_the_oldest_make_room() {
         let data = tempfile::tempdir().unwrap();
         let config = Config { data: data.path().to_owned(), ..Config::default() };

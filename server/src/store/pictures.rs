@@ -32,8 +32,9 @@ statements! {
                JOIN maps m ON m.id = g.map_id \
                UNION ALL SELECT m.name, 'underlay of map ' || m.name FROM damaged_pictures d \
                JOIN underlays u ON u.image_sha256 = d.sha256 JOIN maps m ON m.id = u.map_id) \
-               SELECT (SELECT count(*) FROM shown), (SELECT json_group_array(what) FROM (SELECT what FROM shown \
-               WHERE $2 IS NULL OR map IN (SELECT value FROM json_each($2)) ORDER BY what LIMIT $1))";
+               SELECT a.places, n.what FROM (SELECT count(*) AS places FROM shown) a LEFT JOIN (SELECT what FROM shown \
+               WHERE CAST($2 AS TEXT) IS NULL OR map IN (SELECT value FROM json_each($2)) ORDER BY what LIMIT $1) n \
+               ON true ORDER BY n.what";
 }
 
 /// SHA-256 of a picture.
@@ -136,10 +137,10 @@ pub(crate) async fn damaged(
 ) -> Result<(u64, Vec<String>), StoreError> {
     let at = || StoreError::during("list damaged pictures");
     let maps = maps.map(|maps| serde_json::json!(maps).to_string());
-    let row = db::query(DAMAGED).bind(MAX_NAMED).bind(maps).fetch_one(db).await.map_err(at())?;
-    let (count, named): (i64, String) = (row.try_get(0).map_err(at())?, row.try_get(1).map_err(at())?);
-    let named = serde_json::from_str(&named).map_err(|e| at()(db::Error::Decode(e.into())))?;
-    Ok((count.unsigned_abs(), named))
+    let rows = db::query_as::<(i64, Option<String>)>(DAMAGED).bind(MAX_NAMED).bind(maps);
+    let rows = rows.fetch_all(db).await.map_err(at())?;
+    let count = rows.first().map_or(0, |(places, _)| places.unsigned_abs());
+    Ok((count, rows.into_iter().filter_map(|(_, what)| what).collect()))
 }
 
 /// Digest of the first picture after `after`, in the order of digests.

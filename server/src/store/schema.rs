@@ -22,7 +22,7 @@ pub(super) async fn schema(conn: &mut Conn) -> Result<i64, StoreError> {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+mod tests {
     use super::*;
     use crate::store::open;
     use std::{
@@ -31,19 +31,13 @@ pub(super) mod tests {
         path::Path,
     };
 
-    /// A statement without comments, one blank between words.
-    pub(in crate::store) fn on_one_line(sql: &str) -> String {
-        let lines = sql.lines().map(|line| line.split("--").next().unwrap_or_default());
-        lines.flat_map(str::split_whitespace).collect::<Vec<_>>().join(" ")
-    }
-
     /// The checksum of every applied file, then every table, index and trigger on a line.
     async fn dump(conn: &mut Conn) -> String {
         let objects = "SELECT printf('file %04d %s %s', version, description, lower(hex(checksum))) FROM _sqlx_migrations \
                        UNION ALL SELECT type || ' ' || name || ' ' || sql FROM sqlite_schema \
                        WHERE sql IS NOT NULL AND name NOT GLOB 'sqlite_*' AND name <> '_sqlx_migrations' ORDER BY 1";
         let objects: Vec<String> = db::query_scalar(objects).fetch_all(conn).await.unwrap();
-        objects.iter().map(|sql| on_one_line(sql) + "\n").collect()
+        objects.iter().map(|sql| crate::store::postgres::schema::on_one_line(sql) + "\n").collect()
     }
 
     #[tokio::test]

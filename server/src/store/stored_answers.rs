@@ -36,20 +36,20 @@ statements! {
     ICON = "SELECT icon_side, icon FROM stored_answer_icons WHERE answer_id = $1 AND quad = $2";
     LIST = "SELECT a.id, m.name AS map, a.robot, a.camera, a.stored_ms, a.status, a.has_pose, a.refusal, a.landmarks, \
             a.candidates FROM stored_answers a JOIN maps m ON m.id = a.map_id WHERE a.id < $9 \
-            AND ($1 IS NULL OR m.name IN (SELECT value FROM json_each($1))) AND ($2 IS NULL OR a.robot = $2) \
-            AND ($3 IS NULL OR a.camera = $3) AND ($4 IS NULL OR a.status = $4) AND ($5 IS NULL OR a.refusal = $5) \
-            AND ($6 IS NULL OR $6 IN (SELECT value FROM json_each(a.landmarks)) \
+            AND (CAST($1 AS TEXT) IS NULL OR m.name IN (SELECT value FROM json_each($1))) AND (CAST($2 AS TEXT) IS NULL OR a.robot = $2) \
+            AND (CAST($3 AS TEXT) IS NULL OR a.camera = $3) AND (CAST($4 AS TEXT) IS NULL OR a.status = $4) AND (CAST($5 AS TEXT) IS NULL OR a.refusal = $5) \
+            AND (CAST($6 AS TEXT) IS NULL OR $6 IN (SELECT value FROM json_each(a.landmarks)) \
                  OR $6 IN (SELECT value FROM json_each(a.candidates))) \
-            AND ($7 IS NULL OR a.stored_ms >= $7) AND ($8 IS NULL OR a.stored_ms < $8) ORDER BY a.id DESC LIMIT $10";
+            AND (CAST($7 AS BIGINT) IS NULL OR a.stored_ms >= $7) AND (CAST($8 AS BIGINT) IS NULL OR a.stored_ms < $8) ORDER BY a.id DESC LIMIT $10";
     ABOUT = "SELECT a.answer FROM stored_answers a JOIN maps m ON m.id = a.map_id WHERE m.name = $1 \
              AND ($2 IN (SELECT value FROM json_each(a.landmarks)) OR $2 IN (SELECT value FROM json_each(a.candidates))) \
              ORDER BY a.id DESC LIMIT $3";
     COUNT = "SELECT count(*) FROM stored_answers a JOIN maps m ON m.id = a.map_id \
-             WHERE ($1 IS NULL OR m.name IN (SELECT value FROM json_each($1))) AND ($2 IS NULL OR a.robot = $2) \
-             AND ($3 IS NULL OR a.camera = $3) AND ($4 IS NULL OR a.status = $4) AND ($5 IS NULL OR a.refusal = $5) \
-             AND ($6 IS NULL OR $6 IN (SELECT value FROM json_each(a.landmarks)) \
+             WHERE (CAST($1 AS TEXT) IS NULL OR m.name IN (SELECT value FROM json_each($1))) AND (CAST($2 AS TEXT) IS NULL OR a.robot = $2) \
+             AND (CAST($3 AS TEXT) IS NULL OR a.camera = $3) AND (CAST($4 AS TEXT) IS NULL OR a.status = $4) AND (CAST($5 AS TEXT) IS NULL OR a.refusal = $5) \
+             AND (CAST($6 AS TEXT) IS NULL OR $6 IN (SELECT value FROM json_each(a.landmarks)) \
                   OR $6 IN (SELECT value FROM json_each(a.candidates))) \
-             AND ($7 IS NULL OR a.stored_ms >= $7) AND ($8 IS NULL OR a.stored_ms < $8)";
+             AND (CAST($7 AS BIGINT) IS NULL OR a.stored_ms >= $7) AND (CAST($8 AS BIGINT) IS NULL OR a.stored_ms < $8)";
 }
 
 /// Largest message that is stored, bytes; a larger answer is left out.

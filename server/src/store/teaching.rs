@@ -278,6 +278,12 @@ mod tests {
     };
     use vision::recognise::DistanceKind;
 
+    crate::store::tests::cluster::on_each_store! {
+        a_view_is_written_only_on_what_it_was_prepared_from,
+        an_accepted_track_is_placed_as_its_views_place_it,
+        a_panic_of_the_computation_ends_nothing,
+    }
+
     async fn store(dir: &std::path::Path) -> (Catalogue, crate::publication::CatalogueTasks) {
         let (store, task) = Catalogue::open(&config(dir)).await.unwrap();
         store.write(|tx| Box::pin(maps::create(tx, "a", DistanceKind::Both, 2))).await.unwrap();
@@ -314,7 +320,6 @@ mod tests {
         }
     }
 
-    #[tokio::test]
     async fn a_view_is_written_only_on_what_it_was_prepared_from() {
         let dir = tempfile::tempdir().unwrap();
         let (store, _task) = store(dir.path()).await;
@@ -341,7 +346,6 @@ mod tests {
         assert!(!refused(&store, 2, beside).await);
     }
 
-    #[tokio::test]
     async fn an_accepted_track_is_placed_as_its_views_place_it() {
         let dir = tempfile::tempdir().unwrap();
         let (store, _task) = store(dir.path()).await;
@@ -361,7 +365,6 @@ mod tests {
         assert_eq!(again, PlacementOutcome::Placed(Box::new(row.geometry), 3));
     }
 
-    #[tokio::test]
     async fn a_panic_of_the_computation_ends_nothing() {
         let dir = tempfile::tempdir().unwrap();
         let (store, _task) = store(dir.path()).await;

@@ -150,6 +150,11 @@ mod tests {
     };
     use vision::recognise::DistanceKind;
 
+    crate::store::tests::cluster::on_each_store! {
+        a_token_is_not_for_a_later_map_of_the_same_name,
+        ended_tokens_make_room_and_those_in_use_do_not,
+    }
+
     fn new(name: &str, maps: Option<Vec<String>>, expires_ms: Option<i64>) -> TokenInsert {
         TokenInsert { name: name.to_owned(), role: Role::Viewer, maps, sha256: [7; 32], expires_ms }
     }
@@ -159,7 +164,6 @@ mod tests {
         Catalogue::open(&config).await.unwrap()
     }
 
-    #[tokio::test]
     async fn a_token_is_not_for_a_later_map_of_the_same_name() {
         let data = tempfile::tempdir().unwrap();
         let (store, _tasks) = catalogue(data.path()).await;
@@ -180,7 +184,6 @@ mod tests {
         assert!(matches!(refused, Err(StoreError::NotFound { what: Kind::Map, .. })), "{refused:?}");
     }
 
-    #[tokio::test]
     async fn ended_tokens_make_room_and_those_in_use_do_not() {
         let data = tempfile::tempdir().unwrap();
         let (store, _tasks) = catalogue(data.path()).await;

@@ -296,6 +296,10 @@ pub(crate) mod tests {
     use crate::publication::Catalogue;
     use crate::store::{gatherings::NewGathering, robots, views::NewView};
 
+    crate::store::tests::cluster::on_each_store! {
+        a_decision_is_written_only_on_what_it_was_prepared_from,
+    }
+
     /// A gathering with one track of these views.
     pub(crate) async fn gathered(
         store: &Catalogue,
@@ -337,7 +341,6 @@ pub(crate) mod tests {
         }
     }
 
-    #[tokio::test]
     async fn a_decision_is_written_only_on_what_it_was_prepared_from() {
         use crate::store::landmark_placement::tests::seen_from;
         let dir = tempfile::tempdir().unwrap();

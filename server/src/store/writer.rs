@@ -14,13 +14,14 @@
 use super::{
     actor::Actor,
     audit,
-    db::{self, Conn},
+    db::Conn,
     error::StoreError,
     history::{self, Author, HistoryLimits},
     kept_answers::IdempotencyRecord,
     note_head,
     on_commit::{CommittedChange, OnCommit},
     sqlite::checkpoint::{empty_log, move_long_log},
+    transactions::Transactions,
 };
 use engine::{
     heartbeats::Heartbeat,
@@ -187,6 +188,7 @@ pub(super) struct Writer {
     heart: Arc<Heartbeat>,
     /// Pages of the log from which on it is moved into the file.
     log_pages: i64,
+    transactions: Transactions,
 }
 
 /// Steps of the database's machine between two beats: a beat costs a thousandth of them.
@@ -204,10 +206,10 @@ impl Writer {
         commands: mpsc::Receiver<Command>,
         history: HistoryLimits,
         (on_commit, vitals, jobs, commits): (Arc<dyn OnCommit>, Arc<Vitals>, Arc<Notify>, Arc<AtomicU64>),
-        (heart, log_pages): (Arc<Heartbeat>, i64),
+        (heart, log_pages, transactions): (Arc<Heartbeat>, i64, Transactions),
     ) -> Self {
         let tx = Tx { conn, author: Author::default(), history, changes: Vec::new(), after: Vec::new() };
-        Self { tx, commands, on_commit, vitals, jobs, commits, heart, log_pages }
+        Self { tx, commands, on_commit, vitals, jobs, commits, heart, log_pages, transactions }
     }
 
     /// Runs until told to close and what is queued is done, or until an error after which nothing
@@ -240,13 +242,29 @@ impl Writer {
         if let Err(error) = note_head(&mut self.tx.conn, "stop").await {
             tracing::warn!(%error, "audit_head_not_read");
         }
-        let emptied = empty_log(self.tx.conn.sqlite()).await.map_err(|error| error.to_string());
+        let emptied = match self.tx.conn.sqlite() {
+            Ok(conn) => empty_log(conn).await.map_err(|error| error.to_string()),
+            // PostgreSQL keeps its log itself.
+            Err(_) => Ok(true),
+        };
         if let Err(error) = emptied.and_then(|is_empty| is_empty.then_some(()).ok_or(READ.to_owned())) {
             tracing::warn!(%error, follows = "the write-ahead log holds data: copy it with the file", "checkpoint_failed");
         }
         if let Err(error) = self.tx.conn.close().await {
             tracing::warn!(%error, "store_close_failed");
         }
+    }
+
+    /// Begins a transaction in which nothing was done.
+    async fn begin(&mut self) -> Result<(), StoreError> {
+        self.tx.changes.clear();
+        self.tx.after.clear();
+        if self.tx.conn.is_postgres() {
+            // Who waits for another program is not stuck: a statement has a time limit. The next
+            // probe ends the rest.
+            self.heart.rest();
+        }
+        self.transactions.begin(&mut self.tx.conn).await
     }
 
     async fn one(&mut self, command: Command) -> Result<(), StoreError> {
@@ -263,9 +281,7 @@ impl Writer {
             tracing::debug!("write_skipped: its caller has gone");
             return Ok(());
         }
-        self.tx.changes.clear();
-        self.tx.after.clear();
-        let begun = self.execute("BEGIN IMMEDIATE", "begin").await;
+        let begun = self.begin().await;
         let outcome = run(&mut self.tx, begun).await;
         if let Some(cause) = &outcome.panic {
             let follows = "it is rolled back; other writes go on";
@@ -274,7 +290,7 @@ impl Writer {
         if !outcome.keep {
             // After some errors (a full disk) SQLite has already rolled back, and this returns an
             // error.
-            let rolled_back = self.execute("ROLLBACK", "roll back").await;
+            let rolled_back = self.transactions.roll_back(&mut self.tx.conn).await;
             (outcome.acknowledge)(Ok(()));
             return match rolled_back {
                 Err(error) if error.is_fatal() || outcome.fatal => Err(error),
@@ -282,11 +298,12 @@ impl Writer {
                 _ => Ok(()),
             };
         }
-        match self.execute("COMMIT", "commit").await {
+        match self.transactions.commit(&mut self.tx.conn).await {
             Ok(()) => {}
-            Err(StoreError::Full) => {
-                let rolled_back = self.execute("ROLLBACK", "roll back").await;
-                (outcome.acknowledge)(Err(StoreError::Full));
+            // Nothing was changed. PostgreSQL repairs itself.
+            Err(error) if matches!(error, StoreError::Full) || self.tx.conn.is_postgres() => {
+                let rolled_back = self.transactions.roll_back(&mut self.tx.conn).await;
+                (outcome.acknowledge)(Err(error));
                 return match rolled_back {
                     Err(error) if error.is_fatal() => Err(error),
                     _ => Ok(()),
@@ -321,7 +338,8 @@ impl Writer {
     /// here, too: the log would grow without an end, and the sync that has failed cannot be
     /// repeated.
     async fn move_log(&mut self) -> Result<(), StoreError> {
-        match move_long_log(self.tx.conn.sqlite(), self.log_pages).await {
+        let Ok(conn) = self.tx.conn.sqlite() else { return Ok(()) };
+        match move_long_log(conn, self.log_pages).await {
             Err(error) if error.is_fatal() => Err(error),
             Err(error) => {
                 tracing::warn!(%error, follows = "the log grows; the next commit tries again", "log_not_moved");
@@ -339,24 +357,27 @@ impl Writer {
                 self.jobs.notify_one();
                 continue;
             }
-            match self.on_commit.committed(&mut self.tx.conn, change).await {
+            let mut made = self.on_commit.committed(&mut self.tx.conn, change.clone()).await;
+            while let Err(lost) = &made
+                && self.transactions.reached_again(&mut self.tx.conn, lost).await
+            {
+                made = self.on_commit.committed(&mut self.tx.conn, change.clone()).await;
+            }
+            match made {
                 Err(error @ StoreError::NotPublished { .. }) => done = Err(error),
                 other => other?,
             }
         }
         done
     }
-
-    async fn execute(&mut self, sql: &'static str, operation: &'static str) -> Result<(), StoreError> {
-        db::raw_sql(sql).execute(&mut self.tx.conn).await.map_err(StoreError::during(operation))?;
-        Ok(())
-    }
 }
 
 /// Has a long statement beat: it is at work, and not stuck.
 async fn beat_with(conn: &mut Conn, heart: &Arc<Heartbeat>) -> Result<(), StoreError> {
     let heart = heart.clone();
-    let mut handle = conn.sqlite().lock_handle().await.map_err(StoreError::during("watch"))?;
+    // With PostgreSQL it rests meanwhile.
+    let Ok(conn) = conn.sqlite() else { return Ok(()) };
+    let mut handle = conn.lock_handle().await.map_err(StoreError::during("watch"))?;
     handle.set_progress_handler(STEPS_A_BEAT, move || {
         heart.beat();
         true

@@ -6,6 +6,14 @@ use crate::{
 };
 use vision::recognise::DistanceKind;
 
+crate::store::tests::cluster::on_each_store! {
+    every_change_has_an_entry_and_what_changes_nothing_has_none,
+    whatever_is_changed_in_the_file_breaks_the_chain,
+    a_noted_head_finds_what_the_chain_alone_cannot,
+    the_oldest_are_forgotten_and_the_chain_goes_on,
+    the_database_refuses_to_change_or_remove_entries,
+}
+
 async fn catalogue(data: &std::path::Path, audit_entries: usize) -> (Catalogue, CatalogueTasks) {
     let limits = Limits { audit_entries, ..Limits::default() };
     let config = Config { data: data.to_owned(), limits, ..Config::default() };
@@ -48,7 +56,6 @@ async fn tamper(store: &Catalogue, sql: &'static str) {
     write.await.unwrap();
 }
 
-#[tokio::test]
 async fn every_change_has_an_entry_and_what_changes_nothing_has_none() {
     let data = tempfile::tempdir().unwrap();
     let (store, _tasks) = catalogue(data.path(), 100).await;
@@ -82,7 +89,6 @@ async fn every_change_has_an_entry_and_what_changes_nothing_has_none() {
     }
 }
 
-#[tokio::test]
 async fn whatever_is_changed_in_the_file_breaks_the_chain() {
     let changes = [
         ("UPDATE audit SET time_ms = time_ms + 1 WHERE seq = 2", "entry 2 is not as it was written"),
@@ -115,7 +121,6 @@ async fn whatever_is_changed_in_the_file_breaks_the_chain() {
     }
 }
 
-#[tokio::test]
 async fn a_noted_head_finds_what_the_chain_alone_cannot() {
     let data = tempfile::tempdir().unwrap();
     let (store, _tasks) = catalogue(data.path(), 100).await;
@@ -133,7 +138,6 @@ async fn a_noted_head_finds_what_the_chain_alone_cannot() {
     assert_eq!(found.fault.as_deref(), Some("entry 2 has another digest than was noted"));
 }
 
-#[tokio::test]
 async fn the_oldest_are_forgotten_and_the_chain_goes_on() {
     let data = tempfile::tempdir().unwrap();
     let first;
@@ -157,7 +161,6 @@ async fn the_oldest_are_forgotten_and_the_chain_goes_on() {
     assert_eq!((found.entries, found.forgotten, found.fault), (2, 5, None));
 }
 
-#[tokio::test]
 async fn the_database_refuses_to_change_or_remove_entries() {
     let data = tempfile::tempdir().unwrap();
     let (store, _tasks) = catalogue(data.path(), 100).await;

@@ -16,6 +16,7 @@ use crate::{
         models::{self, NewModel},
         pictures::digest,
         teaching::{self, Teaching},
+        tests::rows::{columns, exact},
         underlays, visibility_settings, walls,
     },
 };
@@ -36,6 +37,12 @@ use vision::{
     pose::LandmarkSize,
     recognise::DistanceKind,
 };
+
+crate::store::tests::cluster::on_each_store! {
+    a_copy_has_every_column_of_the_map,
+    models_of_a_copy_carry_its_numbers_and_are_used,
+    a_copy_keeps_the_bounds_of_maps_and_the_pictures_of_a_deleted_one,
+}
 
 /// Tables of a map, with what says whose row it is.
 const TABLES: [(&str, &str); 8] = [
@@ -161,11 +168,6 @@ pub(crate) async fn filled(store: &Catalogue) {
     teaching::add(store, teaching).await.unwrap();
 }
 
-async fn columns(store: &Catalogue, table: &str) -> Vec<(String, Option<String>)> {
-    let sql = "SELECT name, dflt_value FROM pragma_table_info($1) ORDER BY cid";
-    db::query_as(sql).bind(table).fetch_all(store.reads()).await.unwrap()
-}
-
 /// The rows of a table that belong to a map, as text, to the last bit; without these columns.
 pub(crate) async fn rows(
     store: &Catalogue,
@@ -173,17 +175,15 @@ pub(crate) async fn rows(
     map: i64,
     without: &[&str],
 ) -> Vec<String> {
-    let columns = columns(store, table).await.into_iter().map(|(name, _)| name);
-    let exact = columns.filter(|c| !without.contains(&c.as_str())).map(|c| {
-        format!("'{c}=' || CASE typeof({c}) WHEN 'real' THEN printf('%!.20g', {c}) ELSE quote({c}) END")
-    });
+    let columns: Vec<_> = columns(store.reads(), table).await.into_iter().map(|(name, _)| name).collect();
+    let shown = columns.iter().filter(|c| !without.contains(&c.as_str()));
+    let exact = shown.map(|c| format!("'{c}=' || {}", exact(store.reads(), c)));
     let exact = exact.collect::<Vec<_>>().join(" || ',' || ");
-    let sql = format!("SELECT {exact} FROM {table} WHERE {of} ORDER BY rowid");
-    let sql = if table == "laser_segments" { sql.replace("rowid", "ordinal") } else { sql };
+    let order = if table == "laser_segments" { "ordinal" } else { columns[0].as_str() };
+    let sql = format!("SELECT {exact} FROM {table} WHERE {of} ORDER BY {order}");
     db::query_scalar(db::AssertSqlSafe(sql)).bind(map).fetch_all(store.reads()).await.unwrap()
 }
 
-#[tokio::test]
 async fn a_copy_has_every_column_of_the_map() {
     let dir = tempfile::tempdir().unwrap();
     let (store, _task) = Catalogue::open(&config(dir.path())).await.unwrap();
@@ -196,7 +196,7 @@ async fn a_copy_has_every_column_of_the_map() {
         let source = rows(&store, (table, of), a, &without).await;
         assert!(!source.is_empty(), "{table} is filled");
         assert_eq!(rows(&store, (table, of), b, &without).await, source, "{table}");
-        for (column, default) in columns(&store, table).await {
+        for (column, default) in columns(store.reads(), table).await {
             let empty = format!("{column}={}", default.unwrap_or_else(|| "NULL".into()));
             let is_empty = |row: &String| row.split(',').any(|part| part == empty);
             let is_unfilled = source.iter().all(is_empty);
@@ -211,7 +211,6 @@ async fn a_copy_has_every_column_of_the_map() {
     assert_eq!(history, 1, "a copy is one commit");
 }
 
-#[tokio::test]
 async fn models_of_a_copy_carry_its_numbers_and_are_used() {
     let dir = tempfile::tempdir().unwrap();
     let (store, _task) = Catalogue::open(&config(dir.path())).await.unwrap();
@@ -237,7 +236,6 @@ async fn models_of_a_copy_carry_its_numbers_and_are_used() {
     assert_eq!(other["id"], numbers[&LandmarkId(1)].0);
 }
 
-#[tokio::test]
 async fn a_copy_keeps_the_bounds_of_maps_and_the_pictures_of_a_deleted_one() {
     let dir = tempfile::tempdir().unwrap();
     let (store, _task) = Catalogue::open(&config(dir.path())).await.unwrap();

@@ -2,11 +2,17 @@
 
 use super::{
     Error, Executor, Row, Target,
+    errors::{answered, of_postgres},
     row::{FromRow, Get},
     value::{Bind, Value},
 };
 use futures::{StreamExt as _, TryStreamExt as _, stream::BoxStream};
-use sqlx::{SqlSafeStr, SqlStr, Sqlite, sqlite::SqliteArguments};
+use sqlx::{Postgres, SqlSafeStr, SqlStr, Sqlite, postgres::PgArguments, sqlite::SqliteArguments};
+
+/// Whether the rows that a statement returns are rows that it has changed.
+fn changes(sql: &SqlStr) -> bool {
+    !["SELECT", "WITH"].iter().any(|verb| sql.as_str().trim_start().starts_with(verb))
+}
 
 /// A statement. It is prepared once for each connection.
 pub(crate) struct Query {
@@ -59,11 +65,17 @@ pub(crate) struct RawSql(SqlStr);
 impl RawSql {
     pub(crate) async fn execute<'c>(self, on: impl Executor<'c>) -> Result<Done, Error> {
         let raw = sqlx::raw_sql(self.0);
-        let done = match on.target() {
-            Target::SqliteConn(conn) => raw.execute(conn).await,
-            Target::SqlitePool(pool) => raw.execute(pool).await,
+        let rows = match on.target() {
+            Target::SqliteConn(conn) => raw.execute(conn).await?.rows_affected(),
+            Target::SqlitePool(pool) => raw.execute(pool).await?.rows_affected(),
+            Target::PostgresConn(conn, changed) => {
+                let rows = answered(raw.execute(conn)).await?.rows_affected();
+                *changed += rows;
+                rows
+            }
+            Target::PostgresPool(pool) => answered(raw.execute(pool)).await?.rows_affected(),
         };
-        done.map(|done| Done { rows: done.rows_affected() })
+        Ok(Done { rows })
     }
 }
 
@@ -78,12 +90,23 @@ impl Query {
         self.values.into_iter().fold(sqlx::query(self.sql), |query, value| value.bind_sqlite(query))
     }
 
+    fn postgres(self) -> sqlx::query::Query<'static, Postgres, PgArguments> {
+        self.values.into_iter().fold(sqlx::query(self.sql), |query, value| value.bind_postgres(query))
+    }
+
     pub(crate) async fn execute<'c>(self, on: impl Executor<'c>) -> Result<Done, Error> {
-        let done = match on.target() {
-            Target::SqliteConn(conn) => self.sqlite().execute(conn).await,
-            Target::SqlitePool(pool) => self.sqlite().execute(pool).await,
+        let changes = changes(&self.sql);
+        let rows = match on.target() {
+            Target::SqliteConn(conn) => self.sqlite().execute(conn).await?.rows_affected(),
+            Target::SqlitePool(pool) => self.sqlite().execute(pool).await?.rows_affected(),
+            Target::PostgresConn(conn, changed) => {
+                let rows = answered(self.postgres().execute(conn)).await?.rows_affected();
+                *changed += if changes { rows } else { 0 };
+                rows
+            }
+            Target::PostgresPool(pool) => answered(self.postgres().execute(pool)).await?.rows_affected(),
         };
-        done.map(|done| Done { rows: done.rows_affected() })
+        Ok(Done { rows })
     }
 
     /// The first row. Errors: there is none.
@@ -93,21 +116,48 @@ impl Query {
 
     /// The first row, if there is one.
     pub(crate) async fn fetch_optional<'c>(self, on: impl Executor<'c>) -> Result<Option<Row>, Error> {
+        let changes = changes(&self.sql);
         match on.target() {
             Target::SqliteConn(conn) => Ok(self.sqlite().fetch_optional(conn).await?.map(Row::Sqlite)),
             Target::SqlitePool(pool) => Ok(self.sqlite().fetch_optional(pool).await?.map(Row::Sqlite)),
+            Target::PostgresConn(conn, changed) => {
+                let row = answered(self.postgres().fetch_optional(conn)).await?.map(Row::Postgres);
+                *changed += u64::from(changes && row.is_some());
+                Ok(row)
+            }
+            Target::PostgresPool(pool) => {
+                Ok(answered(self.postgres().fetch_optional(pool)).await?.map(Row::Postgres))
+            }
         }
     }
 
     pub(crate) async fn fetch_all<'c>(self, on: impl Executor<'c>) -> Result<Vec<Row>, Error> {
-        self.fetch(on).try_collect().await
+        match on.target() {
+            target @ (Target::SqliteConn(_) | Target::SqlitePool(_)) => self.rows(target).try_collect().await,
+            target => answered(self.rows(target).try_collect()).await,
+        }
     }
 
     /// The rows one by one.
     pub(crate) fn fetch<'c>(self, on: impl Executor<'c>) -> BoxStream<'c, Result<Row, Error>> {
-        match on.target() {
+        self.rows(on.target())
+    }
+
+    fn rows(self, target: Target<'_>) -> BoxStream<'_, Result<Row, Error>> {
+        let changes = changes(&self.sql);
+        match target {
             Target::SqliteConn(conn) => self.sqlite().fetch(conn).map_ok(Row::Sqlite).boxed(),
             Target::SqlitePool(pool) => self.sqlite().fetch(pool).map_ok(Row::Sqlite).boxed(),
+            Target::PostgresConn(conn, changed) => {
+                let counted = move |row| {
+                    *changed += u64::from(changes);
+                    Row::Postgres(row)
+                };
+                self.postgres().fetch(conn).map_ok(counted).map_err(of_postgres).boxed()
+            }
+            Target::PostgresPool(pool) => {
+                self.postgres().fetch(pool).map_ok(Row::Postgres).map_err(of_postgres).boxed()
+            }
         }
     }
 }

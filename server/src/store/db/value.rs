@@ -1,6 +1,6 @@
 //! What is bound to a parameter: of the four types that every engine stores, or absent.
 
-use sqlx::{Sqlite, query::Query, sqlite::SqliteArguments};
+use sqlx::{Postgres, Sqlite, postgres::PgArguments, query::Query, sqlite::SqliteArguments};
 
 /// A value with its type, which an absent one has, too.
 #[derive(Debug, Clone)]
@@ -11,18 +11,25 @@ pub(crate) enum Value {
     Bytes(Option<Vec<u8>>),
 }
 
-impl Value {
-    pub(super) fn bind_sqlite(
-        self,
-        query: Query<'static, Sqlite, SqliteArguments>,
-    ) -> Query<'static, Sqlite, SqliteArguments> {
-        match self {
-            Self::Int(value) => query.bind(value),
-            Self::Real(value) => query.bind(value),
-            Self::Text(value) => query.bind(value),
-            Self::Bytes(value) => query.bind(value),
+macro_rules! bind_to {
+    ($name:ident, $engine:ty, $arguments:ty) => {
+        pub(super) fn $name(
+            self,
+            query: Query<'static, $engine, $arguments>,
+        ) -> Query<'static, $engine, $arguments> {
+            match self {
+                Self::Int(value) => query.bind(value),
+                Self::Real(value) => query.bind(value),
+                Self::Text(value) => query.bind(value),
+                Self::Bytes(value) => query.bind(value),
+            }
         }
-    }
+    };
+}
+
+impl Value {
+    bind_to!(bind_sqlite, Sqlite, SqliteArguments);
+    bind_to!(bind_postgres, Postgres, PgArguments);
 }
 
 /// A type that can be bound.
@@ -46,7 +53,8 @@ bind! {
     u16 => Int, i64::from;
     u32 => Int, i64::from;
     bool => Int, i64::from;
-    f64 => Real, |number| number;
+    // SQLite stores no negative zero.
+    f64 => Real, |number| number + 0.0;
     &str => Text, str::to_owned;
     String => Text, |text| text;
     &[u8] => Bytes, <[u8]>::to_vec;

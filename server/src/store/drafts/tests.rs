@@ -17,6 +17,17 @@ use crate::{
 };
 use vision::pose::LandmarkSize;
 
+crate::store::tests::cluster::on_each_store! {
+    a_published_draft_changes_what_it_has_changed_by_one_commit_that_can_be_gone_back_from,
+    what_a_draft_has_not_changed_stays_byte_for_byte,
+    what_both_have_changed_is_named_and_nothing_is_published,
+    a_removed_view_and_landmark_are_removed_and_one_that_the_map_has_taught_is_in_conflict,
+    what_was_compared_before_another_change_is_not_published,
+    a_publication_keeps_the_bounds_of_a_map,
+    a_finding_ends_with_the_geometry_that_it_is_about,
+    robots_and_limits_leave_drafts_alone,
+}
+
 /// Tables of a map with all their columns but those that count changes.
 const TABLES: [(&str, &str); 7] = [
     ("landmarks", "map_id = $1"),
@@ -34,7 +45,7 @@ async fn state(store: &Catalogue) -> BTreeMap<&'static str, Vec<String>> {
     for (table, of) in TABLES.into_iter().chain([("maps", "id = $1")]) {
         all.insert(table, rows(store, (table, of), 1, &counters).await);
     }
-    let bytes = "SELECT quote(c.bytes) FROM models m JOIN model_contents c ON c.sha256 = m.sha256 \
+    let bytes = "SELECT hex(c.bytes) FROM models m JOIN model_contents c ON c.sha256 = m.sha256 \
                  JOIN landmarks l ON l.id = m.landmark_id WHERE l.map_id = 1 ORDER BY m.landmark_id";
     all.insert("bytes", db::query_scalar(bytes).fetch_all(store.reads()).await.unwrap());
     all
@@ -122,7 +133,6 @@ async fn edit(store: &Catalogue, draft: i64) {
     learn(store, draft, of["p1"], 4).await;
 }
 
-#[tokio::test]
 async fn a_published_draft_changes_what_it_has_changed_by_one_commit_that_can_be_gone_back_from() {
     let (_dir, store, _task) = open().await;
     let before = state(&store).await;
@@ -167,7 +177,6 @@ async fn a_published_draft_changes_what_it_has_changed_by_one_commit_that_can_be
     }
 }
 
-#[tokio::test]
 async fn what_a_draft_has_not_changed_stays_byte_for_byte() {
     let (_dir, store, _task) = open().await;
     draft(&store, "d").await;
@@ -190,7 +199,6 @@ async fn what_a_draft_has_not_changed_stays_byte_for_byte() {
     assert_eq!(landmarks::get(store.reads(), "a", "p2").await.unwrap().geometry, sized());
 }
 
-#[tokio::test]
 async fn what_both_have_changed_is_named_and_nothing_is_published() {
     let (_dir, store, _task) = open().await;
     let number = draft(&store, "d").await;
@@ -232,7 +240,6 @@ async fn what_both_have_changed_is_named_and_nothing_is_published() {
     assert_eq!(state(&store).await, before);
 }
 
-#[tokio::test]
 async fn a_removed_view_and_landmark_are_removed_and_one_that_the_map_has_taught_is_in_conflict() {
     let (_dir, store, _task) = open().await;
     draft(&store, "d").await;
@@ -252,7 +259,6 @@ async fn a_removed_view_and_landmark_are_removed_and_one_that_the_map_has_taught
     assert_eq!(conflicts(&store, "e").await, "landmark `p2`");
 }
 
-#[tokio::test]
 async fn what_was_compared_before_another_change_is_not_published() {
     let (_dir, store, _task) = open().await;
     let id = draft(&store, "d").await;
@@ -267,7 +273,6 @@ async fn what_was_compared_before_another_change_is_not_published() {
     assert!(list(store.reads(), 1).await.unwrap().iter().any(|row| row.name == "d"), "the draft is there");
 }
 
-#[tokio::test]
 async fn a_publication_keeps_the_bounds_of_a_map() {
     let (_dir, store, _task) = open().await;
     let id = draft(&store, "d").await;
@@ -279,7 +284,6 @@ async fn a_publication_keeps_the_bounds_of_a_map() {
     assert_eq!(state(&store).await, had, "nothing of it is published");
 }
 
-#[tokio::test]
 async fn a_finding_ends_with_the_geometry_that_it_is_about() {
     let (_dir, store, _task) = open().await;
     let health = async || {
@@ -300,7 +304,6 @@ async fn a_finding_ends_with_the_geometry_that_it_is_about() {
     assert_eq!(health().await, ["p1 sound", "p2 flagged"]);
 }
 
-#[tokio::test]
 async fn robots_and_limits_leave_drafts_alone() {
     let (_dir, store, _task) = open().await;
     let refused = |name: &'static str| store.write(move |tx| Box::pin(robots::put(tx, "r1", name, 9)));

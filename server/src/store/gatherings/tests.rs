@@ -6,6 +6,11 @@ use crate::{
 use map::tracks::StoredTrack;
 use vision::{geometry::Corners, icon::Icon, recognise::DistanceKind};
 
+crate::store::tests::cluster::on_each_store! {
+    every_bound_holds_and_a_refusal_changes_nothing,
+    an_acceptance_is_whole_or_nothing,
+}
+
 const GATHERING_LIMITS: GatheringLimits =
     GatheringLimits { open: 2, of_map: 3, tracks: 2, views: 2, bytes: 40 };
 const ACCEPTANCE_LIMITS: track_acceptance::AcceptanceLimits =
@@ -49,7 +54,6 @@ fn at_bound<T: std::fmt::Debug>(result: &Result<T, StoreError>, what: &str) {
     assert!(matches!(result, Err(StoreError::Limit { what: w, .. }) if w.contains(what)), "{result:?}");
 }
 
-#[tokio::test]
 async fn every_bound_holds_and_a_refusal_changes_nothing() {
     let dir = tempfile::tempdir().unwrap();
     let (store, _task) = store(dir.path()).await;
@@ -100,7 +104,6 @@ async fn accepted(
     track_acceptance::accept(store, decision).await
 }
 
-#[tokio::test]
 async fn an_acceptance_is_whole_or_nothing() {
     let dir = tempfile::tempdir().unwrap();
     let (store, _task) = store(dir.path()).await;

@@ -3,8 +3,11 @@
 //! these tables have.
 
 use super::before;
-use crate::store::db::{self, Conn};
-use crate::store::statements::statements;
+use crate::store::{
+    db::{self, Conn},
+    postgres::schema::COLUMNS as COLUMNS_IN_POSTGRES,
+    statements::statements,
+};
 
 /// A table of rows of a map.
 pub(in crate::store) struct KeptTable {
@@ -82,7 +85,7 @@ pub(in crate::store) const LANDMARKS: KeptTable = KeptTable {
         ("map_id", "$1"),
         // Beyond every revision that it ever had.
         ("revision", "(SELECT max(p.revision) + 1 FROM past_landmarks p WHERE p.id = f.id)"),
-        ("changed_ms", "CAST(unixepoch('subsec') * 1000 AS INTEGER)"),
+        ("changed_ms", "CAST(unixepoch('subsec') * 1000 AS BIGINT)"),
     ],
     revised_by: Some(&[]),
     ..kept!("landmarks", "id", BY_MAP)
@@ -110,7 +113,8 @@ statements! {
 impl KeptTable {
     /// The columns that are kept, without the key.
     pub(in crate::store) async fn columns(&self, conn: &mut Conn) -> Result<Vec<KeptColumn>, db::Error> {
-        let rows = db::query(COLUMNS).bind(self.name).fetch_all(conn).await?;
+        let read = if conn.is_postgres() { COLUMNS_IN_POSTGRES } else { COLUMNS };
+        let rows = db::query(read).bind(self.name).fetch_all(conn).await?;
         let mut columns = Vec::with_capacity(rows.len());
         for row in rows {
             let name: String = row.try_get("name")?;

@@ -2,8 +2,11 @@
 
 use super::*;
 use crate::{
-    config::{Config, RawConfig},
-    publication::{Catalogue, CatalogueTasks, tests::config},
+    config::Config,
+    publication::{
+        Catalogue, CatalogueTasks,
+        tests::{config, raw_config},
+    },
     store::{
         gatherings, jobs,
         landmark_placement::tests::seen_from,
@@ -15,6 +18,7 @@ use crate::{
         pictures::digest,
         robots,
         teaching::{self, Teaching},
+        tests::rows,
         track_acceptance::{
             self,
             tests::{decision, gathered},
@@ -55,8 +59,7 @@ const TABLES: [(&str, &str); 8] = [
 ];
 
 async fn columns(store: &Catalogue, table: &str) -> Vec<String> {
-    let sql = "SELECT name FROM pragma_table_info($1) ORDER BY cid";
-    db::query_scalar(sql).bind(table).fetch_all(store.reads()).await.unwrap()
+    rows::columns(store.reads(), table).await.into_iter().map(|(name, _)| name).collect()
 }
 
 /// All rows of all maps, as text; REAL numbers to the last bit. Without what only counts, and
@@ -69,21 +72,26 @@ async fn state(store: &Catalogue) -> BTreeMap<&'static str, Vec<String>> {
             !["revision", "changed_ms", "version", "walls_version", "underlay_revision"].contains(&c.as_str())
         });
         columns.retain(|c| table != "maps" || c != "name");
-        let exact = columns
-            .iter()
-            .map(|c| format!("CASE typeof({c}) WHEN 'real' THEN printf('%!.20g', {c}) ELSE quote({c}) END"));
+        let exact = columns.iter().map(|column| rows::exact(store.reads(), column));
         let sql = format!("SELECT {} FROM {table} ORDER BY 1", exact.collect::<Vec<_>>().join(" || ',' || "));
         let rows: Vec<String> =
             db::query_scalar(db::AssertSqlSafe(sql)).fetch_all(store.reads()).await.unwrap();
         all.insert(table, rows);
     }
-    let bytes = "SELECT quote(c.bytes) FROM models m JOIN model_contents c ON c.sha256 = m.sha256 ORDER BY m.landmark_id";
+    let bytes = "SELECT hex(c.bytes) FROM models m JOIN model_contents c ON c.sha256 = m.sha256 ORDER BY m.landmark_id";
     all.insert("bytes", db::query_scalar(bytes).fetch_all(store.reads()).await.unwrap());
     all
 }
 
 type Write = Box<dyn for<'t> FnOnce(&'t mut Tx) -> BoxFuture<'t, Result<(), StoreError>> + Send>;
 use crate::store::Tx;
+
+crate::store::tests::cluster::on_each_store! {
+    every_change_is_one_commit_and_every_commit_can_be_gone_back_to,
+    what_robots_do_and_what_changes_nothing_is_no_commit,
+    a_finding_stays_with_the_place_that_it_is_about, a_restored_landmark_has_a_revision_that_it_never_had,
+    a_commit_says_who_and_why,
+}
 
 /// A write of one step, without its result.
 macro_rules! write {
@@ -202,7 +210,6 @@ async fn ids(store: &Catalogue) -> Vec<i64> {
     page(store.reads(), 1, i64::MAX, 99).await.unwrap().iter().map(|commit| commit.id).collect()
 }
 
-#[tokio::test]
 async fn every_change_is_one_commit_and_every_commit_can_be_gone_back_to() {
     let dir = tempfile::tempdir().unwrap();
     let (store, _task) = open(&config(dir.path())).await;
@@ -253,6 +260,7 @@ async fn every_change_is_one_commit_and_every_commit_can_be_gone_back_to() {
     assert_eq!(lost, 0);
 }
 
+// Of SQLite alone: the schema of PostgreSQL is made of its schema.
 #[tokio::test]
 async fn every_column_of_a_map_is_in_its_history() {
     let dir = tempfile::tempdir().unwrap();
@@ -292,7 +300,6 @@ async fn every_column_of_a_map_is_in_its_history() {
     assert_eq!(tables, known, "a new table of maps needs a place in their history");
 }
 
-#[tokio::test]
 async fn what_robots_do_and_what_changes_nothing_is_no_commit() {
     let dir = tempfile::tempdir().unwrap();
     let (store, _task) = open(&config(dir.path())).await;
@@ -317,7 +324,6 @@ async fn what_robots_do_and_what_changes_nothing_is_no_commit() {
     assert!(failing.await.is_err() && newest(store.reads(), 1).await.unwrap() == again);
 }
 
-#[tokio::test]
 async fn a_finding_stays_with_the_place_that_it_is_about() {
     let dir = tempfile::tempdir().unwrap();
     let (store, _task) = open(&config(dir.path())).await;
@@ -335,7 +341,6 @@ async fn a_finding_stays_with_the_place_that_it_is_about() {
     assert_eq!(health(&store).await, LandmarkHealth::Flagged, "another name is no other place");
 }
 
-#[tokio::test]
 async fn a_restored_landmark_has_a_revision_that_it_never_had() {
     let dir = tempfile::tempdir().unwrap();
     let (store, _task) = open(&config(dir.path())).await;
@@ -350,25 +355,6 @@ async fn a_restored_landmark_has_a_revision_that_it_never_had() {
     }
 }
 
-#[tokio::test]
-async fn what_another_program_wrote_is_nobodys_commit() {
-    let dir = tempfile::tempdir().unwrap();
-    let (store, task) = open(&config(dir.path())).await;
-    task.close().await;
-    drop(store);
-    let file = sqlx::sqlite::SqliteConnectOptions::new().filename(dir.path().join(crate::store::open::FILE));
-    let mut foreign = sqlx::ConnectOptions::connect(&file).await.unwrap();
-    sqlx::raw_sql("DELETE FROM landmarks").execute(&mut foreign).await.unwrap();
-    sqlx::Connection::close(foreign).await.unwrap();
-    let (store, _task) = Catalogue::open(&config(dir.path())).await.unwrap();
-    let rows = page(store.reads(), 1, i64::MAX, 9).await.unwrap();
-    assert_eq!((rows.len(), rows[0].author.operation.as_str()), (3, "outside"));
-    let before = rows[1].id;
-    store.write(move |tx| Box::pin(roll_back(tx, "a", before))).await.unwrap();
-    assert!(landmarks::get(store.reads(), "a", "p1").await.is_ok());
-}
-
-#[tokio::test]
 async fn a_commit_says_who_and_why() {
     let dir = tempfile::tempdir().unwrap();
     let (store, _task) = open(&config(dir.path())).await;
@@ -397,4 +383,5 @@ async fn a_commit_says_who_and_why() {
 }
 
 mod bounds;
+mod outside;
 mod undoing;

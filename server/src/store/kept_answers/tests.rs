@@ -3,14 +3,20 @@
 use super::*;
 use crate::{
     config::{Limits, RawConfig},
-    publication::{Catalogue, CatalogueTasks},
+    publication::{Catalogue, CatalogueTasks, tests::raw_config},
     store::maps::{self, MapRow},
 };
 use vision::recognise::DistanceKind;
 
+crate::store::tests::cluster::on_each_store! {
+    an_answer_is_kept_with_its_change_and_only_with_it,
+    a_key_is_at_work_until_its_write_has_ended,
+    the_oldest_answers_go,
+}
+
 async fn store(dir: &std::path::Path) -> (Catalogue, CatalogueTasks) {
     let limits = Limits { kept_answers: 3, ..Limits::default() };
-    let raw = RawConfig { limits, data: dir.to_owned(), ..RawConfig::default() };
+    let raw = RawConfig { limits, ..raw_config(dir) };
     Catalogue::open(&crate::config::Config::try_from(raw).unwrap()).await.unwrap()
 }
 
@@ -35,7 +41,6 @@ async fn kept(store: &Catalogue) -> Vec<String> {
     db::query_scalar("SELECT key FROM kept_answers ORDER BY id").fetch_all(store.reads()).await.unwrap()
 }
 
-#[tokio::test]
 async fn an_answer_is_kept_with_its_change_and_only_with_it() {
     let dir = tempfile::tempdir().unwrap();
     let (store, _task) = store(dir.path()).await;
@@ -52,7 +57,6 @@ async fn an_answer_is_kept_with_its_change_and_only_with_it() {
     assert_eq!(kept(&store).await, ["k1", "k2"]);
 }
 
-#[tokio::test]
 async fn a_key_is_at_work_until_its_write_has_ended() {
     let dir = tempfile::tempdir().unwrap();
     let (store, _task) = store(dir.path()).await;
@@ -80,7 +84,6 @@ async fn a_key_is_at_work_until_its_write_has_ended() {
     assert!(matches!(store.creation("k", [1; 32]).await, Ok(Creation::Repeat(_))));
 }
 
-#[tokio::test]
 async fn the_oldest_answers_go() {
     let dir = tempfile::tempdir().unwrap();
     let (store, _task) = store(dir.path()).await;

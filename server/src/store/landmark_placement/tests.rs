@@ -17,6 +17,11 @@ use vision::{
     recognise::DistanceKind,
 };
 
+crate::store::tests::cluster::on_each_store! {
+    a_taught_landmark_is_placed_on_its_wall_and_a_place_by_hand_stays,
+    a_wall_that_is_known_badly_gives_a_place_that_is_known_badly,
+}
+
 const SIZE: LandmarkSize = LandmarkSize { width_m: 0.6, height_m: 0.84 };
 
 /// On the wall y = 0 of a room above it, 2 m from the origin.
@@ -70,7 +75,6 @@ async fn taught(store: &Catalogue, view: NewView) -> PlacementReport {
     teaching::add(store, teaching).await.unwrap().2.unwrap()
 }
 
-#[tokio::test]
 async fn a_taught_landmark_is_placed_on_its_wall_and_a_place_by_hand_stays() {
     let dir = tempfile::tempdir().unwrap();
     let config = crate::publication::tests::config(dir.path());
@@ -109,7 +113,6 @@ async fn a_taught_landmark_is_placed_on_its_wall_and_a_place_by_hand_stays() {
     assert!((of(&store).unwrap().x_m - 2.5).abs() < 1e-12);
 }
 
-#[tokio::test]
 async fn a_wall_that_is_known_badly_gives_a_place_that_is_known_badly() {
     let dir = tempfile::tempdir().unwrap();
     let config = crate::publication::tests::config(dir.path());

@@ -1,7 +1,10 @@
 use super::*;
 use crate::{
-    config::{Config, RawConfig},
-    publication::{Catalogue, CatalogueTasks, tests::config},
+    config::Config,
+    publication::{
+        Catalogue, CatalogueTasks,
+        tests::{config, raw_config},
+    },
     store::{
         landmark_placement::tests::seen_from,
         landmarks::{self, LandmarkGeometry},
@@ -14,9 +17,14 @@ use crate::{
 use std::path::Path;
 use vision::recognise::DistanceKind;
 
+crate::store::tests::cluster::on_each_store! {
+    a_picture_is_stored_once_and_goes_with_the_last_row_that_refers_to_it,
+    a_damaged_picture_is_named_and_mended_by_the_same_one,
+}
+
 /// Map `a` with landmarks `p1` and `p2`, and the history of one commit.
 async fn store(dir: &Path) -> (Catalogue, CatalogueTasks) {
-    let mut raw = RawConfig { data: dir.to_owned(), ..RawConfig::default() };
+    let mut raw = raw_config(dir);
     raw.limits.kept_commits = 1;
     let (store, task) = Catalogue::open(&Config::try_from(raw).unwrap()).await.unwrap();
     store.write(|tx| Box::pin(maps::create(tx, "a", DistanceKind::Both, 2))).await.unwrap();
@@ -60,7 +68,6 @@ async fn count(store: &Catalogue) -> i64 {
     db::query_scalar("SELECT count(*) FROM pictures").fetch_one(store.reads()).await.unwrap()
 }
 
-#[tokio::test]
 async fn a_picture_is_stored_once_and_goes_with_the_last_row_that_refers_to_it() {
     let dir = tempfile::tempdir().unwrap();
     let (store, _task) = store(dir.path()).await;
@@ -81,16 +88,16 @@ async fn a_picture_is_stored_once_and_goes_with_the_last_row_that_refers_to_it()
     assert_eq!(count(&store).await, 0, "a cascade deletes pictures, too");
 }
 
-#[tokio::test]
 async fn a_damaged_picture_is_named_and_mended_by_the_same_one() {
     let dir = tempfile::tempdir().unwrap();
     let (store, _task) = store(dir.path()).await;
     let (first, other) = (teach(&store, "p1", b"one").await, teach(&store, "p2", b"two").await);
-    let damage = "UPDATE pictures SET bytes = x'00' WHERE bytes = x'6f6e65'";
+    let damage =
+        db::query("UPDATE pictures SET bytes = $1 WHERE bytes = $2").bind(&[0][..]).bind(&b"one"[..]);
     store
         .write(move |tx| {
             Box::pin(async move {
-                db::raw_sql(damage).execute(tx.conn()).await.map_err(StoreError::during("damage")).map(drop)
+                damage.execute(tx.conn()).await.map_err(StoreError::during("damage")).map(drop)
             })
         })
         .await

@@ -149,7 +149,7 @@ pub(crate) async fn contents(conn: &mut Conn) -> Result<Contents, StoreError> {
 async fn rows_digest(conn: &mut Conn, sql: &'static str, map: i64) -> Result<RowsDigest, StoreError> {
     let at = || StoreError::during("read rows for their digest");
     let (mut hash, mut count) = (Sha256::new(), 0);
-    let mut rows = sqlx::query(sql).bind(map).fetch(conn.sqlite());
+    let mut rows = sqlx::query(sql).bind(map).fetch(conn.sqlite().map_err(at())?);
     while let Some(row) = rows.try_next().await.map_err(at())? {
         add_row(&mut hash, &row).map_err(at())?;
         count += 1;

@@ -192,6 +192,9 @@ impl DiskGuard {
 
 /// Bytes of the database that are free inside of it.
 async fn freed(reads: &Pool) -> Result<u64, db::Error> {
+    if !matches!(reads, Pool::Sqlite(_)) {
+        return Ok(0);
+    }
     let sql = "SELECT freelist_count * page_size FROM pragma_freelist_count, pragma_page_size";
     db::query_scalar::<i64>(sql).fetch_one(reads).await.map(|bytes| bytes.max(0) as u64)
 }

@@ -85,8 +85,11 @@ impl LastCheck {
     }
 }
 
-/// Checks the database once. Ends early when the server stops.
+/// Checks the database once, if it is a file. Ends early when the server stops.
 pub(crate) async fn check(store: Store, stopping: watch::Receiver<bool>) {
+    if store.database().is_some() {
+        return;
+    }
     let started = Instant::now();
     let found = faults(&store, stopping.clone()).await;
     if *stopping.borrow() {
@@ -116,7 +119,7 @@ fn cause(error: &StoreError) -> String {
 async fn faults(store: &Store, stopping: watch::Receiver<bool>) -> Result<Vec<String>, StoreError> {
     let at = || StoreError::during("check the database");
     // A connection of its own: requests keep theirs.
-    let mut conn = store.reads().sqlite().acquire().await.map_err(at())?.detach();
+    let mut conn = store.reads().sqlite().map_err(at())?.acquire().await.map_err(at())?.detach();
     let mut since = Instant::now();
     conn.lock_handle().await.map_err(at())?.set_progress_handler(STEPS, move || {
         if since.elapsed() > WORK {
@@ -152,7 +155,8 @@ mod tests {
         let create = catalogue.write(move |tx| Box::pin(landmarks::create(tx, "hall", "poster", none, 9)));
         create.await.unwrap();
         let roots = "SELECT rootpage FROM sqlite_schema WHERE type = 'index' AND tbl_name = 'landmarks'";
-        let roots: Vec<i64> = sqlx::query_scalar(roots).fetch_all(catalogue.reads().sqlite()).await.unwrap();
+        let roots: Vec<i64> =
+            sqlx::query_scalar(roots).fetch_all(catalogue.reads().sqlite().unwrap()).await.unwrap();
         task.close().await;
         let mut bytes = fs::read(data.join(FILE)).unwrap();
         let mut damaged = 0;

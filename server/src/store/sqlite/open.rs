@@ -82,7 +82,7 @@ pub(crate) enum OpenError {
     Migrate(#[source] sqlx::migrate::MigrateError),
     /// Anything else at opening.
     #[error("the database does not open")]
-    Open(#[source] sqlx::Error),
+    Open(#[from] sqlx::Error),
     /// A read-only file system on which the database cannot be read as it is.
     #[error("data directory {path} is on a read-only file system, and {reason}")]
     ReadOnly {
@@ -90,6 +90,9 @@ pub(crate) enum OpenError {
         /// What is missing.
         reason: &'static str,
     },
+    /// A database of PostgreSQL.
+    #[error(transparent)]
+    Postgres(#[from] crate::store::postgres::open::OpenError),
     /// The first reading of the maps.
     #[error("the maps cannot be read")]
     Load(#[source] StoreError),
@@ -165,7 +168,7 @@ async fn prepare(writer: &mut Conn, options: SqliteConnectOptions) -> Result<Poo
     check_version(writer).await?;
     check_pragmas(writer).await?;
     check_integrity(writer).await?;
-    migrations::migrator().run(writer.sqlite()).await.map_err(OpenError::Migrate)?;
+    migrations::migrator().run(writer.sqlite()?).await.map_err(OpenError::Migrate)?;
     derived_schema::complete(writer).await.map_err(OpenError::Open)?;
     history::close_outside(writer).await.map_err(OpenError::Open)?;
     let reads = SqlitePoolOptions::new()
@@ -260,8 +263,7 @@ fn held(file: File, data: &Path) -> Result<File, OpenError> {
 }
 
 async fn check_version(conn: &mut Conn) -> Result<(), OpenError> {
-    let text: String =
-        db::query_scalar("SELECT sqlite_version()").fetch_one(conn).await.map_err(OpenError::Open)?;
+    let text: String = db::query_scalar("SELECT sqlite_version()").fetch_one(conn).await?;
     if version(&text).is_some_and(|v| v >= SQLITE_MIN) { Ok(()) } else { Err(OpenError::Version(text)) }
 }
 
@@ -273,7 +275,7 @@ fn version(text: &str) -> Option<(u32, u32, u32)> {
 async fn check_pragmas(conn: &mut Conn) -> Result<(), OpenError> {
     for (pragma, expected) in PRAGMAS {
         let sql = sqlx::AssertSqlSafe(format!("PRAGMA {pragma}"));
-        let row = sqlx::query(sql).fetch_one(conn.sqlite()).await.map_err(OpenError::Open)?;
+        let row = sqlx::query(sql).fetch_one(conn.sqlite()?).await?;
         // Some pragmas answer with a number, some with a word; SQLite converts either to text.
         let actual: String = row.try_get_unchecked(0).map_err(OpenError::Open)?;
         if actual != expected {
@@ -289,14 +291,12 @@ async fn check_pragmas(conn: &mut Conn) -> Result<(), OpenError> {
 async fn check_integrity(conn: &mut Conn) -> Result<(), OpenError> {
     let tables = "SELECT name FROM sqlite_schema WHERE type = 'table' \
                   AND name NOT IN ('pictures', 'model_contents')";
-    let tables: Vec<String> =
-        db::query_scalar(tables).fetch_all(&mut *conn).await.map_err(OpenError::Open)?;
+    let tables: Vec<String> = db::query_scalar(tables).fetch_all(&mut *conn).await?;
     for table in std::iter::once("sqlite_schema").chain(tables.iter().map(String::as_str)) {
         let said: String = db::query_scalar("SELECT quick_check FROM pragma_quick_check($1)")
             .bind(table)
             .fetch_one(&mut *conn)
-            .await
-            .map_err(OpenError::Open)?;
+            .await?;
         if said != "ok" {
             return Err(OpenError::Damaged(format!("table {table}: {said}")));
         }

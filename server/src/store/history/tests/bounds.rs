@@ -3,13 +3,16 @@
 use super::*;
 use std::path::Path;
 
+crate::store::tests::cluster::on_each_store! {
+    history_is_bounded_by_commits_and_by_bytes,
+}
+
 fn bounded(dir: &Path, commits: usize, bytes: usize) -> Config {
-    let mut raw = RawConfig { data: dir.to_owned(), ..RawConfig::default() };
+    let mut raw = raw_config(dir);
     (raw.limits.kept_commits, raw.limits.history_bytes) = (commits, bytes);
     Config::try_from(raw).unwrap()
 }
 
-#[tokio::test]
 async fn history_is_bounded_by_commits_and_by_bytes() {
     let count = async |store: &Catalogue, table: &str| -> i64 {
         let sql = format!("SELECT count(*) FROM {table}");

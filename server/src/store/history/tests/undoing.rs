@@ -2,7 +2,10 @@
 
 use super::*;
 
-#[tokio::test]
+crate::store::tests::cluster::on_each_store! {
+    one_commit_is_taken_back_unless_a_later_one_changed_the_same,
+}
+
 async fn one_commit_is_taken_back_unless_a_later_one_changed_the_same() {
     let dir = tempfile::tempdir().unwrap();
     let (store, _task) = open(&config(dir.path())).await;
