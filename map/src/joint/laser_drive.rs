@@ -23,7 +23,7 @@ const NEAR_RAD: f64 = 0.06;
 /// ...and this far beyond its ends, metres.
 const BEYOND_M: f64 = 0.3;
 /// So many keyframes see a wall from about the same place, and its unevenness there is one error.
-const SHARED: f64 = 2.0;
+pub(super) const SHARED: f64 = 2.0;
 /// Standard deviation of a motion besides, for one of nothing: metres and radians.
 const STILL: f64 = 1e-4;
 

@@ -5,7 +5,7 @@ use super::{
     build::SurveyProblem,
     closures::weights,
     datum::{Datum, DriveFrame},
-    laser_drive::{DriveSurvey, LaserDrive, Piece},
+    laser_drive::{DriveSurvey, LaserDrive, Piece, SHARED},
     marginals::Marginals,
     params::JointParams,
     problem::JointError,
@@ -25,7 +25,8 @@ use nalgebra::{DMatrix, Matrix2, Matrix3, Matrix6, Point2, SVector};
 
 /// Variables whose covariance is computed at once.
 const AT_ONCE: usize = 32;
-/// 99.9 % of chi2 with 2 degrees of freedom: beyond it a line may be of another wall.
+/// 99.9 % of chi2 with 2 degrees of freedom: beyond it a line alone, whose covariance is not widened,
+/// may be of another wall.
 const LINE_CHI2: f64 = 13.8;
 /// Parameters of a landmark's variable that its place has a covariance of.
 const OF_PLACE: [usize; 6] = [0, 1, 2, 3, 6, 7];
@@ -79,7 +80,7 @@ impl LaserDrive<'_> {
         datum: Datum,
     ) -> Result<JointLaserMap, JointError> {
         let made = self.survey(camera, odometry)?;
-        let params = JointParams { line_doubt_chi2: Some(LINE_CHI2), ..params.clone() };
+        let params = JointParams { line_doubt_chi2: Some(LINE_CHI2 / SHARED), ..params.clone() };
         let solved = opened_from(&made.survey, &params, made.keyframes.clone())?;
         let camera = Marginals::of(&solved.problem, &[Variable::Camera(0)])?.into_covariance();
         let frame = match datum {
