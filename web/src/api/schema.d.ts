@@ -761,6 +761,16 @@ export interface components {
             /** It is used whatever its measured gates say. Without a threshold it is still not. */
             use_despite_gates?: boolean | null;
         };
+        /** An object of a drive that is no landmark. */
+        LeftOutBody: {
+            /** Its centre in the map, metres. */ x_m: number;
+            /** Metres. */ y_m: number;
+            /** Over the floor, metres. */ z_m: number;
+            /** Metres. */ width_m: number;
+            /** Metres. */ height_m: number;
+            /** Number of its views. */ views: number;
+            /** Why it is none. */ reason: string;
+        };
         /** The order of a list: by name, or by the time of the last edit or lesson; `-` reverses it. */
         ListOrder: "name" | "-name" | "changed" | "-changed";
         /** The answer to a frame. */
@@ -870,6 +880,8 @@ export interface components {
             /** Frames that were taken; absent where no landmarks are looked for. */ frames?: number | null;
             /** What of the frames cannot be used: how often, and why. */ frames_refused?: string | null;
             /** Number of landmarks that are proposed, once they are found. */ landmarks?: number | null;
+            /** What hangs there and is no landmark, and why: the 64 with the most views. */
+            left_out?: components["schemas"]["LeftOutBody"][];
             /** The gathering whose tracks these are, once the walls are stored. */ gathering?: number | null;
             /** Way driven, metres. */ distance_m: number;
             pose?: components["schemas"]["Triple"] | null;
@@ -971,8 +983,7 @@ export interface components {
         /** Who makes the map. */
         NewMapping: {
             /** A robot that stands on this map; its scans must come with odometry. */ robot: string;
-            /** Where on the map its first pose is: x, y in metres, heading in radians. The origin, if absent. */
-            origin?: components["schemas"]["Triple"];
+            origin?: components["schemas"]["Triple"] | null;
             /** Look for landmarks, too: its frames, with intrinsics and mounting, are kept until the end, and objects on walls become tracks of a gathering. */
             landmarks?: boolean;
         };

@@ -101,6 +101,7 @@ __all__ = [
     "LandmarkPoint",
     "LandmarkStatus",
     "LearningSettings",
+    "LeftOutBody",
     "LiveAnswer",
     "LiveMapChange",
     "LivePose",
@@ -1501,6 +1502,26 @@ class LearningSettings:
 
 
 @dataclass(frozen=True, slots=True)
+class LeftOutBody:
+    """An object of a drive that is no landmark."""
+
+    x_m: float
+    """Its centre in the map, metres."""
+    y_m: float
+    """Metres."""
+    z_m: float
+    """Over the floor, metres."""
+    width_m: float
+    """Metres."""
+    height_m: float
+    """Metres."""
+    views: int
+    """Number of its views."""
+    reason: str
+    """Why it is none."""
+
+
+@dataclass(frozen=True, slots=True)
 class LiveAnswer:
     """The answer to a frame."""
 
@@ -1698,6 +1719,8 @@ class MappingProgressBody:
     """What of the frames cannot be used: how often, and why."""
     landmarks: int | None = None
     """Number of landmarks that are proposed, once they are found."""
+    left_out: tuple[LeftOutBody, ...] = ()
+    """What hangs there and is no landmark, and why: the 64 with the most views."""
     gathering: int | None = None
     """The gathering whose tracks these are, once the walls are stored."""
     pose: Triple | None = None
@@ -1877,7 +1900,8 @@ class NewMapping:
     robot: str
     """A robot that stands on this map; its scans must come with odometry."""
     origin: Triple | None = None
-    """Where on the map its first pose is: x, y in metres, heading in radians. The origin, if absent."""
+    """Where its first pose is in the frame of the map: x, y in metres, heading in radians. If absent, the drive
+    makes the frame: it begins at the origin, and what a survey finds is known relative to the drive as a whole."""
     landmarks: bool = False
     """Look for landmarks, too: its frames, with intrinsics and mounting, are kept until the end, and objects on
     walls become tracks of a gathering."""
