@@ -151,7 +151,7 @@ fn taken_for(result: &RecognitionResult) -> Option<LandmarkId> {
             let refusal = result.candidates.first()?.refusal?;
             (refusal != MatchRefusal::Margin).then_some(id)
         }
-        _ => None,
+        Verdict::Unknown => None,
     }
 }
 

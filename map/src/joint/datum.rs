@@ -12,6 +12,7 @@ use super::{
     problem::{JointError, JointProblem},
     variables::{State, Variable},
 };
+use crate::pose2::Pose2;
 use nalgebra::{DMatrix, Matrix3, Point2, RowVector3, Vector2, Vector3};
 
 /// What defines the frame of a map.
@@ -43,7 +44,7 @@ impl DriveFrame {
         problem.check()?;
         let keyframes = &problem.state.keyframes;
         let count = keyframes.len().max(1) as f64;
-        let middle: Vector2<f64> = keyframes.iter().map(|k| k.position()).sum();
+        let middle: Vector2<f64> = keyframes.iter().map(Pose2::position).sum();
         let centre = Point2::from(middle / count);
         let squares: f64 = keyframes.iter().map(|k| (k.position() - centre.coords).norm_squared()).sum();
         let (turn, lever) = (squares + count * LEVER_M * LEVER_M, LEVER_M * LEVER_M);
