@@ -176,8 +176,8 @@ impl MappingSessions {
         }
     }
 
-    /// Starts a mapping with a robot; `origin` is its first pose where that is known in the frame of
-    /// the map. Its frames are taken as well if `landmarks` are wanted.
+    /// Starts a mapping with a robot; `origin` is its first pose where that is known in the frame
+    /// of the map. Its frames are taken as well if `landmarks` are wanted.
     pub fn begin(
         &self,
         map: &Name,

@@ -55,8 +55,8 @@ pub enum SurveyError {
 }
 
 /// Surveys a drive whose scans made this laser map. `origin` is the first pose where it is known in
-/// the frame of the map; else the map begins at (0, 0, 0), and covariances are relative to the drive
-/// as a whole.
+/// the frame of the map; else the map begins at (0, 0, 0), and covariances are relative to the
+/// drive as a whole.
 pub fn surveyed(
     drive: &Drive,
     slam: SlamMap,

@@ -55,8 +55,8 @@ impl SurveyedBuilding {
         self.laid(&by)
     }
 
-    /// The same in another frame of the floor, whose relation to this one is exact: as a person lays
-    /// a map on a floor plan.
+    /// The same in another frame of the floor, whose relation to this one is exact: as a person
+    /// lays a map on a floor plan.
     fn laid(mut self, there_from_here: &Pose2) -> Self {
         let by = Pose2Covariance { pose: *there_from_here, covariance: Matrix3::zeros() };
         for wall in self.walls.iter_mut().chain(&mut self.laser_walls) {

@@ -25,8 +25,8 @@ use nalgebra::{DMatrix, Matrix2, Matrix3, Matrix6, Point2, SVector};
 
 /// Variables whose covariance is computed at once.
 const AT_ONCE: usize = 32;
-/// 99.9 % of chi2 with 2 degrees of freedom: beyond it a line alone, whose covariance is not widened,
-/// may be of another wall.
+/// 99.9 % of chi2 with 2 degrees of freedom: beyond it a line alone, whose covariance is not
+/// widened, may be of another wall.
 const LINE_CHI2: f64 = 13.8;
 /// Parameters of a landmark's variable that its place has a covariance of.
 const OF_PLACE: [usize; 6] = [0, 1, 2, 3, 6, 7];

@@ -353,7 +353,7 @@ fn a_stored_model_is_the_same_bit_for_bit() {
 
     let mut later = bytes.clone();
     later[4] += 1;
-    assert_eq!(LandmarkModel::from_bytes(&later, &p), Err(StoredModelError::Version { found: 5 }));
+    assert_eq!(LandmarkModel::from_bytes(&later, &p), Err(StoredModelError::Version { found: 6 }));
     for at in (6..bytes.len()).step_by(97).chain([bytes.len() - 1]) {
         let mut damaged = bytes.clone();
         damaged[at] ^= 0x10;
