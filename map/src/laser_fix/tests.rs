@@ -103,6 +103,45 @@ fn walls_with_wide_covariances_widen_the_fix() {
 }
 
 #[test]
+fn uneven_walls_widen_the_fix() {
+    // Oracle: in each draw the scan sees every wall off its line by the unevenness that is believed.
+    let p = LaserFixParams::default();
+    let straight = LaserFixParams { rough_m: 0.0, rough_rad: 0.0, ..p.clone() };
+    let index = WallIndex::new(&segments(&ring(), 1e-4, 1e-5));
+    let (mut sum, mut as_straight, mut n) = (0.0, 0.0, 0);
+    for seed in 0..300 {
+        let mut random = Random::new(3000 + seed);
+        let at = Pose2::new(random.range(0.7, 1.4), random.range(3.0, 13.0), random.range(-3.0, 3.0));
+        let uneven = |w: &[f64; 4], random: &mut Random| {
+            let (a, b) = (Vector2::new(w[0], w[1]), Vector2::new(w[2], w[3]));
+            let (along, from) = ((b - a).normalize(), at.position() - a);
+            // About the foot of the robot, near the middle of what it sees.
+            let foot = a + along * from.dot(&along).clamp(0.0, (b - a).norm());
+            let turn = Rotation2::new(p.rough_rad * random.normal());
+            let across = Vector2::new(-along.y, along.x) * (p.rough_m * random.normal());
+            let [a, b] = [a, b].map(|end| foot + across + turn * (end - foot));
+            [a.x, a.y, b.x, b.y]
+        };
+        let seen: Walls = ring().iter().map(|w| uneven(w, &mut random)).collect();
+        let prior = prior(&at, 0.1, 0.03, &mut random);
+        let scan = scan(&seen, &at, 0.01, 12.0, &mut random);
+        let fixed = |p: &LaserFixParams| laser_fix(&index, &scan, &prior, p).unwrap();
+        let (Ok(found), Ok(narrow)) = (fixed(&p), fixed(&straight)) else { continue };
+        let nees = |fix: &LaserFix| {
+            let e = fix.pose.pose.minus(&at);
+            e.dot(&fix.pose.covariance.cholesky().unwrap().solve(&e))
+        };
+        (sum, as_straight, n) = (sum + nees(&found), as_straight + nees(&narrow), n + 1);
+    }
+    let (mean, as_straight) = (sum / f64::from(n), as_straight / f64::from(n));
+    assert!(n > 270, "{n}");
+    assert!(
+        (1.5..4.5).contains(&mean) && as_straight > 2.0 * mean,
+        "mean NEES {mean}, {as_straight} straight"
+    );
+}
+
+#[test]
 fn along_a_bare_corridor_the_pose_is_undetermined() {
     let walls = vec![[-60.0, -1.0, 60.0, -1.0], [-60.0, 1.0, 60.0, 1.0]];
     let mut random = Random::new(1);
