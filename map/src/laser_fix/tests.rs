@@ -104,7 +104,8 @@ fn walls_with_wide_covariances_widen_the_fix() {
 
 #[test]
 fn uneven_walls_widen_the_fix() {
-    // Oracle: in each draw the scan sees every wall off its line by the unevenness that is believed.
+    // Oracle: in each draw the scan sees every wall off its line by the unevenness that is
+    // believed.
     let p = LaserFixParams::default();
     let straight = LaserFixParams { rough_m: 0.0, rough_rad: 0.0, ..p.clone() };
     let index = WallIndex::new(&segments(&ring(), 1e-4, 1e-5));
