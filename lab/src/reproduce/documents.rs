@@ -1,6 +1,6 @@
 //! The generated parts of the documents: written from the stored figures, and compared with them.
 
-use super::{figures::Figures, rows, table};
+use super::{comparison, figures::Figures, rows, table};
 use anyhow::Context as _;
 use cli::screen;
 use std::{
@@ -74,6 +74,8 @@ fn complete(figures: &Figures) -> anyhow::Result<()> {
         "{} lack a preset or are absent: run without --only and --preset into the same folder",
         lacking.join(", ")
     );
+    let faults = comparison::faults(figures);
+    anyhow::ensure!(faults.is_empty(), "{}", faults.join("\n"));
     Ok(())
 }
 

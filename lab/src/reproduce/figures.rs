@@ -86,8 +86,13 @@ impl Figures {
 }
 
 /// The figures of a command in its report, which is the list of the JSON objects that it printed.
+/// One that says what it skipped gives that as the reason of a missing figure.
 pub(super) fn measured(command: &Command, report: &Value) -> anyhow::Result<Vec<Measured>> {
-    command.figures.iter().map(|figure| of(figure, report)).collect()
+    let found = command.figures.iter().map(|figure| of(figure, report)).collect::<anyhow::Result<_>>();
+    found.map_err(|error| match find(report, "0/skipped/0").and_then(Value::as_str) {
+        Some(why) => anyhow::anyhow!("{why}"),
+        None => error,
+    })
 }
 
 fn of(figure: &Figure, report: &Value) -> anyhow::Result<Measured> {
@@ -173,5 +178,8 @@ mod tests {
         report[0].as_object_mut().unwrap().remove("quads");
         let error = measured(&command, &report).unwrap_err().to_string();
         assert!(error.contains("0/quads") && error.contains("right"), "{error}");
+        report[0]["skipped"] = json!(["boards: no module named cv2"]);
+        let error = measured(&command, &report).unwrap_err().to_string();
+        assert_eq!(error, "boards: no module named cv2");
     }
 }

@@ -4,7 +4,7 @@ use super::row::{
     Command, Figure,
     Presets::{Each, One},
     Row,
-    Unit::{Count, M, Percent, Plain, Px, Share},
+    Unit::{Count, Deg, M, Percent, Plain, Px, Share},
 };
 
 /// The worlds that nothing was chosen on.
@@ -18,25 +18,25 @@ const WORLDS: &str = worlds!();
 const STRANGERS: &str = concat!(worlds!(), " --strangers");
 
 const NAMES: [Figure; 12] = [
-    Figure::new("detected at IoU 0.7", Share, "0/all/shown").of("0/all/full_views"),
-    Figure::new("among the compared borders", Share, "0/all/asked"),
-    Figure::new("false quads an image", Plain, "0/false_per_picture"),
-    Figure::new("full views named", Share, "0/all/named").of("0/all/full_views"),
-    Figure::new("without doors and windows", Share, "0/pictures_and_boards/named"),
-    Figure::new("wrong names", Count, "0/wrong_names"),
-    Figure::new("cut or hidden, named", Count, "0/partial/named").of("0/partial/views"),
-    Figure::new("corners of posters and canvases, median", Px, "0/flat/answer_error_px/median"),
-    Figure::new("landmark in the camera frame, median", M, "0/measurements/position_m/median"),
-    Figure::new("camera position, median", M, "0/camera/position_m/median").of("0/camera/position_m/count"),
-    Figure::new("camera position, 90 %", M, "0/camera/position_m/most"),
-    Figure::new("camera position, worst", M, "0/camera/position_m/worst"),
+    Figure::more("detected at IoU 0.7", Share, "0/all/shown").of("0/all/full_views"),
+    Figure::more("among the compared borders", Share, "0/all/asked"),
+    Figure::less("false quads an image", Plain, "0/false_per_picture"),
+    Figure::more("full views named", Share, "0/all/named").of("0/all/full_views"),
+    Figure::more("without doors and windows", Share, "0/pictures_and_boards/named"),
+    Figure::less("wrong names", Count, "0/wrong_names"),
+    Figure::more("cut or hidden, named", Count, "0/partial/named").of("0/partial/views"),
+    Figure::less("corners of posters and canvases, median", Px, "0/flat/answer_error_px/median"),
+    Figure::less("landmark in the camera frame, median", M, "0/measurements/position_m/median"),
+    Figure::less("camera position, median", M, "0/camera/position_m/median").of("0/camera/position_m/count"),
+    Figure::less("camera position, 90 %", M, "0/camera/position_m/most"),
+    Figure::less("camera position, worst", M, "0/camera/position_m/worst"),
 ];
 
 const FOUND: [Figure; 4] = [
-    Figure::new("recall at IoU 0.7", Share, "0/recall_70").of("0/quads").within("0/recall_70_interval"),
-    Figure::new("recall at IoU 0.85", Share, "0/recall_85").within("0/recall_85_interval"),
-    Figure::new("false quads an image", Plain, "0/false_per_image").within("0/false_per_image_interval"),
-    Figure::new("corners, median", Px, "0/corner_error_px"),
+    Figure::more("recall at IoU 0.7", Share, "0/recall_70").of("0/quads").within("0/recall_70_interval"),
+    Figure::more("recall at IoU 0.85", Share, "0/recall_85").within("0/recall_85_interval"),
+    Figure::less("false quads an image", Plain, "0/false_per_image").within("0/false_per_image_interval"),
+    Figure::less("corners, median", Px, "0/corner_error_px"),
 ];
 
 const fn of_set(
@@ -81,10 +81,10 @@ pub(super) const SETS: [Row; 10] = [
             &["poster-behind-glass"],
             15,
             &[
-                Figure::new("detected at IoU 0.7", Share, "0/all/shown").of("0/all/full_views"),
-                Figure::new("full views named", Share, "0/all/named").of("0/all/full_views"),
-                Figure::new("wrong names", Count, "0/wrong_names"),
-                Figure::new("corners, median", Px, "0/all/answer_error_px/median"),
+                Figure::more("detected at IoU 0.7", Share, "0/all/shown").of("0/all/full_views"),
+                Figure::more("full views named", Share, "0/all/named").of("0/all/full_views"),
+                Figure::less("wrong names", Count, "0/wrong_names"),
+                Figure::less("corners, median", Px, "0/all/answer_error_px/median"),
             ],
         )],
     },
@@ -110,11 +110,11 @@ pub(super) const SETS: [Row; 10] = [
             &["museum-paintings"],
             90,
             &[
-                Figure::new("right", Count, "0/right"),
-                Figure::new("wrong", Count, "0/wrong"),
-                Figure::new("missed", Count, "0/missed"),
-                Figure::new("distractors accepted", Count, "0/distractors_accepted"),
-                Figure::new("distractors refused", Count, "0/distractors_refused"),
+                Figure::more("right", Count, "0/right"),
+                Figure::less("wrong", Count, "0/wrong"),
+                Figure::less("missed", Count, "0/missed"),
+                Figure::less("distractors accepted", Count, "0/distractors_accepted"),
+                Figure::more("distractors refused", Count, "0/distractors_refused"),
             ],
         )],
     },
@@ -139,7 +139,7 @@ pub(super) const SETS: [Row; 10] = [
             "outside photoreal/15 photoreal/16 --strangers",
             &["photoreal"],
             100,
-            &[Figure::new("wrong names", Count, "0/wrong_names")],
+            &[Figure::less("wrong names", Count, "0/wrong_names")],
         )],
     },
     Row {
@@ -184,9 +184,9 @@ pub(super) const SETS: [Row; 10] = [
             &["museum-paintings", "poster-textures-estense"],
             250,
             &[
-                Figure::new("accepted", Count, "0/unknown/0/accepted").of("0/unknown/0/quads"),
-                Figure::new("landmarks right", Count, "0/mated/right").of("0/mated/quads"),
-                Figure::new("landmarks wrong", Count, "0/mated/wrong").of("0/mated/quads"),
+                Figure::less("accepted", Count, "0/unknown/0/accepted").of("0/unknown/0/quads"),
+                Figure::more("landmarks right", Count, "0/mated/right").of("0/mated/quads"),
+                Figure::less("landmarks wrong", Count, "0/mated/wrong").of("0/mated/quads"),
             ],
         )],
     },
@@ -211,7 +211,7 @@ pub(super) const SETS: [Row; 10] = [
     },
 ];
 
-pub(super) const BEYOND: [Row; 7] = [
+pub(super) const BEYOND: [Row; 8] = [
     Row {
         id: "B1",
         title: "confidences",
@@ -223,9 +223,9 @@ pub(super) const BEYOND: [Row; 7] = [
             sets: &[],
             seconds: 400,
             figures: &[
-                Figure::new("expected calibration error", Plain, "0/results/distance=both/ece")
+                Figure::less("expected calibration error", Plain, "0/results/distance=both/ece")
                     .within("0/results/distance=both/ece_interval"),
-                Figure::new("the same, H^r", Plain, "0/results/distance=hausdorff/ece")
+                Figure::less("the same, H^r", Plain, "0/results/distance=hausdorff/ece")
                     .within("0/results/distance=hausdorff/ece_interval"),
             ],
         }],
@@ -241,15 +241,15 @@ pub(super) const BEYOND: [Row; 7] = [
             sets: &[],
             seconds: 200,
             figures: &[
-                Figure::new("a quarter replaced", Count, "0/kinds/change=a quarter/alone/look_alike")
+                Figure::less("a quarter replaced", Count, "0/kinds/change=a quarter/alone/look_alike")
                     .of("0/kinds/change=a quarter/alone/views"),
-                Figure::new("one block of 25", Count, "0/kinds/change=one block/alone/look_alike")
+                Figure::less("one block of 25", Count, "0/kinds/change=one block/alone/look_alike")
                     .of("0/kinds/change=one block/alone/views"),
-                Figure::new("a line of text", Count, "0/kinds/change=text/alone/look_alike")
+                Figure::less("a line of text", Count, "0/kinds/change=text/alone/look_alike")
                     .of("0/kinds/change=text/alone/views"),
-                Figure::new("other tones", Count, "0/kinds/change=tones/alone/look_alike")
+                Figure::less("other tones", Count, "0/kinds/change=tones/alone/look_alike")
                     .of("0/kinds/change=tones/alone/views"),
-                Figure::new("another door number", Count, "0/kinds/change=doors/alone/look_alike")
+                Figure::less("another door number", Count, "0/kinds/change=doors/alone/look_alike")
                     .of("0/kinds/change=doors/alone/views"),
             ],
         }],
@@ -350,6 +350,31 @@ pub(super) const BEYOND: [Row; 7] = [
             "visibility --seed 1 --maps 2 --points 200",
             30,
             &[Figure::new("points that differ", Count, "0/differ").of("0/points")],
+        )],
+    },
+    Row {
+        id: "B8",
+        title: "surveys of one drive, 25 m with uneven walls: landmarks, camera and sizes",
+        paper: "",
+        commands: &[once(
+            "survey --buildings 12 --seed 701",
+            "survey --buildings 1 --length-m 10 --posters 2",
+            300,
+            &[
+                Figure::new("posters that became landmarks", Count, "0/placed").of("0/shown"),
+                Figure::new("landmarks that are something else", Count, "0/strangers"),
+                Figure::new("landmark, median", M, "0/joint_m/median"),
+                Figure::new("landmark, 95 %", M, "0/joint_m/p95"),
+                Figure::new("after alignment, median", M, "0/joint_aligned_m/median"),
+                Figure::new("after alignment, 95 %", M, "0/joint_aligned_m/p95"),
+                Figure::new("by two steps, median", M, "0/two_steps_m/median"),
+                Figure::new("by two steps, 95 %", M, "0/two_steps_m/p95"),
+                Figure::new("by two steps, after alignment, 95 %", M, "0/two_steps_aligned_m/p95"),
+                Figure::new("size in percent, 95 %", Plain, "0/size_percent/p95"),
+                Figure::new("mounting as stated, 95 %", Deg, "0/stated_deg/p95"),
+                Figure::new("mounting as found, 95 %", Deg, "0/found_deg/p95"),
+                Figure::new("NEES of a degree of freedom", Plain, "0/nees"),
+            ],
         )],
     },
 ];

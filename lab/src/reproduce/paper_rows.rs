@@ -14,10 +14,10 @@ const CORRIDOR: Command = Command {
     sets: &[],
     seconds: 40,
     figures: &[
-        Figure::new("recall at IoU 0.7", Share, "0/recall_70").of("0/quads").within("0/recall_70_interval"),
-        Figure::new("recall at IoU 0.85", Share, "0/recall_85").within("0/recall_85_interval"),
-        Figure::new("false quads an image", Plain, "0/false_per_image").within("0/false_per_image_interval"),
-        Figure::new("corners, median", Px, "0/corner_error_px"),
+        Figure::more("recall at IoU 0.7", Share, "0/recall_70").of("0/quads").within("0/recall_70_interval"),
+        Figure::more("recall at IoU 0.85", Share, "0/recall_85").within("0/recall_85_interval"),
+        Figure::less("false quads an image", Plain, "0/false_per_image").within("0/false_per_image_interval"),
+        Figure::less("corners, median", Px, "0/corner_error_px"),
     ],
 };
 
@@ -40,7 +40,28 @@ const fn navigation(figures: &'static [Figure]) -> Command {
     Command { full: NAVIGATION, quick: ONE_DRIVE, presets: Each, sets: &[], seconds: 400, figures }
 }
 
-pub(super) const ROWS: [Row; 14] = [
+/// A survey and drives in its map; the figures name the seed.
+macro_rules! in_survey {
+    ($seed:literal) => {
+        Command {
+            full: concat!("navigation --survey --drives 2 --rate-hz 2 --seed ", $seed),
+            quick: concat!("navigation --survey --drives 1 --length-m 8 --rate-hz 1 --seed ", $seed),
+            presets: One,
+            sets: &[],
+            seconds: 40,
+            figures: &[
+                Figure::new(concat!("seed ", $seed, ": along, 95 %"), M, "0/along_m/p95"),
+                Figure::new(concat!("seed ", $seed, ": along, worst"), M, "0/along_m/worst"),
+                Figure::new(concat!("seed ", $seed, ": NEES of 3"), Plain, "0/nees"),
+                Figure::new(concat!("seed ", $seed, ": fewest corrections"), Count, "0/corrections_fewest"),
+                Figure::new(concat!("seed ", $seed, ": false matches"), Count, "0/false_matches")
+                    .of("0/frames"),
+            ],
+        }
+    };
+}
+
+pub(super) const ROWS: [Row; 15] = [
     Row {
         id: "E1",
         title: "detection in a corridor",
@@ -65,10 +86,10 @@ pub(super) const ROWS: [Row; 14] = [
         commands: &[discrimination(&[
             Figure::new("H^r, own, mean", Plain, "0/histograms/0/own_normal/0"),
             Figure::new("H^r, others, mean", Plain, "0/histograms/0/other_normal/0"),
-            Figure::new("H^r, overlap", Share, "0/histograms/0/overlap"),
+            Figure::less("H^r, overlap", Share, "0/histograms/0/overlap"),
             Figure::new("C^r, own, mean", Plain, "0/histograms/1/own_normal/0"),
             Figure::new("C^r, others, mean", Plain, "0/histograms/1/other_normal/0"),
-            Figure::new("C^r, overlap", Share, "0/histograms/1/overlap"),
+            Figure::less("C^r, overlap", Share, "0/histograms/1/overlap"),
         ])],
     },
     Row {
@@ -76,10 +97,10 @@ pub(super) const ROWS: [Row; 14] = [
         title: "errors of the thresholds",
         paper: "false positives about 1 %, false negatives about 30 % (3.6)",
         commands: &[discrimination(&[
-            Figure::new("H^r, false positives", Count, "0/pairs/0/false_positives").of("0/pairs/0/unknown"),
-            Figure::new("H^r, false negatives", Count, "0/pairs/0/false_negatives").of("0/pairs/0/own"),
-            Figure::new("C^r, false positives", Count, "0/pairs/1/false_positives").of("0/pairs/1/unknown"),
-            Figure::new("C^r, false negatives", Count, "0/pairs/1/false_negatives").of("0/pairs/1/own"),
+            Figure::less("H^r, false positives", Count, "0/pairs/0/false_positives").of("0/pairs/0/unknown"),
+            Figure::less("H^r, false negatives", Count, "0/pairs/0/false_negatives").of("0/pairs/0/own"),
+            Figure::less("C^r, false positives", Count, "0/pairs/1/false_positives").of("0/pairs/1/unknown"),
+            Figure::less("C^r, false negatives", Count, "0/pairs/1/false_negatives").of("0/pairs/1/own"),
         ])],
     },
     Row {
@@ -128,14 +149,20 @@ pub(super) const ROWS: [Row; 14] = [
         title: "navigation in a corridor of 25 m with four posters",
         paper: "13 corrections, below 20 cm along (5)",
         commands: &[navigation(&[
-            Figure::new("corrections by landmarks", Count, "0/corrections"),
+            Figure::more("corrections by landmarks", Count, "0/corrections"),
             Figure::new("drives", Count, "0/drives"),
-            Figure::new("along the corridor, median", M, "0/along_m/median"),
-            Figure::new("along the corridor, 95 %", M, "0/along_m/p95"),
-            Figure::new("along the corridor, worst", M, "0/along_m/worst"),
-            Figure::new("across, 95 %", M, "0/across_m/p95"),
+            Figure::less("along the corridor, median", M, "0/along_m/median"),
+            Figure::less("along the corridor, 95 %", M, "0/along_m/p95"),
+            Figure::less("along the corridor, worst", M, "0/along_m/worst"),
+            Figure::less("across, 95 %", M, "0/across_m/p95"),
             Figure::new("NEES of 3", Plain, "0/nees"),
         ])],
+    },
+    Row {
+        id: "E10S",
+        title: "the same in the map of one survey (`waymark survey`), two drives each, 2 Hz",
+        paper: "",
+        commands: &[in_survey!("21"), in_survey!("22"), in_survey!("23"), in_survey!("24"), in_survey!("25")],
     },
     Row {
         id: "E11",
@@ -143,13 +170,13 @@ pub(super) const ROWS: [Row; 14] = [
         paper: "above 97 % (5)",
         commands: &[
             discrimination(&[
-                Figure::new("views named right", Count, "0/mated/right").of("0/mated/quads"),
-                Figure::new("views named wrong", Count, "0/mated/wrong").of("0/mated/quads"),
-                Figure::new("distractors accepted", Count, "0/unknown/0/accepted").of("0/unknown/0/quads"),
+                Figure::more("views named right", Count, "0/mated/right").of("0/mated/quads"),
+                Figure::less("views named wrong", Count, "0/mated/wrong").of("0/mated/quads"),
+                Figure::less("distractors accepted", Count, "0/unknown/0/accepted").of("0/unknown/0/quads"),
             ]),
             navigation(&[
-                Figure::new("full views named on drives", Count, "0/recognised").of("0/shown"),
-                Figure::new("false matches on drives", Count, "0/false_matches").of("0/frames"),
+                Figure::more("full views named on drives", Count, "0/recognised").of("0/shown"),
+                Figure::less("false matches on drives", Count, "0/false_matches").of("0/frames"),
             ]),
         ],
     },
@@ -198,41 +225,42 @@ const REFINED_OF_10: &str = "0/curves/constraints=C1&refined=true&corner_noise_p
 
 /// Where the medians reach 1, and up to where half and 95 % are recognised.
 macro_rules! crossings {
-    ($unit:expr) => {
+    ($unit:expr, $better:ident) => {
         [
-            Figure::new("median H^r/tau reaches 1", $unit, "0/curves/0/crossings/0/at")
+            Figure::$better("median H^r/tau reaches 1", $unit, "0/curves/0/crossings/0/at")
                 .within("0/curves/0/crossings/0/interval")
                 .until("0/curves/0/crossings/0/beyond"),
-            Figure::new("median C^r/tau reaches 1", $unit, "0/curves/0/crossings/1/at")
+            Figure::$better("median C^r/tau reaches 1", $unit, "0/curves/0/crossings/1/at")
                 .within("0/curves/0/crossings/1/interval")
                 .until("0/curves/0/crossings/1/beyond"),
-            Figure::new("half recognised up to", $unit, "0/curves/0/half/at")
+            Figure::$better("half recognised up to", $unit, "0/curves/0/half/at")
                 .within("0/curves/0/half/interval")
                 .until("0/curves/0/half/beyond"),
-            Figure::new("95 % recognised up to", $unit, "0/curves/0/most/at").until("0/curves/0/most/beyond"),
-            Figure::new("wrong names", Count, "0/curves/0/wrong").of("0/curves/0/views"),
+            Figure::$better("95 % recognised up to", $unit, "0/curves/0/most/at")
+                .until("0/curves/0/most/beyond"),
+            Figure::less("wrong names", Count, "0/curves/0/wrong").of("0/curves/0/views"),
         ]
     };
 }
 
-const CROSSINGS_PX: [Figure; 5] = crossings!(Px);
-const CROSSINGS_DEG: [Figure; 5] = crossings!(Deg);
-const CROSSINGS_HIDDEN: [Figure; 5] = crossings!(Plain);
+const CROSSINGS_PX: [Figure; 5] = crossings!(Px, less);
+const CROSSINGS_DEG: [Figure; 5] = crossings!(Deg, more);
+const CROSSINGS_HIDDEN: [Figure; 5] = crossings!(Plain, more);
 
 const LIGHT: [Figure; 8] = [
-    Figure::new("gain, darker, H^r/tau reaches 1", Plain, "0/curves/0/crossings/0/at")
+    Figure::less("gain, darker, H^r/tau reaches 1", Plain, "0/curves/0/crossings/0/at")
         .until("0/curves/0/crossings/0/beyond"),
-    Figure::new("gain, darker, 95 % recognised up to", Plain, "0/curves/0/most/at")
+    Figure::less("gain, darker, 95 % recognised up to", Plain, "0/curves/0/most/at")
         .until("0/curves/0/most/beyond"),
-    Figure::new("gain, brighter, H^r/tau reaches 1", Plain, "0/curves/1/crossings/0/at")
+    Figure::more("gain, brighter, H^r/tau reaches 1", Plain, "0/curves/1/crossings/0/at")
         .until("0/curves/1/crossings/0/beyond"),
-    Figure::new("gain, brighter, 95 % recognised up to", Plain, "0/curves/1/most/at")
+    Figure::more("gain, brighter, 95 % recognised up to", Plain, "0/curves/1/most/at")
         .until("0/curves/1/most/beyond"),
-    Figure::new("grey levels added, 95 % recognised up to", Plain, "0/curves/2/most/at")
+    Figure::more("grey levels added, 95 % recognised up to", Plain, "0/curves/2/most/at")
         .until("0/curves/2/most/beyond"),
-    Figure::new("light lost to one side, 95 % recognised up to", Share, "0/curves/3/most/at")
+    Figure::more("light lost to one side, 95 % recognised up to", Share, "0/curves/3/most/at")
         .until("0/curves/3/most/beyond"),
-    Figure::new("taken by a shadow, 95 % recognised up to", Share, "0/curves/4/most/at")
+    Figure::more("taken by a shadow, 95 % recognised up to", Share, "0/curves/4/most/at")
         .until("0/curves/4/most/beyond"),
-    Figure::new("wrong names, gain", Count, "0/curves/0/wrong").of("0/curves/0/views"),
+    Figure::less("wrong names, gain", Count, "0/curves/0/wrong").of("0/curves/0/views"),
 ];

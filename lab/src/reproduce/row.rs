@@ -21,6 +21,20 @@ pub(super) enum Unit {
     Bytes,
 }
 
+impl Unit {
+    /// Whether the number is counted in a whole, rather than divided by it already.
+    pub(super) const fn is_counted(self) -> bool {
+        matches!(self, Self::Count)
+    }
+}
+
+/// Which of two values is the better one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Better {
+    Larger,
+    Smaller,
+}
+
 /// One experiment of the table.
 #[derive(Debug)]
 pub(super) struct Row {
@@ -78,11 +92,23 @@ pub(super) struct Figure {
     pub(super) interval: Option<&'static str>,
     /// Whether the number is only a bound: the sweep ended before.
     pub(super) beyond: Option<&'static str>,
+    /// `None`: neither, or no two presets are compared.
+    pub(super) better: Option<Better>,
 }
 
 impl Figure {
     pub(super) const fn new(name: &'static str, unit: Unit, path: &'static str) -> Self {
-        Self { name, unit, path, of: None, interval: None, beyond: None }
+        Self { name, unit, path, of: None, interval: None, beyond: None, better: None }
+    }
+
+    /// A number of which the larger is better.
+    pub(super) const fn more(name: &'static str, unit: Unit, path: &'static str) -> Self {
+        Self { better: Some(Better::Larger), ..Self::new(name, unit, path) }
+    }
+
+    /// A number of which the smaller is better.
+    pub(super) const fn less(name: &'static str, unit: Unit, path: &'static str) -> Self {
+        Self { better: Some(Better::Smaller), ..Self::new(name, unit, path) }
     }
 
     pub(super) const fn of(self, path: &'static str) -> Self {

@@ -1,6 +1,7 @@
 //! Figures as Markdown: the tables of docs/EVALUATION.md and README.md. Figures in, text out.
 
 use super::{
+    comparison,
     figures::{Figures, Measured, Outcome, RowFigures, Run},
     row::{HIGHLIGHTS, Unit},
 };
@@ -30,7 +31,8 @@ pub(super) fn readme(figures: &Figures) -> String {
         let [default, paper] = [Preset::Default, Preset::Paper].map(|preset| {
             row.map_or_else(|| "not measured".to_owned(), |row| cell(row, highlight.figure, preset))
         });
-        writeln!(text, "| {} | {default} | {paper} | {} |", highlight.what, highlight.on).ok();
+        let bold = row.map_or("", |row| bold(row, highlight.figure));
+        writeln!(text, "| {} | {default} | {bold}{paper}{bold} | {} |", highlight.what, highlight.on).ok();
     }
     text
 }
@@ -43,7 +45,7 @@ fn head(figures: &Figures) -> String {
     let (measured, of) = figures.counts();
     format!(
         "{quick}Measured on {} at commit {commit}{changed} by `waymark-lab reproduce`, {measured} of {of} commands, in {:.0}\n\
-         minutes on {} cores of {}. Brackets are 95 % intervals.\n",
+         minutes on {} cores of {}. Brackets are 95 % intervals; bold: the paper's preset is better.\n",
         figures.date, figures.minutes, figures.cores, figures.processor
     )
 }
@@ -60,13 +62,22 @@ fn names(row: &RowFigures) -> Vec<&str> {
     names
 }
 
+/// Marks around a figure in which the paper's preset is better.
+fn bold(row: &RowFigures, name: &str) -> &'static str {
+    if comparison::is_better(row, name) { "**" } else { "" }
+}
+
 fn lines(row: &RowFigures) -> String {
     let (mut text, mut left) = (String::new(), format!("**{}** {}", row.id, row.title));
     let mut paper = row.paper.as_str();
     for name in names(row) {
         let [default, preset] = [Preset::Default, Preset::Paper].map(|preset| cell(row, name, preset));
-        writeln!(text, "| {left} | {name} | {paper} | {default} | {preset} |").ok();
+        let bold = bold(row, name);
+        writeln!(text, "| {left} | {name} | {paper} | {default} | {bold}{preset}{bold} |").ok();
         (left, paper) = (String::new(), "");
+    }
+    if let Some(reason) = comparison::reason(&row.id) {
+        writeln!(text, "| | *{reason}* | | | |").ok();
     }
     if text.is_empty() {
         writeln!(text, "| {left} | | {paper} | {0} | {0} |", reason(row)).ok();
@@ -85,14 +96,10 @@ fn reason(row: &RowFigures) -> String {
 
 /// The figure under a preset; one that no preset changes stands in the first column.
 fn cell(row: &RowFigures, name: &str, preset: Preset) -> String {
-    let value = |run: &Run| match &run.outcome {
-        Outcome::Figures(all) => all.iter().find(|m| m.name == name).map(shown),
-        Outcome::NotMeasured(_) => None,
-    };
-    if let Some(text) = row.runs.iter().filter(|run| run.preset == Some(preset)).find_map(value) {
-        return text;
+    if let Some(measured) = comparison::under(row, name, Some(preset)) {
+        return shown(measured);
     }
-    match row.runs.iter().filter(|run| run.preset.is_none()).find_map(value) {
+    match comparison::under(row, name, None).map(shown) {
         Some(text) if preset == Preset::Default => text,
         Some(_) => "-".to_owned(),
         None => "not measured".to_owned(),
@@ -129,6 +136,7 @@ fn shown(m: &Measured) -> String {
         Unit::Percent => format!("{:.2}", 100.0 * x),
         Unit::Plain if x.abs() < 0.01 && x != 0.0 => format!("{x:.1e}"),
         Unit::Plain | Unit::Px => format!("{x:.2}"),
+        Unit::Deg if x.abs() < 1.0 => format!("{x:.2}"),
         Unit::Deg => format!("{x:.1}"),
     };
     let mut text = if m.beyond { format!("beyond {}", number(value)) } else { number(value) };

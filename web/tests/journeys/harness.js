@@ -191,7 +191,7 @@ export async function learnt(api, landmark) {
 /** Sends a photograph of a landmark of the map `hall`. */
 export const uploaded = (context, origin, landmark, buffer, parts = {}) =>
   context.request.post(`${origin}/api/v1/maps/hall/landmarks/${landmark}/views`, {
-    headers: { "x-waymark-page": "1" },
+    headers: { "x-waymark-page": "1", connection: "close" },
     multipart: { image: { name: "photo.png", mimeType: "image/png", buffer }, ...parts },
   });
 

@@ -52,7 +52,7 @@ pub(crate) struct Args {
 }
 
 /// Errors in one building, or in all.
-#[derive(Debug, Default, Serialize)]
+#[derive(Debug, Default)]
 struct Figures {
     /// Posters that were to be seen, and those of them that became landmarks.
     shown: usize,
@@ -99,37 +99,83 @@ impl Figures {
         }
     }
 
+    fn report(self) -> Report {
+        let spread = |all: &[f64]| Spread {
+            median: quantile(&mut all.to_vec(), 0.5),
+            p95: quantile(&mut all.to_vec(), 0.95),
+        };
+        Report {
+            experiment: "survey",
+            shown: self.shown,
+            placed: self.placed,
+            strangers: self.strangers,
+            joint_m: spread(&self.joint_m),
+            joint_aligned_m: spread(&self.joint_aligned_m),
+            two_steps_m: spread(&self.two_steps_m),
+            two_steps_aligned_m: spread(&self.two_steps_aligned_m),
+            size_percent: spread(&self.size_percent),
+            two_steps_size_percent: spread(&self.two_steps_size_percent),
+            nees: self.nees.iter().sum::<f64>() / self.nees.len().max(1) as f64,
+            stated_deg: spread(&self.stated_deg),
+            found_deg: spread(&self.found_deg),
+            lost: self.lost,
+        }
+    }
+}
+
+/// Median and 95 % quantile; absent where nothing was measured.
+#[derive(Debug, Serialize)]
+struct Spread {
+    median: Option<f64>,
+    p95: Option<f64>,
+}
+
+impl Spread {
+    fn in_words(&self, factor: f64, digits: usize, unit: &str) -> String {
+        let word = |x: Option<f64>| x.map_or("-".to_owned(), |x| format!("{:.digits$}", factor * x));
+        format!("{}, {} {unit}", word(self.median), word(self.p95))
+    }
+}
+
+/// What is printed: [`Figures`] of all buildings, in the same units.
+#[derive(Debug, Serialize)]
+struct Report {
+    experiment: &'static str,
+    shown: usize,
+    placed: usize,
+    strangers: usize,
+    joint_m: Spread,
+    joint_aligned_m: Spread,
+    two_steps_m: Spread,
+    two_steps_aligned_m: Spread,
+    size_percent: Spread,
+    two_steps_size_percent: Spread,
+    /// Mean; 1 expected.
+    nees: f64,
+    stated_deg: Spread,
+    found_deg: Spread,
+    lost: Vec<String>,
+}
+
+impl Report {
     fn lines(&self) -> Vec<String> {
-        let quantile = |all: &[f64], share| quantile(&mut all.to_vec(), share).unwrap_or(f64::NAN);
-        let millimetres =
-            |all: &[f64]| format!("{:4.0}, {:4.0} mm", 1e3 * quantile(all, 0.5), 1e3 * quantile(all, 0.95));
-        let percent = |all: &[f64]| format!("{:.2}, {:.2} %", quantile(all, 0.5), quantile(all, 0.95));
-        let mean = |all: &[f64]| all.iter().sum::<f64>() / all.len().max(1) as f64;
         let mut lines = vec![
             format!(
                 "{} of {} posters in full view became landmarks; {} landmarks are something else",
                 self.placed, self.shown, self.strangers
             ),
             "median, 95 %".to_owned(),
-            format!("  landmark, joint      {}", millimetres(&self.joint_m)),
-            format!("  landmark, two steps  {}", millimetres(&self.two_steps_m)),
-            format!("  aligned, joint       {}", millimetres(&self.joint_aligned_m)),
-            format!("  aligned, two steps   {}", millimetres(&self.two_steps_aligned_m)),
-            format!("  size, joint          {}", percent(&self.size_percent)),
-            format!("  size, two steps      {}", percent(&self.two_steps_size_percent)),
-            format!(
-                "  mounting, stated     {:.2}, {:.2} deg",
-                quantile(&self.stated_deg, 0.5),
-                quantile(&self.stated_deg, 0.95)
-            ),
-            format!(
-                "  mounting, found      {:.2}, {:.2} deg",
-                quantile(&self.found_deg, 0.5),
-                quantile(&self.found_deg, 0.95)
-            ),
+            format!("  landmark, joint      {}", self.joint_m.in_words(1e3, 0, "mm")),
+            format!("  landmark, two steps  {}", self.two_steps_m.in_words(1e3, 0, "mm")),
+            format!("  aligned, joint       {}", self.joint_aligned_m.in_words(1e3, 0, "mm")),
+            format!("  aligned, two steps   {}", self.two_steps_aligned_m.in_words(1e3, 0, "mm")),
+            format!("  size, joint          {}", self.size_percent.in_words(1.0, 2, "%")),
+            format!("  size, two steps      {}", self.two_steps_size_percent.in_words(1.0, 2, "%")),
+            format!("  mounting, stated     {}", self.stated_deg.in_words(1.0, 2, "deg")),
+            format!("  mounting, found      {}", self.found_deg.in_words(1.0, 2, "deg")),
             format!(
                 "NEES of landmarks for each degree of freedom, in the frame of the whole drive: {:.2}",
-                mean(&self.nees)
+                self.nees
             ),
         ];
         lines.extend(self.lost.iter().map(|lost| format!("  lost: {lost}")));
@@ -153,7 +199,8 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
         let building = surveyed(&driven.drive.log, &Params::default())?;
         all.add(figures(&driven, &building));
     }
-    say(args.json, &all, || all.lines())
+    let report = all.report();
+    say(args.json, &report, || report.lines())
 }
 
 fn figures(driven: &Driven, building: &SurveyedBuilding) -> Figures {
