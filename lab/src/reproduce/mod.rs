@@ -2,8 +2,8 @@
 //! beside it, and the tables of docs/EVALUATION.md and README.md from them.
 //!
 //! `row` says what a row is, `paper_rows` and `further_rows` list them; `execute` runs their
-//! commands; `figures` takes the numbers from the reports; `comparison` says where the paper's preset is
-//! better; `documents` writes them.
+//! commands; `figures` takes the numbers from the reports; `comparison` says where the paper's
+//! preset is better; `documents` writes them.
 
 mod figures;
 mod row;
