@@ -39,6 +39,7 @@ from waymark.api import (
     CameraFrame,
     Job,
     LandmarkDeletion,
+    LearningSettings,
     NewLandmark,
     Parent,
     PoseBody,
@@ -123,6 +124,12 @@ def test_maps_are_stored_with_all_their_fields(server: Server) -> None:
         paper = maps.set_pipeline("attic", preset="paper")
         assert (paper.preset, paper.distance) == ("paper", "hausdorff")
         assert maps.set_pipeline("attic", preset=None, distance="correlation").preset is None
+        assert maps.set_learning(
+            "attic", LearningSettings("doors look alike", min_views=3)
+        ).learning == LearningSettings("doors look alike", min_views=3)
+        with pytest.raises(Refused, match="min_views"):
+            maps.set_learning("attic", LearningSettings("none", min_views=0))
+        assert maps.set_learning("attic", None).learning is None
         assert maps.rename_map("attic", "loft").site == "Works / 1"
         assert maps.rename_map("loft", "attic").name == "attic"
         assert {"attic", "ground"} <= {each.name for each in maps.maps()}

@@ -16,6 +16,7 @@ export const HELP: Readonly<Record<string, Help>> = {
   "/maps/:map/sheet": { what: "The floor on paper, its landmarks by number.", guide: "administrator#a-map" },
   "/maps/:map/settings?part=where": { what: "Where this floor lies in another map, so that a robot may change floors.", guide: "administrator#settings-of-a-map" },
   "/maps/:map/settings?part=camera": { what: "The camera that coverage is computed for.", guide: "administrator#settings-of-a-map" },
+  "/maps/:map/settings?part=gates": { what: "What a landmark must show before robots use it: views, points, and sides from which it was photographed.", guide: "administrator#settings-of-a-map" },
   "/maps/:map/settings?part=fusion": { what: "Which of landmarks, laser and odometry counts, and in which area.", guide: "administrator#settings-of-a-map" },
   "/maps/:map/settings?part=scans": { what: "Walls of the laser scans of a robot that is driven round. They are shown before they replace any.", guide: "administrator#settings-of-a-map" },
   "/maps/:map/teach": { what: "Teaches a landmark by photographs, and tries it.", guide: "administrator#teaching" },

@@ -201,7 +201,7 @@ for (const [size, where] of [[undefined, "desk"], [PHONE, "phone"]]) {
 
   test(`settings of a map are read and changed, at the ${where}`, async () => {
     const page = await go(`/maps/${MAP}/settings`, size);
-    for (const part of ["Position in the building", "Camera assumed for coverage", "Which sensor to trust, where", "Walls from scans"]) {
+    for (const part of ["Position in the building", "Camera assumed for coverage", "When a landmark is used", "Which sensor to trust, where", "Walls from scans"]) {
       await page.getByRole("button", { name: part }).click();
       await page.getByRole("heading", { name: part }).waitFor();
       await page.waitForFunction(() => !document.querySelector(".loading"));
@@ -225,6 +225,23 @@ test("a map lies in another, has a camera, a named area and a choice of what is 
   await page.getByRole("button", { name: "Save", exact: true }).click();
   await page.getByText(/The camera is set/).waitFor();
   assert.equal((await api("GET", "/maps/upstairs/visibility-settings")).camera_height_m, 0.9);
+  await page.getByRole("button", { name: "When a landmark is used" }).click();
+  await page.getByLabel("Fewest views, 1 to 200").fill("0");
+  await page.getByLabel("Why").fill("doors look alike");
+  await page.getByRole("button", { name: "Save", exact: true }).click();
+  await page.getByText(/^Fewest views: .*1 to 200/).waitFor();
+  // The browser itself says this of the refusal, once.
+  const said = page.faults.splice(0);
+  assert.ok(said.length === 1 && /status of 422/.test(said[0]), said.join());
+  await page.getByLabel("Fewest views, 1 to 200").fill("4");
+  await page.getByLabel("A landmark that was photographed from one side only").selectOption("is not used");
+  await page.getByRole("button", { name: "Save", exact: true }).click();
+  await page.getByText("upstairs has gates of its own: doors look alike").waitFor();
+  assert.deepEqual((await api("GET", "/maps/upstairs")).learning, { min_views: 4, reason: "doors look alike", refuse_one_side: true });
+  await page.getByRole("button", { name: "Use the server's gates" }).click();
+  await page.getByText("upstairs has the server's gates again.").waitFor();
+  assert.equal(await page.getByLabel("Fewest views, 1 to 200").inputValue(), "");
+  assert.equal((await api("GET", "/maps/upstairs")).learning ?? null, null);
   await page.getByRole("button", { name: "Which sensor to trust, where" }).click();
   await page.getByLabel(/^Where runs have told/).selectOption("best");
   await page.getByText("The choice is kept.").waitFor();

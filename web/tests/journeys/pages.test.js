@@ -31,6 +31,7 @@ const PAGES = [
   ["floor-sheet", "/maps/:map/sheet", () => `/maps/${MAP}/sheet`, drawn],
   ["settings-where", "/maps/:map/settings?part=where", () => `/maps/${MAP}/settings?part=where`],
   ["settings-camera", "/maps/:map/settings?part=camera", () => `/maps/${MAP}/settings?part=camera`],
+  ["settings-gates", "/maps/:map/settings?part=gates", () => `/maps/${MAP}/settings?part=gates`],
   ["settings-fusion", "/maps/:map/settings?part=fusion", () => `/maps/${MAP}/settings?part=fusion`],
   ["settings-scans", "/maps/:map/settings?part=scans", () => `/maps/${MAP}/settings?part=scans`],
   ["teach", "/maps/:map/teach", () => `/maps/${MAP}/teach`, outlined],

@@ -28,6 +28,8 @@ T = TypeVar("T")
 
 # Longest wait for one request, and longest silence of a stream, in seconds; the server sends something every 15 s.
 TIMEOUT_S = 60.0
+# Longest time a connection is kept without a request, in seconds: less than the 5 s after which the server closes it.
+MAX_IDLE_S = 3.0
 # Period of polling a job, in seconds.
 JOB_POLL_S = 0.2
 

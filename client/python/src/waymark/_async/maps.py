@@ -20,6 +20,7 @@ from waymark.api import (
     FileWalls,
     GazeRankingBody,
     Health,
+    LearningSettings,
     LiveEvent,
     Map,
     Order,
@@ -144,6 +145,11 @@ class AsyncMaps(AsyncBase):
         """Sets detector and decision of a map, and the distance that decides: without one, that of the preset. `None`:
         those of the server's settings."""
         return await self._send(Map, "locate_map", map, json=given(preset=preset, distance=distance))
+
+    async def set_learning(self, map: str, learning: LearningSettings | None) -> Map:
+        """Sets weights and gates of all landmarks of a map; `None`: those of the server. The reason in it
+        goes to the history; what a landmark sets of its own goes before."""
+        return await self._send(Map, "locate_map", map, json={"learning": to_json(learning)})
 
     async def copy_map(self, map: str, name: str) -> Map:
         """Makes a new map of all that a map has."""

@@ -17,6 +17,7 @@ import httpx
 from waymark import _local_token
 from waymark._events import EventParser
 from waymark._http import (
+    MAX_IDLE_S,
     TIMEOUT_S,
     Revised,
     headers_of,
@@ -59,7 +60,11 @@ class Base:
         self._why: str | None = None
         # Ignores proxies of the environment: the server is in the robot's own network.
         self._http = httpx.Client(
-            base_url=self._base, timeout=TIMEOUT_S, trust_env=False, verify=trusted(self._base, authority)
+            base_url=self._base,
+            timeout=TIMEOUT_S,
+            limits=httpx.Limits(keepalive_expiry=MAX_IDLE_S),
+            trust_env=False,
+            verify=trusted(self._base, authority),
         )
 
     def __repr__(self) -> str:

@@ -21,6 +21,7 @@ from waymark.api import (
     FileWalls,
     GazeRankingBody,
     Health,
+    LearningSettings,
     LiveEvent,
     Map,
     Order,
@@ -145,6 +146,11 @@ class Maps(Base):
         """Sets detector and decision of a map, and the distance that decides: without one, that of the preset. `None`:
         those of the server's settings."""
         return self._send(Map, "locate_map", map, json=given(preset=preset, distance=distance))
+
+    def set_learning(self, map: str, learning: LearningSettings | None) -> Map:
+        """Sets weights and gates of all landmarks of a map; `None`: those of the server. The reason in it
+        goes to the history; what a landmark sets of its own goes before."""
+        return self._send(Map, "locate_map", map, json={"learning": to_json(learning)})
 
     def copy_map(self, map: str, name: str) -> Map:
         """Makes a new map of all that a map has."""

@@ -1,1 +1,0 @@
-import{ap as i,t as o,a as d,s as l,m as n,k as v,L as m,j as c,o as f}from"./index-C_jUhJOW.js";var h=n('<div class="card empty svelte-1fpw1hr"><p> </p> <!></div>');function x(s,a){var t=h(),e=v(t),p=f(e,!0),r=l(e,2);i(r,()=>a.children??m),o(()=>c(p,a.what)),d(s,t)}export{x as E};

@@ -1,0 +1,1 @@
+import{t as n,a as r,m as l,h as o,n as i,j as m,o as _}from"./index-sr58ZO63.js";var f=l("<span> </span>");function c(e,a){var t=f(),s=_(t,!0);n(()=>{o(t,1,`state ${a.kind??""}`,"svelte-lrhrev"),i(t,"title",a.meaning),m(s,a.word)}),r(e,t)}export{c as S};

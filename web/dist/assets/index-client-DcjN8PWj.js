@@ -1,1 +1,0 @@
-import{aJ as t,aK as e,W as f,al as c}from"./index-C_jUhJOW.js";function u(n){t===null&&e(),f(()=>{const o=c(n);if(typeof o=="function")return o})}function i(n){t===null&&e(),u(()=>()=>c(n))}export{i as o};

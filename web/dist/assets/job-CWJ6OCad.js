@@ -1,0 +1,1 @@
+import{H as s,l as n}from"./index-sr58ZO63.js";const i=400;async function f(o,a){for(;;){const t=await s(n("/jobs/{job}",{job:o}));if(t.state!=="queued"&&t.state!=="running")return t;a(t),await new Promise(e=>setTimeout(e,i))}}export{f};

@@ -1,0 +1,1 @@
+import{o as i}from"./index-client-DFbI7whL.js";import{C as c}from"./index-sr58ZO63.js";import{S as p}from"./stream-Dw7FlOsz.js";const f=250;function u(t,s,r){let e;const o=()=>e??=setTimeout(()=>{e=void 0,s()},f),n=Object.fromEntries([...t,"reset"].map(a=>[a,o])),m=new p(c("/events",{map:r}),{on:n,onopen:o});i(()=>{m.close(),clearTimeout(e)})}export{u as w};

@@ -1,1 +1,0 @@
-import{o as i}from"./index-client-DcjN8PWj.js";import{C as c}from"./index-C_jUhJOW.js";import{S as p}from"./stream-B9Ny5UKG.js";const f=250;function u(t,s,r){let e;const o=()=>e??=setTimeout(()=>{e=void 0,s()},f),n=Object.fromEntries([...t,"reset"].map(a=>[a,o])),m=new p(c("/events",{map:r}),{on:n,onopen:o});i(()=>{m.close(),clearTimeout(e)})}export{u as w};

@@ -1,0 +1,1 @@
+import{aL as s,aM as t,aN as d,aO as l,ay as r}from"./index-sr58ZO63.js";function i(o,n){var a;a=document.head.appendChild(s()),t(()=>{var e=d(()=>n(a));e.f|=l,r||(e.nodes===null?e.nodes={start:a,end:a,a:null,t:null}:e.nodes.end=a)})}export{i as h};

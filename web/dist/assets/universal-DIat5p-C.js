@@ -1,1 +1,0 @@
-import{am as n,an as s}from"./index-C_jUhJOW.js";function b(o,a,r,f,i){var d=()=>{f(r[o])};r.addEventListener(a,d),i?n(()=>{r[o]=i()}):d(),(r===document.body||r===window||r===document)&&s(()=>{r.removeEventListener(a,d)})}export{b};
