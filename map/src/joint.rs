@@ -21,6 +21,7 @@ mod survey_map;
 mod known_map;
 mod window;
 mod laser_drive;
+mod laser_drives;
 mod laser_map;
 
 pub use build::SurveyProblem;
@@ -38,6 +39,7 @@ pub use factors::{
 };
 pub use known_map::{KnownMap, refined};
 pub use laser_drive::{FrameSeen, LaserDrive, ObjectSeen};
+pub use laser_drives::LaserDrives;
 pub use laser_map::{JointLaserMap, MappedObject, MappedWall};
 pub use marginals::Marginals;
 pub use params::JointParams;

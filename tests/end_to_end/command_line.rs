@@ -49,7 +49,11 @@ const OPTIONS: [(&str, &[&str], &[&str]); 68] = [
             "[IMAGES]",
         ],
     ),
-    ("survey", SERVER, &["<RECORDING>", "--into", "--origin", "--camera", "--recorded", "--image", "--scan"]),
+    (
+        "survey",
+        SERVER,
+        &["<RECORDING>...", "--into", "--origin", "--camera", "--recorded", "--image", "--scan"],
+    ),
     ("record", SERVER, &["<FILE>", "--robot", "--seconds", "--zenoh", "--fleet"]),
     (
         "replay",

@@ -24,20 +24,20 @@ pub(super) async fn survey(
     let work = move || {
         let steps = screen::progress(0, "first drive");
         let mut path = Vec::new();
-        let SimulatedDrive { mut log, .. } = simulated_drive(&through, drive, |readings| {
+        let SimulatedDrive { log, .. } = simulated_drive(&through, drive, seed, |readings| {
             path.push(readings.step.map_from_robot.position().into());
             steps.inc(1);
         })?;
         steps.finish_and_clear();
         // As of a building that nobody has a plan of; then laid on it, to show how well robots find
         // their way.
-        log.origin = None;
-        let found = surveyed(&log, &Params::default())?.laid_on_path(&path);
-        anyhow::Ok((log, found))
+        let logs = vec![log];
+        let found = surveyed(&logs, None, &Params::default())?.laid_on_path(&path);
+        anyhow::Ok((logs, found))
     };
-    let (log, found) = tokio::task::spawn_blocking(work).await??;
-    let landmarks = upload(&maps, MAP, &log, &found).await?;
-    screen::complain(&SurveyReport::new(&log, &found, Some((MAP, &landmarks)), BTreeMap::new()).text());
+    let (logs, found) = tokio::task::spawn_blocking(work).await??;
+    let landmarks = upload(&maps, MAP, &logs, &found).await?;
+    screen::complain(&SurveyReport::new(&logs, &found, Some((MAP, &landmarks)), BTreeMap::new()).text());
     let active = landmarks.iter().filter(|landmark| landmark.status == LandmarkStatus::Active);
     Ok(Taught {
         walls: found.walls.len(),

@@ -12,8 +12,8 @@ use client::protos::{
     convert::frame::CheckedFrame,
     convert::motion::{CheckedOdometry, CheckedScan},
 };
-use engine::survey::{Drive, DriveReading, OF_FILE, ScanStamp};
-use map::{laser::Scan, pose2::Pose2, slam::MAX_SCANS};
+use engine::survey::{Drive, DriveFrame, DriveReading, OF_FILE, ScanStamp};
+use map::{laser::Scan, slam::MAX_SCANS};
 use recordings::Body;
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -23,12 +23,15 @@ use std::{
 /// A drive with its scans.
 #[derive(Debug, Clone, Default)]
 pub struct DriveLog {
-    /// Where the drive begins, if that is known in the frame of the map.
-    pub origin: Option<Pose2>,
     /// Scans, those of the drive's stamps.
     pub scans: Vec<Scan>,
     /// The drive.
     pub drive: Drive,
+}
+
+/// A frame by its number through all drives.
+pub(crate) fn frame_of(logs: &[DriveLog], number: usize) -> Option<&DriveFrame> {
+    logs.iter().flat_map(|log| &log.drive.frames).nth(number)
 }
 
 /// A drive of a file.
@@ -87,7 +90,7 @@ pub(super) fn read(path: &Path, drives: &DriveArgs, camera: Option<&Name>) -> an
     if drive.scans.is_empty() || drive.frames.is_empty() {
         return Err(nothing(path, drive.scans.is_empty(), &problems).into());
     }
-    Ok(FileDrive { log: DriveLog { origin: None, scans, drive }, problems })
+    Ok(FileDrive { log: DriveLog { scans, drive }, problems })
 }
 
 fn nothing(path: &Path, no_scans: bool, problems: &BTreeMap<String, (u64, String)>) -> Failure {

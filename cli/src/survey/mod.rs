@@ -1,7 +1,7 @@
-//! `waymark survey`: the map of a building from one drive.
+//! `waymark survey`: the map of a building from drives of a robot.
 //!
 //! ```text
-//! drive_log (a file) -> engine::survey (walls, objects and camera in one estimate) -> upload, report
+//! drive_log (each file) -> engine::survey (walls, objects and camera in one estimate) -> upload, report
 //! ```
 
 mod drive_log;
@@ -15,27 +15,31 @@ pub use simulated::{SimulatedDrive, UNEVEN_M, simulated_drive};
 use crate::{arg_parsers::numbers, recording::drive_args::DriveArgs, screen, session::ServerArgs};
 use anyhow::Context as _;
 use client::protos::Name;
-use engine::survey::{self, Effort, SurveyedBuilding};
+use engine::survey::{self, Drive, Effort, SurveyedBuilding};
 use indicatif::ProgressBar;
 use map::pose2::Pose2;
 use map::slam::{Slam, SlamMap, SlamParams};
 use report::SurveyReport;
-use std::{num::NonZeroUsize, path::PathBuf, sync::Mutex};
+use std::{collections::BTreeMap, num::NonZeroUsize, path::PathBuf, sync::Mutex};
 use vision::params::Params;
+
+/// Most drives of one survey.
+const MAX_DRIVES: usize = 8;
 
 /// `waymark survey`.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// A recording (`waymark record`), or a bag of ROS 2 with MCAP storage: scans, odometry, and
-    /// frames with intrinsics and the camera's mounting.
-    #[arg(value_name = "RECORDING")]
-    recording: PathBuf,
+    /// Recordings (`waymark record`), or bags of ROS 2 with MCAP storage: scans, odometry, and
+    /// frames with intrinsics and the camera's mounting. Several drives of one robot make one map;
+    /// each but the first must see two objects of those before it.
+    #[arg(value_name = "RECORDING", required = true, num_args = 1..=MAX_DRIVES)]
+    recordings: Vec<PathBuf>,
     /// Make this map on the server, with walls and landmarks, and learn them. Without it, nothing
     /// is sent.
     #[arg(long, value_name = "MAP")]
     into: Option<Name>,
-    /// Where the drive begins, if that is known in the frame of the map: x and y in metres, heading
-    /// in radians. Without it, the drive makes the frame, and errors are against it as a whole.
+    /// Where the first drive begins, if that is known in the frame of the map: x and y in metres, heading
+    /// in radians. Without it, the drives make the frame, and errors are against them as a whole.
     #[arg(long, value_name = "X,Y,THETA", value_parser = origin, allow_hyphen_values = true)]
     origin: Option<Pose2>,
     /// The camera whose frames are used, if there are several.
@@ -55,9 +59,15 @@ fn origin(text: &str) -> Result<Pose2, String> {
     Ok(pose)
 }
 
-/// Makes the laser map of a drive, then surveys it, with progress.
-pub fn surveyed(log: &DriveLog, params: &Params) -> anyhow::Result<SurveyedBuilding> {
-    let slam = laser_map(log)?;
+/// Makes the laser map of each drive, then surveys all, with progress. `origin`: the first pose of
+/// the first drive, where it is known in the frame of the map.
+pub fn surveyed(
+    logs: &[DriveLog],
+    origin: Option<&Pose2>,
+    params: &Params,
+) -> anyhow::Result<SurveyedBuilding> {
+    let slams = logs.iter().map(laser_map).collect::<Result<_, _>>()?;
+    let drives: Vec<Drive> = logs.iter().map(|log| log.drive.clone()).collect();
     let bars: Mutex<Option<(&'static str, ProgressBar)>> = Mutex::new(None);
     let told = |what: &'static str, done: usize, of: usize| {
         let mut bar = bars.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
@@ -71,8 +81,7 @@ pub fn surveyed(log: &DriveLog, params: &Params) -> anyhow::Result<SurveyedBuild
         }
     };
     let threads = std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
-    let made =
-        survey::surveyed(&log.drive, slam, log.origin.as_ref(), (params, Effort { threads, told: &told }));
+    let made = survey::surveyed(&drives, slams, origin, (params, Effort { threads, told: &told }));
     if let Some((_, bar)) = bars.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner) {
         bar.finish_and_clear();
     }
@@ -95,21 +104,27 @@ fn laser_map(log: &DriveLog) -> anyhow::Result<SlamMap> {
 /// Runs the command.
 pub(crate) async fn run(args: &Args) -> anyhow::Result<()> {
     let session = args.server.session()?;
-    let (read, building) = tokio::task::block_in_place(|| {
-        let mut read = drive_log::read(&args.recording, &args.drive, args.camera.as_ref())?;
-        read.log.origin = args.origin;
-        let building = surveyed(&read.log, &Params::default())?;
-        anyhow::Ok((read, building))
+    let (logs, problems, building) = tokio::task::block_in_place(|| {
+        let (mut logs, mut problems) = (Vec::new(), BTreeMap::new());
+        for recording in &args.recordings {
+            let read = drive_log::read(recording, &args.drive, args.camera.as_ref())?;
+            logs.push(read.log);
+            for (word, (count, first)) in read.problems {
+                problems.entry(word).or_insert((0, first)).0 += count;
+            }
+        }
+        let building = surveyed(&logs, args.origin.as_ref(), &Params::default())?;
+        anyhow::Ok((logs, problems, building))
     })?;
     let landmarks = match &args.into {
         None => None,
         Some(map) => {
-            let sent = upload::upload(session.maps(), map.as_str(), &read.log, &building).await;
+            let sent = upload::upload(session.maps(), map.as_str(), &logs, &building).await;
             Some(session.explained(sent).await?)
         }
     };
     let sent = args.into.as_ref().zip(landmarks.as_deref()).map(|(map, all)| (map.as_str(), all));
-    let report = SurveyReport::new(&read.log, &building, sent, read.problems);
+    let report = SurveyReport::new(&logs, &building, sent, problems);
     if args.into.is_none() {
         screen::complain("Nothing was sent: --into MAP makes the map on a server.");
     }

@@ -45,7 +45,7 @@ pub(crate) struct SurveyReport {
     walls: usize,
     loops: usize,
     distance_m: f64,
-    odometry_scale_percent: f64,
+    odometry_scale_percent: Vec<f64>,
     camera: CameraLine,
     landmarks: Vec<LandmarkLine>,
     map: Option<String>,
@@ -57,7 +57,7 @@ pub(crate) struct SurveyReport {
 
 impl SurveyReport {
     pub(crate) fn new(
-        log: &DriveLog,
+        logs: &[DriveLog],
         building: &SurveyedBuilding,
         sent: Option<(&str, &[Landmark])>,
         mut problems: BTreeMap<String, (u64, String)>,
@@ -85,16 +85,16 @@ impl SurveyReport {
             }
         };
         let landmarks = building.objects.iter().map(line).collect();
-        let steps =
-            log.drive.scans.windows(2).map(|pair| pair[0].odom.between(&pair[1].odom).position().norm());
+        let scans = || logs.iter().flat_map(|log| log.drive.scans.windows(2));
+        let steps = scans().map(|pair| pair[0].odom.between(&pair[1].odom).position().norm());
         let active = |landmark: &&Landmark| landmark.status == client::api::LandmarkStatus::Active;
         Self {
-            scans: log.scans.len(),
-            frames: log.drive.frames.len(),
+            scans: logs.iter().map(|log| log.scans.len()).sum(),
+            frames: logs.iter().map(|log| log.drive.frames.len()).sum(),
             walls: building.walls.len(),
             loops: building.loops,
             distance_m: steps.sum(),
-            odometry_scale_percent: 100.0 * building.odometry_scale,
+            odometry_scale_percent: building.odometry_scales.iter().map(|scale| 100.0 * scale).collect(),
             camera: camera(building),
             landmarks,
             map: sent.map(|(map, _)| map.to_owned()),
@@ -104,14 +104,15 @@ impl SurveyReport {
     }
 
     pub(crate) fn text(&self) -> String {
+        let scales = self.odometry_scale_percent.iter().map(|scale| format!("{scale:+.1}"));
         let mut text = format!(
-            "{} scans and {} frames over {:.0} m: {}, {}; odometry is {:+.1} % off\n",
+            "{} scans and {} frames over {:.0} m: {}, {}; odometry is {} % off\n",
             self.scans,
             self.frames,
             self.distance_m,
             counted(self.walls as u64, "wall"),
             counted(self.loops as u64, "loop closure"),
-            self.odometry_scale_percent
+            scales.collect::<Vec<_>>().join(", ")
         );
         let c = &self.camera;
         let with = |values: &[f64; 3], sigmas: &[f64; 3], scale: f64| {

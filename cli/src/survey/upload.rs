@@ -1,7 +1,7 @@
 //! Puts a surveyed building on a server: walls, then the views of each landmark with how each was
 //! taken. The server places the landmarks by them, and learns them.
 
-use super::drive_log::DriveLog;
+use super::drive_log::{DriveLog, frame_of};
 use crate::{
     failure::{Class, Failure},
     pictures, screen,
@@ -27,7 +27,7 @@ const LESSON_TIMEOUT: Duration = Duration::from_hours(1);
 pub(crate) async fn upload(
     maps: &MapClient,
     map: &str,
-    log: &DriveLog,
+    logs: &[DriveLog],
     building: &SurveyedBuilding,
 ) -> anyhow::Result<Vec<Landmark>> {
     make_map(maps, map).await?;
@@ -42,7 +42,7 @@ pub(crate) async fn upload(
     for (number, object) in accepted().enumerate() {
         let name = format!("{map}-{:02}", number + 1);
         for view in spread(object) {
-            let new = new_view(log, building, view)?.or_make_landmark(None);
+            let new = new_view(logs, building, view)?.or_make_landmark(None);
             maps.upload_view_with(map, &name, NewView { keep_near_duplicate: true, ..new }).await?;
         }
         progress.inc(1);
@@ -79,13 +79,14 @@ fn spread(object: &SurveyedObject) -> impl Iterator<Item = &ObjectView> {
     object.views.iter().step_by(every)
 }
 
-fn new_view(log: &DriveLog, building: &SurveyedBuilding, view: &ObjectView) -> anyhow::Result<NewView> {
-    let DriveFrame { frame, .. } = &log.drive.frames[view.frame];
+fn new_view(logs: &[DriveLog], building: &SurveyedBuilding, view: &ObjectView) -> anyhow::Result<NewView> {
+    let taken = frame_of(logs, view.frame).context("a view of no frame")?;
+    let DriveFrame { frame, .. } = taken;
     let camera = frame.intrinsics.as_ref().context("a frame without intrinsics")?;
     let mounting = frame.mounting.as_ref().context("a frame without a mounting")?;
     let image = match &frame.pixels {
         Pixels::Image(sent) if matches!(sent.encoding, Encoding::Jpeg | Encoding::Png) => sent.bytes.to_vec(),
-        _ => pictures::photograph_jpeg(picture(&log.drive.frames[view.frame])?.grey())?,
+        _ => pictures::photograph_jpeg(picture(taken)?.grey())?,
     };
     let variances = |c: &nalgebra::Matrix2<f64>| [c[(0, 0)], c[(0, 1)], c[(1, 1)]];
     let capture = CaptureMetadata {

@@ -43,7 +43,7 @@ pub(super) fn fitted(map: SlamMap, drive: Option<Drive>, origin: Option<&Pose2>)
     let alone = Fitted { made, landmarks: None, left_out: Vec::new(), reason: None };
     let Some(drive) = drive.filter(|drive| !drive.frames.is_empty()) else { return alone };
     let effort = Effort { threads: NonZeroUsize::MIN, told: &|_, _, _| {} };
-    match surveyed(&drive, map, origin, (&Params::default(), effort)) {
+    match surveyed(std::slice::from_ref(&drive), vec![map], origin, (&Params::default(), effort)) {
         Ok(building) => {
             let left_out = left_out(&building.objects);
             let landmarks = building.objects.iter().filter(|object| object.refused.is_none()).count();

@@ -1,40 +1,26 @@
-//! The map of one drive: walls, objects and camera in one estimate. In: the drive. Out: the walls,
-//! the objects with their places and views, the camera as it was found, and what each object fails.
+//! The map of drives: walls, objects and camera in one estimate. In: the drives. Out: the walls, the
+//! objects with their places and views, the camera as it was found, and what each object fails.
 
 use super::{
-    drive::{Drive, DriveFrame},
+    drive::Drive,
+    follow::{Followed, Stated, followed, solved},
     gates::{refusal, refuse_twins},
+    identities::pairs,
     look_alikes::refuse_look_alikes,
-    objects::{Known, ObjectView, SeenObject, objects},
+    objects::SeenObject,
     parallel::Effort,
-    sightings::{sightings, straight},
-    surveyed::{SurveyedBuilding, SurveyedObject, with_focal},
+    surveyed::{SurveyedBuilding, SurveyedObject},
 };
 use map::{
-    extrinsics::CameraExtrinsics,
-    fuse::FuseParams,
-    joint::{
-        CameraState, CameraStated, Datum, FrameSeen, JointError, JointLaserMap, JointParams, LaserDrive,
-        MappedWall, ObjectSeen, QuadView,
-    },
+    joint::{Datum, JointError, JointLaserMap},
     pose2::{Pose2, Pose2Covariance},
-    segments::LaserSegment,
     slam::SlamMap,
 };
-use nalgebra::{Isometry3, Matrix3, Matrix6, Point2, SVector};
-use vision::{
-    frame::{Intrinsics, IntrinsicsSigmas},
-    params::Params,
-};
+use nalgebra::Matrix3;
+use std::borrow::Cow;
+use vision::{frame::Intrinsics, params::Params};
 
-/// How far a stated mounting is believed: rotation (radians) and translation (metres). The drive
-/// measures them better.
-const MOUNTING_SIGMA: [f64; 2] = [std::f64::consts::PI / 180.0, 0.02];
-/// How far a stated k1 is believed.
-const K1_SIGMA: f64 = 1e-3;
-/// Times that objects are followed: with the camera as stated, then as found.
-const ROUNDS: usize = 2;
-/// Why a drive gives no building.
+/// Why drives give no building.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SurveyError {
     /// There is nothing to look at.
@@ -46,64 +32,75 @@ pub enum SurveyError {
     /// Frames cannot be put between scans.
     #[error("the capture time of scan {0} is not after that of the scan before")]
     Times(usize),
+    /// One estimate has one camera.
+    #[error("another camera than in the first drive")]
+    OtherCamera,
     /// The estimate cannot be computed.
     #[error(transparent)]
     Joint(#[from] JointError),
     /// The camera as found is not on the robot.
     #[error("the drive puts the camera off its robot")]
     Camera,
+    /// What is wrong with one of several drives.
+    #[error("drive {0}: {1}")]
+    Of(usize, Box<SurveyError>),
 }
 
-/// Surveys a drive whose scans made this laser map. `origin` is the first pose where it is known in
-/// the frame of the map; else the map begins at (0, 0, 0), and covariances are relative to the
-/// drive as a whole.
+/// Surveys drives of one robot, each with the laser map that its scans made. `origin` is the first
+/// pose of the first where it is known in the frame of the map; else the map begins at (0, 0, 0),
+/// and covariances are relative to the drives as a whole. Later drives begin anywhere.
 pub fn surveyed(
-    drive: &Drive,
-    slam: SlamMap,
+    drives: &[Drive],
+    slams: Vec<SlamMap>,
     origin: Option<&Pose2>,
     (params, effort): (&Params, Effort<'_>),
 ) -> Result<SurveyedBuilding, SurveyError> {
+    let datum = if origin.is_some() { Datum::FirstPose } else { Datum::WholeDrive };
+    let slams: Vec<SlamMap> = slams
+        .into_iter()
+        .enumerate()
+        .map(|(number, slam)| match origin.filter(|_| number == 0) {
+            Some(origin) => beginning_at(slam, origin),
+            None => beginning_at(slam, &Pose2::default()),
+        })
+        .collect();
+    if drives.is_empty() || drives.len() != slams.len() {
+        return Err(SurveyError::NoFrame);
+    }
+    let at = |number: usize| {
+        move |error| if drives.len() == 1 { error } else { SurveyError::Of(number + 1, Box::new(error)) }
+    };
+    for (number, (drive, slam)) in drives.iter().zip(&slams).enumerate() {
+        check(drive, slam).map_err(at(number))?;
+    }
+    let stated = Stated::of(&drives[0]).map_err(at(0))?;
+    let mut all = Vec::new();
+    for (number, of) in drives.iter().zip(&slams).enumerate() {
+        if !has_camera(of.0, &stated.intrinsics) {
+            return Err(at(number)(SurveyError::OtherCamera));
+        }
+        all.push(followed(of, &stated, datum, (params, effort)).map_err(at(number))?);
+    }
+    let mut made = together(&all, &stated, datum, (params, effort))?;
+    refuse_look_alikes(&joined(drives), &mut made, (params, effort));
+    Ok(made)
+}
+
+fn check(drive: &Drive, slam: &SlamMap) -> Result<(), SurveyError> {
     if drive.scans.is_empty() || drive.scans.len() != slam.path.len() {
         return Err(SurveyError::Scans(drive.scans.len(), slam.path.len()));
     }
-    if let Some(i) = drive.scans.windows(2).position(|pair| pair[1].captured_ns <= pair[0].captured_ns) {
-        return Err(SurveyError::Times(i + 1));
+    match drive.scans.windows(2).position(|pair| pair[1].captured_ns <= pair[0].captured_ns) {
+        Some(i) => Err(SurveyError::Times(i + 1)),
+        None => Ok(()),
     }
-    let datum = if origin.is_some() { Datum::FirstPose } else { Datum::WholeDrive };
-    let slam = &beginning_at(slam, origin.unwrap_or(&Pose2::default()));
-    let (seen, undecodable) = sightings(drive, params, effort);
-    let camera = drive.frames.first().and_then(|first| first.frame.intrinsics).ok_or(SurveyError::NoFrame)?;
-    let mountings: Vec<CameraExtrinsics> =
-        drive.frames.iter().filter_map(|frame| frame.frame.mounting.clone()).collect();
-    if mountings.len() < drive.frames.len() {
-        return Err(SurveyError::NoFrame);
-    }
-    let stated = state_of(&camera, &mountings[0].robot_from_camera);
-    let laser_frames = by_laser(drive, slam);
-    let mut known = Known {
-        walls: slam.walls.iter().enumerate().map(|(of, wall)| whole(of, wall)).collect(),
-        frames: laser_frames.clone(),
-        mountings,
-        camera,
-    };
-    let mut round = 0;
-    loop {
-        round += 1;
-        let found = objects(drive, &seen, &known, (params, effort));
-        let map = solved((drive, slam, datum), &found, &camera, &stated)?;
-        if round == ROUNDS {
-            let mut building = SurveyedBuilding {
-                laser_walls: slam.walls.clone(),
-                laser_frames,
-                loops: slam.loops.len(),
-                undecodable,
-                ..made(found, map, stated)
-            };
-            refuse_look_alikes(drive, &mut building, (params, effort));
-            return Ok(building);
-        }
-        known = corrected(drive, &map, &camera, &stated)?;
-    }
+}
+
+/// Whether all frames are of this camera; how well it is known may be stated otherwise.
+fn has_camera(drive: &Drive, camera: &Intrinsics) -> bool {
+    let plain = |of: &Intrinsics| Intrinsics { sigmas: None, ..*of };
+    let of = |intrinsics: &Option<Intrinsics>| intrinsics.as_ref().map(plain);
+    drive.frames.iter().all(|frame| of(&frame.frame.intrinsics).is_none_or(|of| of == plain(camera)))
 }
 
 /// The map in a frame where its first pose is `origin`.
@@ -116,92 +113,70 @@ fn beginning_at(mut map: SlamMap, origin: &Pose2) -> SlamMap {
     map
 }
 
-fn whole(of: usize, wall: &LaserSegment) -> MappedWall {
-    MappedWall { segment: wall.clone(), of, from_m: 0.0 }
-}
-
-/// The pose of each frame by the laser map: odometry since the scan before.
-fn by_laser(drive: &Drive, slam: &SlamMap) -> Vec<Pose2> {
-    let pose = |frame: &DriveFrame| {
-        let after = drive.scans.partition_point(|scan| scan.captured_ns <= frame.frame.captured_ns);
-        let scan = after.saturating_sub(1);
-        slam.path[scan].compose(&drive.scans[scan].odom.between(&frame.odom))
+/// All drives in one estimate.
+fn together(
+    all: &[Followed<'_>],
+    stated: &Stated,
+    datum: Datum,
+    (params, effort): (&Params, Effort<'_>),
+) -> Result<SurveyedBuilding, SurveyError> {
+    let [first, ..] = all else { return Err(SurveyError::NoFrame) };
+    let (found, map) = if all.len() == 1 {
+        (first.found.clone(), Cow::Borrowed(&first.map))
+    } else {
+        let same = pairs(all, stated, (params, effort));
+        let drives: Vec<_> = all.iter().map(|of| (of.drive, of.slam, of.found.as_slice())).collect();
+        let mut map = solved(&drives, &same, stated, datum)?;
+        (one_of_each(numbered_through(all), &mut map), Cow::Owned(map))
     };
-    drive.frames.iter().map(pose).collect()
-}
-
-/// The camera without its lens.
-fn state_of(camera: &Intrinsics, robot_from_camera: &Isometry3<f64>) -> CameraState {
-    CameraState {
-        robot_from_camera: *robot_from_camera,
-        focal_px: camera.fx_px,
-        aspect: camera.fy_px / camera.fx_px,
-        centre_px: Point2::new(camera.cx_px, camera.cy_px),
-        k1: 0.0,
-    }
-}
-
-fn solved(
-    (drive, slam, datum): (&Drive, &SlamMap, Datum),
-    found: &[SeenObject],
-    camera: &Intrinsics,
-    stated: &CameraState,
-) -> Result<JointLaserMap, SurveyError> {
-    let scans_ns: Vec<i64> = drive.scans.iter().map(|scan| scan.captured_ns).collect();
-    let frame = |frame: &DriveFrame| FrameSeen { captured_ns: frame.frame.captured_ns, odom: frame.odom };
-    let frames: Vec<FrameSeen> = drive.frames.iter().map(frame).collect();
-    let view = |view: &ObjectView| {
-        let mounting = drive.frames[view.frame].frame.mounting.as_ref()?;
-        Some(QuadView {
-            keyframe: view.frame,
-            mounting_from_camera: stated.robot_from_camera.inverse() * mounting.robot_from_camera,
-            corners_px: straight(&view.corners_px, camera)?,
-            covariance_px2: view.covariance_px2,
-        })
-    };
-    let object = |object: &SeenObject| ObjectSeen {
-        views: object.views.iter().filter_map(view).collect(),
-        on_wall: Some(object.on_wall),
-    };
-    let objects: Vec<ObjectSeen> = found.iter().map(object).collect();
-    let intrinsics = camera.sigmas.unwrap_or_else(|| IntrinsicsSigmas::usual(camera.fx_px));
-    let [turn, shift] = MOUNTING_SIGMA;
-    let (focal, centre) = (intrinsics.focal_px.max(1e-3), intrinsics.center_px.max(1e-3));
-    let sigmas = SVector::from([turn, turn, turn, shift, shift, shift, focal, centre, centre, K1_SIGMA]);
-    let laser = LaserDrive { map: slam, scans_ns: &scans_ns, frames: &frames, objects: &objects };
-    let camera = CameraStated { camera: *stated, sigmas: Some(sigmas) };
-    Ok(laser.joint_map(camera, (&JointParams::default(), &FuseParams::default()), datum)?)
-}
-
-/// What the next round starts from.
-fn corrected(
-    drive: &Drive,
-    map: &JointLaserMap,
-    camera: &Intrinsics,
-    stated: &CameraState,
-) -> Result<Known, SurveyError> {
-    let turned = map.camera.robot_from_camera * stated.robot_from_camera.inverse();
-    let sigmas = map.camera_sigmas.fixed_rows::<6>(0);
-    let covariance = Matrix6::from_diagonal(&sigmas.component_mul(&sigmas));
-    let mounting = |frame: &DriveFrame| {
-        let stated = frame.frame.mounting.as_ref()?;
-        let made = CameraExtrinsics { robot_from_camera: turned * stated.robot_from_camera, covariance };
-        made.check().ok().map(|()| made)
-    };
-    let mountings: Vec<CameraExtrinsics> = drive.frames.iter().filter_map(mounting).collect();
-    if mountings.len() < drive.frames.len() {
-        return Err(SurveyError::Camera);
-    }
-    Ok(Known {
-        walls: map.walls.clone(),
-        frames: map.frames.iter().map(|frame| frame.pose).collect(),
-        mountings,
-        camera: with_focal(camera, map.camera.focal_px),
+    Ok(SurveyedBuilding {
+        laser_walls: first.slam.walls.clone(),
+        laser_frames: first.laser_frames.clone(),
+        loops: all.iter().map(|of| of.slam.loops.len()).sum(),
+        undecodable: all.iter().map(|of| of.undecodable).sum(),
+        ..building(found, &map, stated)
     })
 }
 
+/// Objects of all drives, their frames numbered through.
+fn numbered_through(all: &[Followed<'_>]) -> Vec<SeenObject> {
+    let mut first = 0;
+    let mut found = Vec::new();
+    for of in all {
+        found.extend(of.found.iter().cloned().map(|mut object| {
+            object.views.iter_mut().for_each(|view| view.frame += first);
+            object
+        }));
+        first += of.drive.frames.len();
+    }
+    found
+}
+
+/// Objects that are one get the place of the earliest and the views of all.
+fn one_of_each(mut found: Vec<SeenObject>, map: &mut JointLaserMap) -> Vec<SeenObject> {
+    for &[earlier, later] in &map.same {
+        let views = std::mem::take(&mut found[later].views);
+        found[earlier].views.extend(views);
+        map.objects[later] = None;
+    }
+    found
+}
+
+/// All drives as one: their frames, one drive after the other.
+fn joined(drives: &[Drive]) -> Cow<'_, Drive> {
+    if let [only] = drives {
+        return Cow::Borrowed(only);
+    }
+    let mut all = Drive::default();
+    for drive in drives {
+        all.scans.extend_from_slice(&drive.scans);
+        all.frames.extend_from_slice(&drive.frames);
+    }
+    Cow::Owned(all)
+}
+
 /// The solution, without what is of the laser map and the frames.
-fn made(found: Vec<SeenObject>, map: JointLaserMap, stated: CameraState) -> SurveyedBuilding {
+pub(super) fn building(found: Vec<SeenObject>, map: &JointLaserMap, stated: &Stated) -> SurveyedBuilding {
     let mut objects = Vec::new();
     for (seen, mapped) in found.into_iter().zip(&map.objects) {
         let Some(mapped) = mapped else { continue };
@@ -211,14 +186,14 @@ fn made(found: Vec<SeenObject>, map: JointLaserMap, stated: CameraState) -> Surv
     }
     refuse_twins(&mut objects);
     SurveyedBuilding {
-        walls: map.walls.into_iter().map(|wall| wall.segment).collect(),
+        walls: map.walls.iter().map(|wall| wall.segment.clone()).collect(),
         laser_walls: Vec::new(),
         laser_frames: Vec::new(),
         objects,
-        frames: map.frames,
+        frames: map.frames.clone(),
         camera: (map.camera, map.camera_sigmas),
-        stated,
-        odometry_scale: map.odometry.scale,
+        stated: stated.camera,
+        odometry_scales: map.odometry.iter().map(|errors| errors.scale).collect(),
         loops: 0,
         undecodable: 0,
     }
@@ -227,23 +202,31 @@ fn made(found: Vec<SeenObject>, map: JointLaserMap, stated: CameraState) -> Surv
 #[cfg(test)]
 mod tests {
     use super::{super::drive::ScanStamp, *};
-    use nalgebra::Vector2;
+    use map::segments::LaserSegment;
+    use nalgebra::{Point2, Vector2};
 
     #[test]
     fn a_drive_whose_scans_go_back_in_time_is_refused() {
         let (told, params) = (|_: &'static str, _: usize, _: usize| {}, Params::default());
         let effort = Effort { threads: std::num::NonZeroUsize::MIN, told: &told };
-        let surveyed_at = |times: &[i64]| {
+        let drive = |times: &[i64]| {
             let stamp = |captured_ns: &i64| ScanStamp { captured_ns: *captured_ns, odom: Pose2::default() };
             let drive = Drive { scans: times.iter().map(stamp).collect(), frames: Vec::new() };
             let path = vec![Pose2::default(); times.len()];
-            let slam = SlamMap { path, keys: Vec::new(), loops: Vec::new(), refused: 0, walls: Vec::new() };
-            surveyed(&drive, slam, None, (&params, effort)).unwrap_err()
+            (drive, SlamMap { path, keys: Vec::new(), loops: Vec::new(), refused: 0, walls: Vec::new() })
         };
-        assert_eq!(surveyed_at(&[]), SurveyError::Scans(0, 0));
-        assert_eq!(surveyed_at(&[5, 9, 8]), SurveyError::Times(2));
-        assert_eq!(surveyed_at(&[0, 0]), SurveyError::Times(1));
-        assert_eq!(surveyed_at(&[5, 9]), SurveyError::NoFrame);
+        let surveyed_at = |times: &[&[i64]]| {
+            let (drives, slams): (Vec<Drive>, Vec<SlamMap>) = times.iter().map(|of| drive(of)).unzip();
+            surveyed(&drives, slams, None, (&params, effort)).unwrap_err()
+        };
+        assert_eq!(surveyed_at(&[&[]]), SurveyError::Scans(0, 0));
+        assert_eq!(surveyed_at(&[&[5, 9, 8]]), SurveyError::Times(2));
+        assert_eq!(surveyed_at(&[&[0, 0]]), SurveyError::Times(1));
+        assert_eq!(surveyed_at(&[&[5, 9]]), SurveyError::NoFrame);
+        assert_eq!(surveyed_at(&[]), SurveyError::NoFrame);
+        let second = surveyed_at(&[&[5, 9], &[0, 0]]);
+        assert_eq!(second, SurveyError::Of(2, Box::new(SurveyError::Times(1))));
+        assert!(second.to_string().starts_with("drive 2: the capture time"), "{second}");
     }
 
     #[test]

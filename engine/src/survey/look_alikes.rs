@@ -73,7 +73,12 @@ fn models(
 }
 
 /// Learnt from some of its views, whatever the gates of a lesson say.
-fn model(drive: &Drive, object: &SurveyedObject, id: LandmarkId, params: &Params) -> Option<LandmarkModel> {
+pub(super) fn model(
+    drive: &Drive,
+    object: &SurveyedObject,
+    id: LandmarkId,
+    params: &Params,
+) -> Option<LandmarkModel> {
     let every = object.views.len().div_ceil(MAX_VIEWS).max(1);
     let photograph = |view: &ObjectView| {
         let seen = picture(&drive.frames[view.frame]).ok()?;
@@ -91,13 +96,13 @@ fn model(drive: &Drive, object: &SurveyedObject, id: LandmarkId, params: &Params
 }
 
 /// How a frame was looked at, by the solution.
-struct FrameLook {
+pub(super) struct FrameLook {
     camera_from_map: Isometry3<f64>,
     camera: Intrinsics,
 }
 
 impl FrameLook {
-    fn new(building: &SurveyedBuilding, number: usize, frame: &DriveFrame) -> Option<Self> {
+    pub(super) fn new(building: &SurveyedBuilding, number: usize, frame: &DriveFrame) -> Option<Self> {
         let mounting = building.mounting(&frame.frame.mounting.as_ref()?.robot_from_camera);
         let map_from_camera = building.frames.get(number)?.pose.to_isometry3() * mounting;
         let camera = building.intrinsics(frame.frame.intrinsics.as_ref()?);
@@ -112,16 +117,22 @@ impl FrameLook {
         place: impl Fn(LandmarkId) -> Option<LandmarkPlace>,
         params: &Params,
     ) -> Vec<LandmarkId> {
-        let Ok(picture) = picture(frame) else { return Vec::new() };
-        let analysed = analysed(frame, &picture, models, params);
-        let named = analysed.quads.iter().filter_map(|quad| {
-            let result = quad.recognition.as_ref()?;
+        let named = recognised(frame, models, params);
+        let elsewhere = named.iter().filter_map(|(result, corners)| {
             let id = taken_for(result)?;
-            // Where the quad is: corners by points of a part may be far off.
             let there = self.sees(&place(id)?);
-            (!there.is_some_and(|there| is_at(quad.quad.corners_px.points(), &there))).then_some(id)
+            (!there.is_some_and(|there| is_at(corners.points(), &there))).then_some(id)
         });
-        named.collect()
+        elsewhere.collect()
+    }
+
+    /// The object that is where a quad is, the one with most views of several.
+    pub(super) fn at(&self, corners: &Corners, objects: &[SurveyedObject]) -> Option<usize> {
+        let is_there = |object: &SurveyedObject| {
+            self.sees(&object.place).is_some_and(|there| is_at(corners.points(), &there))
+        };
+        let there = (0..objects.len()).filter(|i| is_there(&objects[*i]));
+        there.max_by_key(|i| (objects[*i].views.len(), std::cmp::Reverse(*i)))
     }
 
     /// Corners of a landmark; `None` behind the camera.
@@ -132,6 +143,19 @@ impl FrameLook {
         let [a, b, c, d] = [[-w, h], [w, h], [w, -h], [-w, -h]].map(corner);
         Some([a?, b?, c?, d?])
     }
+}
+
+/// What is recognised in a frame, and where the quad is: corners by points of a part may be far
+/// off.
+pub(super) fn recognised(
+    frame: &DriveFrame,
+    models: &ModelSet,
+    params: &Params,
+) -> Vec<(RecognitionResult, Corners)> {
+    let Ok(picture) = picture(frame) else { return Vec::new() };
+    let analysed = analysed(frame, &picture, models, params);
+    let quads = analysed.quads.into_iter();
+    quads.filter_map(|quad| Some((quad.recognition?, quad.quad.corners_px))).collect()
 }
 
 fn is_at(quad: &[Point2<f64>; 4], there: &[Point2<f64>; 4]) -> bool {

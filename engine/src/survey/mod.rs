@@ -1,12 +1,13 @@
-//! The map of a building from one drive: walls, objects and camera in one estimate (method 29.4).
+//! The map of a building from drives: walls, objects and camera in one estimate (method 29.4).
 //!
 //! ```text
-//! drive (scans' odometry, frames) -> sightings (quads of frames) -> objects (quads of one object)
-//!     -> building (walls, objects, camera) -> landmarks (objects that pass gates, and look like
-//!     nothing else)
+//! follow: drive (scans' odometry, frames) -> sightings (quads of frames) -> objects (quads of one)
+//! identities: objects of a later drive that are those of earlier ones
+//! building: walls, objects and camera of all drives -> landmarks (objects that pass gates, and look
+//!     like nothing else)
 //! ```
 //!
-//! In: a drive with its finished laser map. Out: walls, objects with places and views, the camera
+//! In: drives, each with its finished laser map. Out: walls, objects with places and views, the camera
 //! as found. Commands read a drive of a file; the server's mappings make it of messages.
 
 mod parallel;
@@ -15,7 +16,9 @@ mod sightings;
 mod objects;
 mod surveyed;
 mod gates;
+mod follow;
 mod look_alikes;
+mod identities;
 mod building;
 
 pub use building::{SurveyError, surveyed};

@@ -1,4 +1,4 @@
-//! What a drive gives: walls, objects, and the camera as it was found.
+//! What drives give: walls, objects, and the camera as it was found.
 
 use super::objects::ObjectView;
 use map::{
@@ -21,26 +21,26 @@ pub struct SurveyedObject {
     pub refused: Option<String>,
 }
 
-/// What a drive gave.
+/// What drives gave.
 #[derive(Debug)]
 pub struct SurveyedBuilding {
     /// Walls, map frame.
     pub walls: Vec<LaserSegment>,
-    /// Walls of the laser map alone, for comparison.
+    /// Walls of the first laser map alone, for comparison.
     pub laser_walls: Vec<LaserSegment>,
-    /// `map_from_robot` of each frame by the laser map alone.
+    /// `map_from_robot` of each frame of the first drive by its laser map alone.
     pub laser_frames: Vec<Pose2>,
     /// Objects.
     pub objects: Vec<SurveyedObject>,
-    /// `map_from_robot` of each frame.
+    /// `map_from_robot` of each frame, those of later drives after those of earlier ones.
     pub frames: Vec<Pose2Covariance>,
     /// The camera as found, without its lens, and its standard deviations.
     pub camera: (CameraState, SVector<f64, 10>),
     /// The camera as stated.
     pub stated: CameraState,
-    /// Scale of odometry as found, minus 1.
-    pub odometry_scale: f64,
-    /// Loop closures of the laser map.
+    /// Scale of odometry as found, minus 1, of each drive.
+    pub odometry_scales: Vec<f64>,
+    /// Loop closures of the laser maps.
     pub loops: usize,
     /// Frames that could not be decoded.
     pub undecodable: usize,
@@ -119,7 +119,7 @@ mod tests {
             frames: vec![frame(0.0), frame(4.0)],
             camera: (camera, SVector::zeros()),
             stated: camera,
-            odometry_scale: 0.0,
+            odometry_scales: vec![0.0],
             loops: 0,
             undecodable: 0,
         };

@@ -188,7 +188,12 @@ fn piece_at(wall: usize, along_m: f64, pieces: &[Piece]) -> Option<usize> {
 }
 
 /// The piece of wall that a line of a scan from this pose lies on.
-fn piece_of(line: &LaserSegment, pose: &Pose2, walls: &[LaserSegment], pieces: &[Piece]) -> Option<usize> {
+pub(super) fn piece_of(
+    line: &LaserSegment,
+    pose: &Pose2,
+    walls: &[LaserSegment],
+    pieces: &[Piece],
+) -> Option<usize> {
     let middle = pose.apply(&nalgebra::center(&line.a, &line.b));
     let facing = line.facing();
     let facing_rad = wrap_rad(facing.y.atan2(facing.x) + pose.theta_rad);
@@ -207,7 +212,7 @@ fn piece_of(line: &LaserSegment, pose: &Pose2, walls: &[LaserSegment], pieces: &
 }
 
 /// A line as measured from the robot, with the unevenness of walls.
-fn line_seen(line: &LaserSegment, keyframe: usize, wall: usize) -> LineSeen {
+pub(super) fn line_seen(line: &LaserSegment, keyframe: usize, wall: usize) -> LineSeen {
     let (at, covariance) = local(line, &Point2::origin());
     let p = WallParams::default();
     let middle = nalgebra::center(&line.a, &line.b).coords;

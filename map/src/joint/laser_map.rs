@@ -1,16 +1,16 @@
-//! The joint map of one drive with a laser: walls, and the place of each object, in the frame of
-//! the laser map.
+//! The joint map of drives with a laser: walls, and the place of each object, in the frame of the
+//! first laser map.
 
 use super::{
     build::SurveyProblem,
     closures::weights,
     datum::{Datum, DriveFrame},
-    laser_drive::{DriveSurvey, LaserDrive, Piece, SHARED},
+    laser_drive::{LaserDrive, Piece, SHARED},
+    laser_drives::{Joined, JoinedSolution, LaserDrives},
     marginals::Marginals,
     params::JointParams,
     problem::JointError,
     survey::CameraStated,
-    survey_map::opened_from,
     variables::{CameraState, LandmarkState, OdometryErrors, Variable, WallLine},
 };
 use crate::{
@@ -19,9 +19,9 @@ use crate::{
     place::LandmarkPlace,
     pose2::{Pose2, Pose2Covariance},
     segments::LaserSegment,
-    slam::SlamMap,
 };
 use nalgebra::{DMatrix, Matrix2, Matrix3, Matrix6, Point2, SVector};
+use std::collections::BTreeMap;
 
 /// Variables whose covariance is computed at once.
 const AT_ONCE: usize = 32;
@@ -51,27 +51,29 @@ pub struct MappedWall {
     pub from_m: f64,
 }
 
-/// The joint map of one drive; covariances are relative to the datum.
+/// The joint map of drives; covariances are relative to the datum.
 #[derive(Debug, Clone)]
 pub struct JointLaserMap {
     /// Walls.
     pub walls: Vec<MappedWall>,
-    /// `map_from_robot` of every frame.
+    /// `map_from_robot` of every frame, those of later drives after those of earlier ones.
     pub frames: Vec<Pose2Covariance>,
-    /// `map_from_robot` of every scan, in order.
+    /// `map_from_robot` of every scan, in the same order.
     pub path: Vec<Pose2>,
     /// Objects in their order; `None` with too few views, or at no possible place.
     pub objects: Vec<Option<MappedObject>>,
+    /// Pairs of objects of different drives that are one; each has its own place still.
+    pub same: Vec<[usize; 2]>,
     /// The camera as estimated.
     pub camera: CameraState,
     /// Standard deviations of its rotation (radians), translation (metres), focal length, centre
     /// (px) and k1.
     pub camera_sigmas: SVector<f64, 10>,
-    /// Odometry's systematic errors as estimated.
-    pub odometry: OdometryErrors,
+    /// Odometry's systematic errors as estimated, of each drive.
+    pub odometry: Vec<OdometryErrors>,
 }
 
-impl LaserDrive<'_> {
+impl LaserDrives<'_> {
     /// Solves for walls, objects, camera and odometry together.
     pub fn joint_map(
         &self,
@@ -79,9 +81,9 @@ impl LaserDrive<'_> {
         (params, odometry): (&JointParams, &FuseParams),
         datum: Datum,
     ) -> Result<JointLaserMap, JointError> {
-        let made = self.survey(camera, odometry)?;
+        let mut joined = Joined::new(self, camera, odometry)?;
         let params = JointParams { line_doubt_chi2: Some(LINE_CHI2 / SHARED), ..params.clone() };
-        let solved = opened_from(&made.survey, &params, made.keyframes.clone())?;
+        let JoinedSolution { problem: solved, same } = joined.solved(&params)?;
         let camera = Marginals::of(&solved.problem, &[Variable::Camera(0)])?.into_covariance();
         let frame = match datum {
             Datum::FirstPose => None,
@@ -89,14 +91,27 @@ impl LaserDrive<'_> {
         };
         let solved = Solved { solved, frame };
         Ok(JointLaserMap {
-            walls: walls(&solved, &made, &self.map.walls)?,
-            frames: frames(&solved, &made.of_frame)?,
-            path: path(self.map, &made.of_key, &solved.problem.state.keyframes),
+            walls: walls(&solved, &joined)?,
+            frames: frames(&solved, &joined.frames(&solved))?,
+            path: joined.path(&solved),
             objects: objects(&solved)?,
+            same,
             camera: solved.problem.state.cameras[0],
             camera_sigmas: SVector::from_fn(|i, _| camera[(i, i)].max(0.0).sqrt()),
-            odometry: solved.problem.state.odometry[0],
+            odometry: solved.problem.state.odometry.clone(),
         })
+    }
+}
+
+impl LaserDrive<'_> {
+    /// The joint map of this drive alone.
+    pub fn joint_map(
+        &self,
+        camera: CameraStated,
+        params: (&JointParams, &FuseParams),
+        datum: Datum,
+    ) -> Result<JointLaserMap, JointError> {
+        LaserDrives { drives: &[*self], same: &[] }.joint_map(camera, params, datum)
     }
 }
 
@@ -131,15 +146,6 @@ impl Solved {
         }
         Ok(made)
     }
-}
-
-/// Every scan moves with the keyframe before it.
-fn path(map: &SlamMap, of_key: &[usize], keyframes: &[Pose2]) -> Vec<Pose2> {
-    let scan = |(scan, pose): (usize, &Pose2)| {
-        let key = map.keys.partition_point(|key| key.scan <= scan).saturating_sub(1);
-        keyframes[of_key[key]].compose(&map.keys[key].pose.pose.between(pose))
-    };
-    map.path.iter().enumerate().map(scan).collect()
 }
 
 fn frames(solved: &Solved, of_frame: &[usize]) -> Result<Vec<Pose2Covariance>, JointError> {
@@ -187,28 +193,25 @@ fn place(landmark: &LandmarkState, covariance: &Matrix6<f64>) -> LandmarkPlace {
 
 /// The pieces of walls, each on its line; one that no line of a scan lies on moves with the nearest
 /// keyframe.
-fn walls(
-    solved: &Solved,
-    made: &DriveSurvey,
-    before: &[LaserSegment],
-) -> Result<Vec<MappedWall>, JointError> {
-    let mut covariances = vec![Matrix2::zeros(); made.pieces.len()];
+fn walls(solved: &Solved, joined: &Joined<'_>) -> Result<Vec<MappedWall>, JointError> {
     let chosen: Vec<Variable> = solved.wall_of.values().map(|wall| Variable::Wall(*wall)).collect();
-    for (piece, block) in solved.wall_of.keys().zip(solved.covariances(&chosen)?) {
-        covariances[*piece] = Matrix2::from_fn(|r, c| block[(r, c)]);
-    }
-    let moved = Moved { before: &made.keyframes, after: &solved.problem.state.keyframes };
-    let segment = |(number, piece): (usize, &Piece)| {
-        let wall = &before[piece.wall];
-        let ends = piece.along_m.map(|along| moved.point(&(wall.a + wall.direction() * along)));
-        let segment = match solved.wall_of.get(&number) {
-            Some(line) => on_line(&solved.problem.state.walls[*line], &covariances[number], ends),
-            None => LaserSegment::about_middle(ends[0], ends[1], &wall.covariance_about_middle()),
+    let covariances: BTreeMap<usize, Matrix2<f64>> = solved
+        .wall_of
+        .keys()
+        .zip(solved.covariances(&chosen)?)
+        .map(|(piece, block)| (*piece, Matrix2::from_fn(|r, c| block[(r, c)])))
+        .collect();
+    let segment = |(number, drive, piece): (usize, usize, &Piece)| {
+        let wall = joined.wall(drive, piece);
+        let ends = joined.ends(solved, number);
+        let segment = match (solved.wall_of.get(&number), covariances.get(&number)) {
+            (Some(line), Some(covariance)) => on_line(&solved.problem.state.walls[*line], covariance, ends),
+            _ => LaserSegment::about_middle(ends[0], ends[1], &wall.covariance_about_middle()),
         };
         let segment = LaserSegment { hits: wall.hits, ..segment.ok()? };
-        Some(MappedWall { segment, of: piece.wall, from_m: piece.along_m[0] })
+        Some(MappedWall { segment, of: joined.first_wall(drive) + piece.wall, from_m: piece.along_m[0] })
     };
-    Ok(made.pieces.iter().enumerate().filter_map(segment).collect())
+    Ok(joined.pieces().filter_map(segment).collect())
 }
 
 /// The piece of a line between the feet of two points; `covariance` is that of the line.
@@ -223,19 +226,4 @@ fn on_line(
     let by = Matrix2::new(1.0, 0.0, -line.along().dot(&(nalgebra::center(&a, &b) - line.anchor)), 1.0);
     let covariance = by * covariance * by.transpose();
     LaserSegment::about_middle(a, b, &(0.5 * (covariance + covariance.transpose())))
-}
-
-/// How the solution moved the keyframes.
-struct Moved<'a> {
-    before: &'a [Pose2],
-    after: &'a [Pose2],
-}
-
-impl Moved<'_> {
-    /// A point, moved with the keyframe that was nearest.
-    fn point(&self, at: &Point2<f64>) -> Point2<f64> {
-        let away = |i: &usize| (self.before[*i].position() - at.coords).norm_squared();
-        let nearest = (0..self.before.len()).min_by(|a, b| away(a).total_cmp(&away(b)));
-        nearest.map_or(*at, |i| self.after[i].apply(&self.before[i].inverse().apply(at)))
-    }
 }

@@ -24,6 +24,14 @@ pub enum JointError {
     /// The factors do not determine every variable.
     #[error("the factors do not determine every variable")]
     Loose,
+    /// A drive cannot be laid on those before it.
+    #[error("drive {drive} shares {common} objects with those before it, and needs 2")]
+    Apart {
+        /// From 1.
+        drive: usize,
+        /// Objects that both saw.
+        common: usize,
+    },
     /// A number of a survey is out of range.
     #[error("{field} of {what} {number} is out of range")]
     Survey {

@@ -28,7 +28,7 @@ const OPEN_LOOP: f64 = 4.0;
 /// Farther apart in the common frame no candidate between drives is tried, metres.
 const FAR_M: f64 = 3.0;
 /// Below this weight a closure, or a landmark's own views, are taken as contradicted.
-const CONTRADICTED: f64 = 0.5;
+pub(super) const CONTRADICTED: f64 = 0.5;
 
 /// A candidate and what became of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -114,7 +114,11 @@ pub(super) struct Candidates {
 }
 
 impl Candidates {
-    fn new(survey: &Survey, opened: &[SurveyProblem], params: &JointParams) -> Result<Self, JointError> {
+    pub(super) fn new(
+        survey: &Survey,
+        opened: &[SurveyProblem],
+        params: &JointParams,
+    ) -> Result<Self, JointError> {
         let pairs = survey.candidates.clone();
         // Drive and landmark of each track, in the problem of its drive alone.
         let of: Vec<(usize, Option<usize>)> = opened
@@ -159,7 +163,7 @@ impl Candidates {
         Self { tried: distances_m.iter().map(|d| *d <= FAR_M).collect(), pairs, frames: Vec::new() }
     }
 
-    fn in_one_frame(&self, opened: &[SurveyProblem], keyframes: Vec<Pose2>) -> Vec<Pose2> {
+    pub(super) fn in_one_frame(&self, opened: &[SurveyProblem], keyframes: Vec<Pose2>) -> Vec<Pose2> {
         let counts = opened.iter().map(|o| o.problem.state.keyframes.len());
         let frames = self.frames.iter().zip(counts).flat_map(|(frame, n)| std::iter::repeat_n(frame, n));
         frames.zip(keyframes).map(|(frame, pose)| frame.compose(&pose)).collect()

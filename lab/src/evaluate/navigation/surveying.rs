@@ -25,11 +25,10 @@ pub(super) type FirstMap = (Vec<LaserSegment>, Vec<Photographed>);
 pub(super) fn survey(building: &Arc<Building>, photographs: usize, seed: u64) -> anyhow::Result<FirstMap> {
     let drive = DriveParams { seed, legs: 2, ..DriveParams::default() };
     let mut truth = Vec::new();
-    let SimulatedDrive { mut log, .. } = simulated_drive(building, drive, |readings| {
+    let SimulatedDrive { log, .. } = simulated_drive(building, drive, seed, |readings| {
         truth.push(Point2::from(readings.step.map_from_robot.position()));
     })?;
-    log.origin = None;
-    let found = surveyed(&log, &Params::default())?.laid_on_path(&truth);
+    let found = surveyed(std::slice::from_ref(&log), None, &Params::default())?.laid_on_path(&truth);
     let mut named: BTreeMap<String, Photographed> = BTreeMap::new();
     let accepted = found.objects.iter().filter(|object| object.refused.is_none());
     for (number, SurveyedObject { place, views, .. }) in accepted.enumerate() {

@@ -1,8 +1,10 @@
-//! A corridor, a drive there and back, and what was to be seen.
+//! A corridor, drives there and back of one robot, and what was to be seen.
 
 use crate::evaluate::experiment::mixed;
-use cli::survey::{SimulatedDrive, simulated_drive};
+use anyhow::Context as _;
+use cli::survey::{DriveLog, simulated_drive};
 use map::pose2::Pose2;
+use nalgebra::Isometry3;
 use sim::{
     building::{Building, LandmarkTruth},
     corridor::CorridorParams,
@@ -26,14 +28,17 @@ pub(super) struct Course {
     pub(super) rate_hz: f64,
     /// The camera points ahead; else a head turns it to posters.
     pub(super) ahead: bool,
+    pub(super) drives: usize,
     pub(super) seed: u64,
 }
 
-/// A drive there and back.
+/// Drives there and back.
 pub(super) struct Driven {
     pub(super) building: Arc<Building>,
-    pub(super) drive: SimulatedDrive,
-    /// True poses of the frames.
+    pub(super) logs: Vec<DriveLog>,
+    /// True mounting of the first frame.
+    pub(super) mounting: Isometry3<f64>,
+    /// True poses of the frames of all drives.
     pub(super) path: Vec<Pose2>,
     /// Posters that some frame shows in full.
     pub(super) shown: BTreeSet<String>,
@@ -60,27 +65,34 @@ pub(super) fn drive(course: &Course) -> anyhow::Result<Driven> {
         ..CorridorParams::default()
     };
     let building = Arc::new(Building::corridor_with(&corridor, course.seed));
-    let drive = DriveParams {
-        seed: mixed(&[course.seed, 22]),
+    let params = DriveParams {
         legs: 2,
         rate_hz: course.rate_hz,
         gaze: GazeParams { look_at_posters: !course.ahead, ..GazeParams::default() },
         ..DriveParams::default()
     };
     let (mut shown, mut path) = (BTreeSet::new(), Vec::new());
+    let (mut logs, mut mounting) = (Vec::new(), None);
     let is_shown = |view: &&LandmarkView| {
         view.state == ViewState::Full
             && view.min_side_px() >= MIN_SIDE_PX
             && view.view_angle_rad <= MAX_ANGLE_RAD
     };
-    let mut drive = simulated_drive(&building, drive, |readings: &SensorReadings| {
-        path.push(readings.step.map_from_robot);
-        let views = readings.frame.truth.landmarks.iter().filter(is_shown);
-        shown.extend(views.map(|view| view.name.clone()));
-    })?;
+    let robot_seed = mixed(&[course.seed, 22]);
+    for number in 0..course.drives as u64 {
+        // Of the first, that of its robot.
+        let seed = if number == 0 { robot_seed } else { mixed(&[course.seed, 22, number]) };
+        let drive = DriveParams { seed, ..params.clone() };
+        let driven = simulated_drive(&building, drive, robot_seed, |readings: &SensorReadings| {
+            path.push(readings.step.map_from_robot);
+            let views = readings.frame.truth.landmarks.iter().filter(is_shown);
+            shown.extend(views.map(|view| view.name.clone()));
+        })?;
+        mounting = mounting.or(Some(driven.mounting));
+        logs.push(driven.log);
+    }
     let posters: BTreeSet<&str> = building.posters().map(|poster| poster.name.as_str()).collect();
     shown.retain(|name| posters.contains(name.as_str()));
-    // As of a building that nobody has a plan of.
-    drive.log.origin = None;
-    Ok(Driven { building, drive, path, shown, first_poster: corridor.first_poster })
+    let mounting = mounting.context("no drive")?;
+    Ok(Driven { building, logs, mounting, path, shown, first_poster: corridor.first_poster })
 }

@@ -40,6 +40,9 @@ pub(crate) struct Args {
     /// Posters in the corridor.
     #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=64))]
     posters: u32,
+    /// Drives of one robot, all in one map.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=8))]
+    drives: u32,
     /// Frames and scans a second.
     #[arg(long, default_value_t = 5.0)]
     rate_hz: f64,
@@ -190,13 +193,14 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
         posters: args.posters as usize,
         rate_hz: args.rate_hz,
         ahead: args.ahead,
+        drives: args.drives as usize,
         seed,
     };
     let drives = of_each(&seeds, "drives", |_, seed| drive(&course(*seed)));
     let mut all = Figures::default();
     for driven in drives {
         let driven = driven?;
-        let building = surveyed(&driven.drive.log, &Params::default())?;
+        let building = surveyed(&driven.logs, None, &Params::default())?;
         all.add(figures(&driven, &building));
     }
     let report = all.report();
@@ -243,9 +247,8 @@ fn figures(driven: &Driven, building: &SurveyedBuilding) -> Figures {
     let lost = driven.shown.iter().filter(|name| !named.contains(*name));
     made.lost = lost.map(|name| format!("{name}: {}", why_lost(driven, building, name))).collect();
     (made.joint_aligned_m, made.two_steps_aligned_m) = (aligned(&joint), aligned(&two));
-    let angle = |found: &nalgebra::Isometry3<f64>| {
-        found.rotation.angle_to(&driven.drive.mounting.rotation).to_degrees()
-    };
+    let angle =
+        |found: &nalgebra::Isometry3<f64>| found.rotation.angle_to(&driven.mounting.rotation).to_degrees();
     made.stated_deg.push(angle(&building.stated.robot_from_camera));
     made.found_deg.push(angle(&building.camera.0.robot_from_camera));
     made
@@ -289,13 +292,13 @@ fn size_errors(place: &LandmarkPlace, borders: &[[f64; 2]]) -> [f64; 2] {
     all.min_by(|a, b| (a[0] + a[1]).total_cmp(&(b[0] + b[1]))).unwrap_or([100.0; 2])
 }
 
-/// The place of an object by the laser map's walls and poses and the camera as stated.
+/// The place of an object by the first drive's laser map and the camera as stated.
 fn two_steps(driven: &Driven, building: &SurveyedBuilding, object: &SurveyedObject) -> Option<LandmarkPlace> {
     let sigmas = Vector3::from(NEAR_SIGMA);
     let covariance = Matrix3::from_diagonal(&sigmas.component_mul(&sigmas));
     let p = PlacementParams::default();
     let on_wall = |view: &ObjectView| {
-        let frame = &driven.drive.log.drive.frames[view.frame].frame;
+        let frame = &driven.logs[0].drive.frames.get(view.frame)?.frame;
         let posed = PosedView {
             corners: &view.corners_px,
             covariance_px2: &view.covariance_px2,

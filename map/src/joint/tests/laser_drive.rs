@@ -1,11 +1,11 @@
-//! A drive through a ring of corridors with posters: the program makes the laser map, gives lines
-//! to walls, and the joint map corrects the odometry, the camera and the places.
+//! Drives through a corridor with posters: the program makes the laser maps, gives lines to walls,
+//! and the joint map corrects the odometry, the camera and the places.
 
 use crate::{
     fuse::FuseParams,
     joint::{
-        CameraState, CameraStated, Datum, FrameSeen, JointLaserMap, JointParams, LaserDrive, MappedObject,
-        ObjectSeen, QuadView,
+        CameraState, CameraStated, Datum, FrameSeen, JointError, JointLaserMap, JointParams, LaserDrive,
+        LaserDrives, MappedObject, ObjectSeen, QuadView,
     },
     pose2::Pose2,
     segments::LaserSegment,
@@ -53,6 +53,12 @@ fn path() -> Vec<Pose2> {
     there.chain(turn).chain(back).collect()
 }
 
+/// From the far end here, a turn on the spot, and back.
+fn path_from_the_far_end() -> Vec<Pose2> {
+    let far = Pose2::new(24.0, 0.0, std::f64::consts::PI);
+    path().iter().map(|pose| far.compose(pose)).collect()
+}
+
 fn camera() -> CameraState {
     // Looks forwards: camera z is robot x, camera x is robot -y.
     let looks = Rotation3::from_matrix_unchecked(nalgebra::Matrix3::new(
@@ -92,6 +98,7 @@ fn seen(robot: &Pose2, poster: &Poster, camera: &CameraState) -> Option<[Point2<
 }
 
 struct Driven {
+    start: Pose2,
     map: SlamMap,
     scans_ns: Vec<i64>,
     frames: Vec<FrameSeen>,
@@ -100,14 +107,18 @@ struct Driven {
 
 impl Driven {
     fn drive(&self) -> LaserDrive<'_> {
-        let Self { map, scans_ns, frames, objects } = self;
+        let Self { map, scans_ns, frames, objects, .. } = self;
         LaserDrive { map, scans_ns, frames, objects }
     }
 }
 
-/// A drive with an odometry that measures 2 % too little, seen by this camera.
 fn driven(real: &CameraState, seed: u64) -> Driven {
-    let (walls, path, mut random) = (corridor(), path(), Random::new(seed));
+    driven_along(&path(), real, seed)
+}
+
+/// A drive with an odometry that measures 2 % too little, seen by this camera.
+fn driven_along(path: &[Pose2], real: &CameraState, seed: u64) -> Driven {
+    let (walls, mut random) = (corridor(), Random::new(seed));
     let mut odom = vec![Pose2::default()];
     for pair in path.windows(2) {
         let m = pair[0].between(&pair[1]);
@@ -157,16 +168,29 @@ fn driven(real: &CameraState, seed: u64) -> Driven {
         object.on_wall = near.filter(|i| off(&map.walls[*i]) < 0.5).map(|i| (i, along(&i)));
     }
     let scans_ns = (0..path.len() as i64).map(|i| i * STEP_NS).collect();
-    Driven { map, scans_ns, frames, objects }
+    Driven { start: path[0], map, scans_ns, frames, objects }
 }
 
 fn solved(driven: &Driven, stated: &CameraState) -> JointLaserMap {
+    solved_together(&[driven], &[], stated).unwrap()
+}
+
+fn solved_together(
+    all: &[&Driven],
+    same: &[[usize; 2]],
+    stated: &CameraState,
+) -> Result<JointLaserMap, JointError> {
     let half_degree = 0.5_f64.to_radians();
     let sigmas =
         SVector::from([half_degree, half_degree, half_degree, 0.01, 0.01, 0.01, 3.0, 1e-3, 1e-3, 1e-6]);
     let camera = CameraStated { camera: *stated, sigmas: Some(sigmas) };
     let params = JointParams { border_sigma_px: 0.0, ..JointParams::default() };
-    driven.drive().joint_map(camera, (&params, &FuseParams::default()), Datum::FirstPose).unwrap()
+    let drives: Vec<LaserDrive<'_>> = all.iter().map(|driven| driven.drive()).collect();
+    LaserDrives { drives: &drives, same }.joint_map(
+        camera,
+        (&params, &FuseParams::default()),
+        Datum::FirstPose,
+    )
 }
 
 #[test]
@@ -199,7 +223,7 @@ fn one_drive_places_posters_and_corrects_camera_and_odometry() {
     assert!(chi2 < 36.1, "{chi2}");
     let turn_rad = |camera: &CameraState| camera.minus(&real).fixed_rows::<3>(0).norm();
     assert!(turn_rad(&stated) > 0.01 && turn_rad(&made.camera) < 0.001, "{:?}", made.camera);
-    assert!((made.odometry.scale - (1.0 / 0.98 - 1.0)).abs() < 0.006, "{:?}", made.odometry);
+    assert!((made.odometry[0].scale - (1.0 / 0.98 - 1.0)).abs() < 0.006, "{:?}", made.odometry);
     // The far wall, which odometry and scans alone put nearer.
     let far_m = |walls: &[LaserSegment]| {
         let ends = walls.iter().filter(|wall| wall.facing().x < -0.9 && wall.length_m() > 1.0);
@@ -252,5 +276,50 @@ fn lines_of_cupboards_do_not_pull_the_walls_behind_them() {
         let truth = start.inverse().apply(&Point2::from(poster.centre.xy()));
         let off = Point2::new(place.x_m, place.y_m) - truth;
         assert!(off.norm() < 0.04, "{off}");
+    }
+}
+
+#[test]
+fn drives_from_both_ends_make_one_map() {
+    let [first, second] = [driven(&camera(), 1), driven_along(&path_from_the_far_end(), &camera(), 5)];
+    let count = posters().len();
+    // The second drive names poster 4 as poster 0, and poster 0 not at all.
+    let mut same: Vec<[usize; 2]> = (1..count).map(|i| [i, count + i]).collect();
+    same[3] = [0, count + 4];
+    let made = solved_together(&[&first, &second], &same, &camera()).unwrap();
+    let right: Vec<[usize; 2]> = same.iter().copied().filter(|[a, b]| a + count == *b).collect();
+    assert_eq!(made.same, right, "the wrong identity is dropped, the others stay");
+    assert_eq!(made.frames.len(), first.frames.len() + second.frames.len());
+    assert_eq!(made.path.len(), 2 * path().len());
+    for (number, object) in made.objects.iter().enumerate() {
+        let MappedObject { place, .. } = object.as_ref().unwrap();
+        let poster = &posters()[number % count];
+        let truth = first.start.inverse().apply(&Point2::from(poster.centre.xy()));
+        let off = Point2::new(place.x_m, place.y_m) - truth;
+        assert!(off.norm() < 0.05, "{number}: {off}");
+    }
+    // The walls of the second are those of the first: as long in all as from one drive.
+    let length_m = |map: &JointLaserMap| map.walls.iter().map(|wall| wall.segment.length_m()).sum::<f64>();
+    let alone = solved(&first, &camera());
+    let (both_m, one_m) = (length_m(&made), length_m(&alone));
+    assert!(both_m > 0.95 * one_m && both_m < 1.1 * one_m, "{both_m} {one_m}");
+    // The last pose of the second drive, at the far end.
+    let last = first.start.compose(&made.path[made.path.len() - 1]);
+    let truth = path_from_the_far_end()[path().len() - 1];
+    assert!((last.position() - truth.position()).norm() < 0.06, "{last:?} {truth:?}");
+    let sigma = |map: &JointLaserMap, object: usize| {
+        let place = map.objects[object].as_ref().unwrap().place;
+        (place.covariance[(0, 0)] + place.covariance[(1, 1)]).sqrt()
+    };
+    assert!(sigma(&made, 6) < sigma(&alone, 6), "{} {}", sigma(&made, 6), sigma(&alone, 6));
+}
+
+#[test]
+fn a_drive_that_shares_too_little_is_refused() {
+    let [first, second] = [driven(&camera(), 1), driven_along(&path_from_the_far_end(), &camera(), 5)];
+    let count = posters().len();
+    for (same, common) in [(&[][..], 0), (&[[2, count + 2]][..], 1)] {
+        let refused = solved_together(&[&first, &second], same, &camera()).unwrap_err();
+        assert_eq!(refused, JointError::Apart { drive: 2, common });
     }
 }
