@@ -14,6 +14,8 @@ const MIN_BASELINE_M: f64 = 0.5;
 const MIN_VIEWS: usize = 4;
 /// An object whose lower edge is below this height stands on the floor, metres.
 const FLOOR_M: f64 = 0.15;
+/// Nothing wider is a door, metres: the end of a corridor is, and its posters are no parts of it.
+const MAX_DOOR_M: f64 = 2.4;
 
 /// Why an object is no landmark by its own views.
 pub(super) fn refusal(place: &LandmarkPlace, agreement: f64, poses: &[Pose2]) -> Option<String> {
@@ -42,8 +44,12 @@ fn stands_on_floor(place: &LandmarkPlace) -> bool {
     place.z_m - 0.5 * place.size.height_m < FLOOR_M
 }
 
-/// Of objects at one place, that with most views stays: the others are its frame or its mat. Of
-/// what stands on the floor no part stays.
+fn is_door(place: &LandmarkPlace) -> bool {
+    stands_on_floor(place) && place.size.width_m <= MAX_DOOR_M
+}
+
+/// Of objects at one place, that with most views stays: the others are its frame or its mat. Of a
+/// door no part stays.
 pub(super) fn refuse_twins(objects: &mut [SurveyedObject]) {
     let reach = |place: &LandmarkPlace| 0.5 * place.size.width_m.max(place.size.height_m);
     let at = |place: &LandmarkPlace| place.map_from_landmark().translation.vector;
@@ -57,7 +63,7 @@ pub(super) fn refuse_twins(objects: &mut [SurveyedObject]) {
             let is_near = apart < reach(&own.place).max(reach(&other.place));
             let more_views =
                 (other.views.len(), std::cmp::Reverse(j)) > (own.views.len(), std::cmp::Reverse(i));
-            if is_near && stands_on_floor(&other.place) {
+            if is_near && is_door(&other.place) {
                 Some("it is a part of something that stands on the floor")
             } else if is_near && more_views && other.refused.is_none() {
                 Some("another one with more views is at its place")
@@ -122,6 +128,18 @@ mod tests {
         refuse_twins(&mut objects);
         let refused: Vec<bool> = objects.iter().map(|object| object.refused.is_some()).collect();
         assert_eq!(refused, [true, true, false]);
+    }
+
+    #[test]
+    fn a_poster_at_the_end_of_a_corridor_is_no_part_of_a_door() {
+        let size = LandmarkSize { width_m: 2.6, height_m: 2.6 };
+        let wall = LandmarkPlace { z_m: 1.4, size, ..place(0.0, 2.6) };
+        let refused = Some("it stands on the floor".to_owned());
+        let end = SurveyedObject { place: wall, refused, ..object(0.0, 2.6, 4) };
+        let mut objects = vec![object(0.1, 0.6, 9), end];
+        refuse_twins(&mut objects);
+        assert_eq!(objects[0].refused, None);
+        assert!(objects[1].refused.is_some(), "the wall itself is none");
     }
 
     #[test]

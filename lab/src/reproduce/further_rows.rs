@@ -64,6 +64,23 @@ const fn board(line: &'static str, sets: &'static [&'static str], figures: &'sta
     Command { full: line, quick: line, presets: One, sets, seconds: 5, figures }
 }
 
+/// Of surveys.
+const SURVEYED: [Figure; 13] = [
+    Figure::new("posters that became landmarks", Count, "0/placed").of("0/shown"),
+    Figure::new("landmarks that are something else", Count, "0/strangers"),
+    Figure::new("landmark, median", M, "0/joint_m/median"),
+    Figure::new("landmark, 95 %", M, "0/joint_m/p95"),
+    Figure::new("after alignment, median", M, "0/joint_aligned_m/median"),
+    Figure::new("after alignment, 95 %", M, "0/joint_aligned_m/p95"),
+    Figure::new("by two steps, median", M, "0/two_steps_m/median"),
+    Figure::new("by two steps, 95 %", M, "0/two_steps_m/p95"),
+    Figure::new("by two steps, after alignment, 95 %", M, "0/two_steps_aligned_m/p95"),
+    Figure::new("size in percent, 95 %", Plain, "0/size_percent/p95"),
+    Figure::new("mounting as stated, 95 %", Deg, "0/stated_deg/p95"),
+    Figure::new("mounting as found, 95 %", Deg, "0/found_deg/p95"),
+    Figure::new("NEES of a degree of freedom", Plain, "0/nees"),
+];
+
 pub(super) const SETS: [Row; 10] = [
     Row {
         id: "S1",
@@ -211,7 +228,7 @@ pub(super) const SETS: [Row; 10] = [
     },
 ];
 
-pub(super) const BEYOND: [Row; 8] = [
+pub(super) const BEYOND: [Row; 9] = [
     Row {
         id: "B1",
         title: "confidences",
@@ -360,21 +377,18 @@ pub(super) const BEYOND: [Row; 8] = [
             "survey --buildings 12 --seed 701",
             "survey --buildings 1 --length-m 10 --posters 2",
             300,
-            &[
-                Figure::new("posters that became landmarks", Count, "0/placed").of("0/shown"),
-                Figure::new("landmarks that are something else", Count, "0/strangers"),
-                Figure::new("landmark, median", M, "0/joint_m/median"),
-                Figure::new("landmark, 95 %", M, "0/joint_m/p95"),
-                Figure::new("after alignment, median", M, "0/joint_aligned_m/median"),
-                Figure::new("after alignment, 95 %", M, "0/joint_aligned_m/p95"),
-                Figure::new("by two steps, median", M, "0/two_steps_m/median"),
-                Figure::new("by two steps, 95 %", M, "0/two_steps_m/p95"),
-                Figure::new("by two steps, after alignment, 95 %", M, "0/two_steps_aligned_m/p95"),
-                Figure::new("size in percent, 95 %", Plain, "0/size_percent/p95"),
-                Figure::new("mounting as stated, 95 %", Deg, "0/stated_deg/p95"),
-                Figure::new("mounting as found, 95 %", Deg, "0/found_deg/p95"),
-                Figure::new("NEES of a degree of freedom", Plain, "0/nees"),
-            ],
+            &SURVEYED,
+        )],
+    },
+    Row {
+        id: "B9",
+        title: "the same, surveys of two drives",
+        paper: "",
+        commands: &[once(
+            "survey --drives 2 --buildings 8 --seed 821",
+            "survey --drives 2 --buildings 1 --length-m 12 --posters 4",
+            300,
+            &SURVEYED,
         )],
     },
 ];

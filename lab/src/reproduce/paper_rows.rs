@@ -40,11 +40,30 @@ const fn navigation(figures: &'static [Figure]) -> Command {
     Command { full: NAVIGATION, quick: ONE_DRIVE, presets: Each, sets: &[], seconds: 400, figures }
 }
 
-/// A survey and drives in its map; the figures name the seed.
+/// The same of another building; the figures name the seed.
+macro_rules! navigation_of {
+    ($seed:literal) => {
+        Command {
+            full: concat!("navigation --seed ", $seed),
+            quick: concat!("navigation --drives 1 --length-m 8 --rate-hz 1 --views 4 --seed ", $seed),
+            presets: Each,
+            sets: &[],
+            seconds: 100,
+            figures: &[
+                Figure::less(concat!("seed ", $seed, ": along, median"), M, "0/along_m/median"),
+                Figure::less(concat!("seed ", $seed, ": along, 95 %"), M, "0/along_m/p95"),
+                Figure::less(concat!("seed ", $seed, ": along, worst"), M, "0/along_m/worst"),
+                Figure::new(concat!("seed ", $seed, ": NEES of 3"), Plain, "0/nees"),
+            ],
+        }
+    };
+}
+
+/// A survey of two drives, and drives in its map; the figures name the seed.
 macro_rules! in_survey {
     ($seed:literal) => {
         Command {
-            full: concat!("navigation --survey --drives 2 --rate-hz 2 --seed ", $seed),
+            full: concat!("navigation --survey 2 --drives 2 --rate-hz 2 --seed ", $seed),
             quick: concat!("navigation --survey --drives 1 --length-m 8 --rate-hz 1 --seed ", $seed),
             presets: One,
             sets: &[],
@@ -148,21 +167,25 @@ pub(super) const ROWS: [Row; 15] = [
         id: "E10",
         title: "navigation in a corridor of 25 m with four posters",
         paper: "13 corrections, below 20 cm along (5)",
-        commands: &[navigation(&[
-            Figure::more("corrections by landmarks", Count, "0/corrections"),
-            Figure::new("drives", Count, "0/drives"),
-            Figure::less("along the corridor, median", M, "0/along_m/median"),
-            Figure::less("along the corridor, 95 %", M, "0/along_m/p95"),
-            Figure::less("along the corridor, worst", M, "0/along_m/worst"),
-            Figure::less("across, 95 %", M, "0/across_m/p95"),
-            Figure::new("NEES of 3", Plain, "0/nees"),
-        ])],
+        commands: &[
+            navigation(&[
+                Figure::more("corrections by landmarks", Count, "0/corrections"),
+                Figure::new("drives", Count, "0/drives"),
+                Figure::less("along the corridor, median", M, "0/along_m/median"),
+                Figure::less("along the corridor, 95 %", M, "0/along_m/p95"),
+                Figure::less("along the corridor, worst", M, "0/along_m/worst"),
+                Figure::less("across, 95 %", M, "0/across_m/p95"),
+                Figure::new("NEES of 3", Plain, "0/nees"),
+            ]),
+            navigation_of!("2"),
+            navigation_of!("3"),
+        ],
     },
     Row {
         id: "E10S",
-        title: "the same in the map of one survey (`waymark survey`), two drives each, 2 Hz",
+        title: "the same in the map of one survey of two drives (`waymark survey A B`), two drives each, 2 Hz",
         paper: "",
-        commands: &[in_survey!("21"), in_survey!("22"), in_survey!("23"), in_survey!("24"), in_survey!("25")],
+        commands: &[in_survey!("36"), in_survey!("37"), in_survey!("38"), in_survey!("39"), in_survey!("40")],
     },
     Row {
         id: "E11",

@@ -80,7 +80,7 @@ impl Body {
             }
         });
         // The same walls as in the survey.
-        let uneven_m = if world.course.first_map == FirstMapBy::Survey { UNEVEN_M } else { 0.0 };
+        let uneven_m = if world.course.first_map.is_survey() { UNEVEN_M } else { 0.0 };
         let laser = LaserParams { uneven_m, ..LaserParams::default() };
         let robot =
             Robot::new(world.building.clone(), &RobotParams { drive, laser, ..RobotParams::default() });

@@ -250,7 +250,7 @@ impl Journey {
 
 /// Whether a frame shows a landmark there.
 fn is_there(world: &World, id: LandmarkId, seen: &SensorReadings, found: &Corners) -> bool {
-    let (there, least) = if world.course.first_map == FirstMapBy::Survey {
+    let (there, least) = if world.course.first_map.is_survey() {
         (surveyed_at(world, id, seen), IOU_SURVEYED)
     } else {
         let view = seen.frame.truth.landmark(world.name(id));
@@ -262,7 +262,7 @@ fn is_there(world: &World, id: LandmarkId, seen: &SensorReadings, found: &Corner
 /// The landmark in a frame, where the border that was learnt is the one that the building names: a
 /// survey takes what it finds, a panel of a door or the picture in a frame.
 fn exact_border<'a>(world: &World, id: LandmarkId, truth: &'a FrameTruth) -> Option<&'a LandmarkView> {
-    truth.landmark(world.name(id)).filter(|_| world.course.first_map != FirstMapBy::Survey)
+    truth.landmark(world.name(id)).filter(|_| !world.course.first_map.is_survey())
 }
 
 /// Where the true pose sees a surveyed landmark, whose border the building does not name.

@@ -80,10 +80,11 @@ pub(crate) struct Args {
     /// come from true poses, cameras and mountings are exact. For figures about names and corners.
     #[arg(long)]
     open_loop: bool,
-    /// Walls and landmarks come from one drive of a robot that knew neither, as `waymark survey`
-    /// makes them, in place of a map of walls and a lesson.
-    #[arg(long, conflicts_with = "open_loop")]
-    survey: bool,
+    /// Walls and landmarks come from so many drives of a robot that knew neither (1), as
+    /// `waymark survey` makes them, in place of a map of walls and a lesson.
+    #[arg(long, value_name = "DRIVES", conflicts_with = "open_loop", num_args = 0..=1,
+          default_missing_value = "1", value_parser = clap::value_parser!(u32).range(1..=8))]
+    survey: Option<u32>,
     /// Kidnap every robot: carry it so far forwards, while its odometry stands still, 8 s after its
     /// first pose. The report says after how many frames the wrong pose is detected.
     #[arg(long, value_name = "M", value_parser = kidnap, allow_negative_numbers = true, requires = "open_loop")]
@@ -133,8 +134,8 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
         views: args.views as usize,
         first_map: match (args.open_loop, args.survey) {
             (true, _) => FirstMapBy::Truth,
-            (false, true) => FirstMapBy::Survey,
-            (false, false) => FirstMapBy::Lesson,
+            (false, Some(drives)) => FirstMapBy::Survey { drives: drives as usize },
+            (false, None) => FirstMapBy::Lesson,
         },
         seed: args.seed,
     };

@@ -17,6 +17,9 @@ const AHEAD_M: f64 = 1.0;
 const ARRIVED_M: f64 = 0.05;
 /// Speed, m/s.
 const SPEED_MPS: f64 = 0.5;
+/// Share of its speed without a pose: the camera, which looks about, shall miss nothing on either
+/// side.
+const LOST_PACE: f64 = 0.5;
 /// It looks about to either side, rad, so fast, rad/s.
 const SWEEP_RAD: f64 = 1.2;
 const SWEEP_RADPS: f64 = 0.5;
@@ -87,8 +90,11 @@ impl Pilot {
         odom_from_robot: &Pose2,
         named: &[LandmarkId],
     ) -> anyhow::Result<Option<Command>> {
-        let pose = server.pose().map_or(*odom_from_robot, |fused| fused.pose);
+        let fused = server.pose();
+        let pose = fused.as_ref().map_or(*odom_from_robot, |fused| fused.pose);
         let Some((speed_mps, turn_radps)) = self.path.steering(&pose) else { return Ok(None) };
+        let pace = if fused.is_some() { 1.0 } else { LOST_PACE };
+        let (speed_mps, turn_radps) = (pace * speed_mps, pace * turn_radps);
         let is_aimed = |[pan, tilt]: [f64; 2]| {
             wrap_rad(step.pan_rad - pan).abs() < AIMED_RAD && (step.tilt_rad - tilt).abs() < AIMED_RAD
         };

@@ -107,7 +107,7 @@ pub(super) struct Report {
     runs: usize,
     /// The robots went by their own estimate, in a map of their own.
     closed: bool,
-    surveyed: bool,
+    survey_drives: Option<usize>,
     /// Outcomes of the kidnapped robots.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     kidnapped: Vec<KidnapOutcome>,
@@ -178,7 +178,7 @@ impl Report {
             fusion: world.map.modalities.mode(),
             runs,
             closed: world.course.first_map != FirstMapBy::Truth,
-            surveyed: world.course.first_map == FirstMapBy::Survey,
+            survey_drives: world.course.first_map.survey_drives(),
             kidnapped: journeys.iter().filter_map(|j| j.kidnapped.clone()).collect(),
         }
     }
@@ -228,7 +228,11 @@ impl Report {
             if self.closed {
                 format!(
                     "  Closed loop: map by {}, camera and wheels by the estimate; {} drives arrived.",
-                    if self.surveyed { "one survey" } else { "SLAM and a lesson" },
+                    match self.survey_drives {
+                        None => "SLAM and a lesson".to_owned(),
+                        Some(1) => "a survey of one drive".to_owned(),
+                        Some(drives) => format!("a survey of {drives} drives"),
+                    },
                     self.arrived
                 )
             } else {

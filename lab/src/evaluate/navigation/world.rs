@@ -49,8 +49,21 @@ pub(super) enum FirstMapBy {
     Truth,
     /// SLAM, then a lesson with poses by laser. Robots go by their own estimate, with errors.
     Lesson,
-    /// One drive of a robot that knew neither. Robots go as with a lesson.
-    Survey,
+    /// Drives of a robot that knew neither. Robots go as with a lesson.
+    Survey {
+        /// Number of drives, there and back each.
+        drives: usize,
+    },
+}
+
+impl FirstMapBy {
+    pub(super) fn survey_drives(self) -> Option<usize> {
+        if let Self::Survey { drives } = self { Some(drives) } else { None }
+    }
+
+    pub(super) fn is_survey(self) -> bool {
+        self.survey_drives().is_some()
+    }
 }
 
 /// A corridor and how it is taught.
@@ -110,8 +123,8 @@ impl World {
             ..CorridorParams::default()
         };
         let building = Arc::new(Building::corridor_with(&corridor, seed));
-        let (walls, photographed) = if course.first_map == FirstMapBy::Survey {
-            survey(&building, course.views, mixed(&[seed, 16]))?
+        let (walls, photographed) = if let FirstMapBy::Survey { drives } = course.first_map {
+            survey(&building, (drives, course.views), mixed(&[seed, 16]))?
         } else {
             taught_by_hand(&building, &course, &p)?
         };
@@ -262,7 +275,7 @@ fn true_place(building: &Building, name: &str) -> Option<LandmarkPlace> {
 /// `None` of a landmark that is nothing of the building, or perhaps a part of a door or window.
 fn place_error(building: &Building, lesson: &Lesson, course: &Course) -> Option<(f64, f64)> {
     let is_whole =
-        |truth: &&LandmarkTruth| course.first_map != FirstMapBy::Survey || truth.kind == LandmarkKind::Poster;
+        |truth: &&LandmarkTruth| !course.first_map.is_survey() || truth.kind == LandmarkKind::Poster;
     let truth = building.landmark(&lesson.name).filter(is_whole)?;
     let place = &lesson.place;
     let error =
