@@ -10,7 +10,7 @@ pub(crate) mod report;
 mod simulated;
 
 pub use drive_log::DriveLog;
-pub use simulated::{SimulatedDrive, UNEVEN_M, simulated_drive};
+pub use simulated::{SimulatedDrive, UNEVEN_M, believed_odometry, simulated_drive};
 
 use crate::{arg_parsers::numbers, recording::drive_args::DriveArgs, screen, session::ServerArgs};
 use anyhow::Context as _;
@@ -38,8 +38,9 @@ pub(crate) struct Args {
     /// is sent.
     #[arg(long, value_name = "MAP")]
     into: Option<Name>,
-    /// Where the first drive begins, if that is known in the frame of the map: x and y in metres, heading
-    /// in radians. Without it, the drives make the frame, and errors are against them as a whole.
+    /// Where the first drive begins, if that is known in the frame of the map: x and y in metres,
+    /// heading in radians. Without it, the drives make the frame, and errors are against them as a
+    /// whole.
     #[arg(long, value_name = "X,Y,THETA", value_parser = origin, allow_hyphen_values = true)]
     origin: Option<Pose2>,
     /// The camera whose frames are used, if there are several.

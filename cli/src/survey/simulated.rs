@@ -36,7 +36,7 @@ pub struct SimulatedDrive {
 }
 
 /// Errors of odometry, as large as an estimate believes of an unknown robot.
-fn odometry(random: &mut Random) -> OdometryParams {
+pub fn believed_odometry(random: &mut Random) -> OdometryParams {
     let believed = FuseParams::default();
     OdometryParams {
         scale_error: believed.scale_sigma * random.normal(),
@@ -56,7 +56,7 @@ pub fn simulated_drive(
     mut sensed: impl FnMut(&SensorReadings),
 ) -> anyhow::Result<SimulatedDrive> {
     let mut random = Random::new(robot_seed ^ 2);
-    let drive = DriveParams { odometry: odometry(&mut random), ..drive };
+    let drive = DriveParams { odometry: believed_odometry(&mut random), ..drive };
     let laser = LaserParams { uneven_m: UNEVEN_M, ..LaserParams::default() };
     let robot = Robot::new(building.clone(), &RobotParams { drive, laser, ..RobotParams::default() });
     let stated = SimulatedRobotErrors::drawn(robot.camera().intrinsics(), robot_seed ^ 1).camera;

@@ -1,50 +1,25 @@
-//! The map of drives: walls, objects and camera in one estimate. In: the drives. Out: the walls, the
-//! objects with their places and views, the camera as it was found, and what each object fails.
+//! The map of drives: walls, objects and camera in one estimate. In: the drives. Out: the walls,
+//! the objects with their places and views, the camera as it was found, and what each object fails.
 
 use super::{
     drive::Drive,
+    error::SurveyError,
     follow::{Followed, Stated, followed, solved},
-    gates::{refusal, refuse_twins},
     identities::pairs,
     look_alikes::refuse_look_alikes,
     objects::SeenObject,
     parallel::Effort,
-    surveyed::{SurveyedBuilding, SurveyedObject},
+    solution::building,
+    surveyed::SurveyedBuilding,
 };
 use map::{
-    joint::{Datum, JointError, JointLaserMap},
+    joint::{Datum, JointLaserMap},
     pose2::{Pose2, Pose2Covariance},
     slam::SlamMap,
 };
 use nalgebra::Matrix3;
 use std::borrow::Cow;
 use vision::{frame::Intrinsics, params::Params};
-
-/// Why drives give no building.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum SurveyError {
-    /// There is nothing to look at.
-    #[error("no frame with intrinsics and the camera's mounting")]
-    NoFrame,
-    /// The laser map is not that of the drive's scans.
-    #[error("{0} scans were driven, {1} are in the laser map")]
-    Scans(usize, usize),
-    /// Frames cannot be put between scans.
-    #[error("the capture time of scan {0} is not after that of the scan before")]
-    Times(usize),
-    /// One estimate has one camera.
-    #[error("another camera than in the first drive")]
-    OtherCamera,
-    /// The estimate cannot be computed.
-    #[error(transparent)]
-    Joint(#[from] JointError),
-    /// The camera as found is not on the robot.
-    #[error("the drive puts the camera off its robot")]
-    Camera,
-    /// What is wrong with one of several drives.
-    #[error("drive {0}: {1}")]
-    Of(usize, Box<SurveyError>),
-}
 
 /// Surveys drives of one robot, each with the laser map that its scans made. `origin` is the first
 /// pose of the first where it is known in the frame of the map; else the map begins at (0, 0, 0),
@@ -173,30 +148,6 @@ fn joined(drives: &[Drive]) -> Cow<'_, Drive> {
         all.frames.extend_from_slice(&drive.frames);
     }
     Cow::Owned(all)
-}
-
-/// The solution, without what is of the laser map and the frames.
-pub(super) fn building(found: Vec<SeenObject>, map: &JointLaserMap, stated: &Stated) -> SurveyedBuilding {
-    let mut objects = Vec::new();
-    for (seen, mapped) in found.into_iter().zip(&map.objects) {
-        let Some(mapped) = mapped else { continue };
-        let poses = seen.views.iter().map(|view| map.frames[view.frame].pose);
-        let refused = refusal(&mapped.place, mapped.agreement, &poses.collect::<Vec<_>>());
-        objects.push(SurveyedObject { place: mapped.place, views: seen.views, refused });
-    }
-    refuse_twins(&mut objects);
-    SurveyedBuilding {
-        walls: map.walls.iter().map(|wall| wall.segment.clone()).collect(),
-        laser_walls: Vec::new(),
-        laser_frames: Vec::new(),
-        objects,
-        frames: map.frames.clone(),
-        camera: (map.camera, map.camera_sigmas),
-        stated: stated.camera,
-        odometry_scales: map.odometry.iter().map(|errors| errors.scale).collect(),
-        loops: 0,
-        undecodable: 0,
-    }
 }
 
 #[cfg(test)]

@@ -1,11 +1,11 @@
-//! Objects of one drive. In: a drive with its laser map. Out: the objects that were followed through
-//! it, and the map of this drive alone.
+//! Objects of one drive. In: a drive with its laser map. Out: the objects that were followed
+//! through it, and the map of this drive alone.
 //!
 //! Objects are followed twice: with the camera as stated, then as found.
 
 use super::{
-    building::SurveyError,
     drive::{Drive, DriveFrame},
+    error::SurveyError,
     objects::{Known, ObjectView, SeenObject, objects},
     parallel::Effort,
     sightings::{sightings, straight},

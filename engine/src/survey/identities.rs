@@ -2,10 +2,10 @@
 //! Out: pairs of objects that may be one, by what they show; the joint estimate says which are.
 
 use super::{
-    building::building,
     follow::{Followed, Stated},
     look_alikes::{FrameLook, model, recognised},
     parallel::Effort,
+    solution::building,
     surveyed::SurveyedBuilding,
 };
 use std::{collections::BTreeMap, sync::Arc};

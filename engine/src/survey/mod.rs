@@ -7,8 +7,8 @@
 //!     like nothing else)
 //! ```
 //!
-//! In: drives, each with its finished laser map. Out: walls, objects with places and views, the camera
-//! as found. Commands read a drive of a file; the server's mappings make it of messages.
+//! In: drives, each with its finished laser map. Out: walls, objects with places and views, the
+//! camera as found. Commands read a drive of a file; the server's mappings make it of messages.
 
 mod parallel;
 mod drive;
@@ -16,13 +16,16 @@ mod sightings;
 mod objects;
 mod surveyed;
 mod gates;
+mod error;
 mod follow;
+mod solution;
 mod look_alikes;
 mod identities;
 mod building;
 
-pub use building::{SurveyError, surveyed};
+pub use building::surveyed;
 pub use drive::{Drive, DriveBounds, DriveFrame, DriveReading, OF_FILE, ScanStamp, WHILE_DRIVING};
+pub use error::SurveyError;
 pub use objects::ObjectView;
 pub use parallel::Effort;
 pub use sightings::picture;

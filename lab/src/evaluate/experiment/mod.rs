@@ -15,6 +15,8 @@ pub(crate) mod discrimination;
 pub(crate) mod look_alikes;
 pub(crate) mod answers;
 pub(crate) mod confidence;
+pub(crate) mod robot_server;
+pub(crate) mod way;
 
 use cli::screen;
 use engine::survey::Effort;

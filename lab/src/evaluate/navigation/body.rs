@@ -2,10 +2,9 @@
 
 use super::{
     pilot::{Path, Pilot},
-    server::Server,
     world::{FirstMapBy, World},
 };
-use crate::evaluate::experiment::mixed;
+use crate::evaluate::experiment::{mixed, robot_server::Server};
 use cli::survey::UNEVEN_M;
 use map::pose2::Pose2;
 use nalgebra::Vector3;

@@ -2,11 +2,11 @@
 //! a map made by SLAM there and back, and the pose at every stop by laser and odometry in these
 //! walls. A person steers; where the first drive began is the only pose that is told.
 
-use super::server::{MAP, Server};
+use crate::evaluate::experiment::{robot_server::Server, way::way};
 use engine::snapshot::MapSnapshot;
 use map::{
     laser_fix::WallIndex,
-    pose2::{Pose2, Pose2Covariance, wrap_rad},
+    pose2::{Pose2, Pose2Covariance},
     segments::LaserSegment,
     slam::{Slam, SlamParams},
 };
@@ -20,11 +20,11 @@ use sim::{
 };
 use std::sync::Arc;
 
+/// Name of the map.
+pub(super) const MAP: &str = "corridor";
 /// How well a robot is put back where its map began: x, y (metres) and heading (radians).
 const PUT_SIGMA: [f64; 3] = [0.01, 0.01, 0.005];
-/// Motion between two scans on the way from stop to stop.
-const STEP_M: f64 = 0.1;
-const STEP_RAD: f64 = 0.12;
+/// Between two scans on the way from stop to stop.
 const STEP_NS: i64 = 200_000_000;
 
 /// What the first drives gave.
@@ -80,25 +80,9 @@ impl<'a> Tour<'a> {
         Ok(tour)
     }
 
-    /// Turns to the stop, drives there in a straight line, and turns as the stop says.
     fn go_to(&mut self, stop: &Pose2) {
-        let way = stop.position() - self.truth.position();
-        if way.norm() > STEP_M {
-            self.turn_to(way.y.atan2(way.x));
-        }
-        let motion = self.truth.between(stop);
-        let count = (motion.position().norm() / STEP_M).ceil().max(1.0);
-        for _ in 0..count as usize {
-            self.step(&Pose2::new(motion.x_m / count, motion.y_m / count, 0.0));
-        }
-        self.turn_to(stop.theta_rad);
-    }
-
-    fn turn_to(&mut self, heading_rad: f64) {
-        let turn = wrap_rad(heading_rad - self.truth.theta_rad);
-        let count = (turn.abs() / STEP_RAD).ceil().max(1.0);
-        for _ in 0..count as usize {
-            self.step(&Pose2::new(0.0, 0.0, turn / count));
+        for motion in way(&self.truth, stop) {
+            self.step(&motion);
         }
     }
 

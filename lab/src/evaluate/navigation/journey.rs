@@ -3,10 +3,12 @@
 //! truth; the start pose is unknown to the server.
 
 use super::{
-    super::experiment::mixed,
+    super::experiment::{
+        mixed,
+        robot_server::{SentFrame, Server},
+    },
     body::{Body, DriveSettings},
     kidnap::{Kidnap, KidnapOutcome},
-    server::Server,
     world::{FirstMapBy, World},
 };
 use cli::simulated_errors::SimulatedRobotErrors;
@@ -126,8 +128,9 @@ pub(super) fn drive(world: &World, way: DriveSettings) -> anyhow::Result<Journey
         let mounting = wrong.extrinsics(&seen.step.robot_from_camera).ok();
         let camera = frame_camera(Some(&wrong.camera), mounting.as_ref(), &map);
         let analysis = analyse_frame(&seen.frame.image, camera, &map, &mut StageTimes::start());
-        let (changes, guided) =
-            server.frame(&map, &analysis, (&seen, odom_from_robot), (&wrong, captured_ns));
+        let (image, camera, mounting) = (&seen.frame.image, &wrong.camera, mounting.as_ref());
+        let frame = SentFrame { image, camera, mounting, odom_from_robot, captured_ns };
+        let (changes, guided) = server.frame(&map, &analysis, &frame);
         let misled = journey.guided_false;
         let shows = journey.score(world, &seen, &analysis, guided.as_ref());
         frames_that_show += usize::from(shows);

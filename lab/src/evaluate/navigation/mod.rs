@@ -5,7 +5,6 @@
 //! estimate. It runs in this program, with the code that the server runs, without a server, from a
 //! seed.
 
-mod server;
 mod exploration;
 mod surveying;
 mod world;

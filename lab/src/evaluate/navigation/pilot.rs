@@ -1,7 +1,7 @@
 //! Steers a robot along a straight path and points its camera. In: the pose that the robot takes
 //! itself to have, and the server's advice on the gaze. Out: commands. Knows no truth.
 
-use super::server::Server;
+use crate::evaluate::experiment::robot_server::Server;
 use map::{
     gaze::{GazeAction, PanTiltUnit},
     pose2::{Pose2, wrap_rad},

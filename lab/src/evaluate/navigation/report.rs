@@ -4,10 +4,9 @@ use super::{
     journey::{Journey, Moment},
     kidnap::KidnapOutcome,
     names::{CornerErrors, Row, corner_errors, rows},
-    server::of,
     world::{FirstMapBy, World},
 };
-use crate::evaluate::statistics::quantile;
+use crate::evaluate::{experiment::robot_server::of, statistics::quantile};
 use map::{
     modality_stats::FusionMode,
     pose2::{Pose2Covariance, wrap_rad},

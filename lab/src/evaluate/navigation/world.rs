@@ -2,8 +2,7 @@
 //! memory.
 
 use super::{
-    exploration::{Explored, explore},
-    server::MAP,
+    exploration::{Explored, MAP, explore},
     surveying::{FirstMap, Photographed, survey},
 };
 use crate::evaluate::experiment::{lesson::points_of, mixed, of_each};

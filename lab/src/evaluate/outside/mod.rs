@@ -15,6 +15,7 @@ mod draw;
 mod listing;
 mod peer;
 mod strangers;
+mod walk;
 
 use anyhow::Context as _;
 use cli::{
@@ -22,7 +23,7 @@ use cli::{
     screen,
 };
 use engine::snapshot::MapSnapshot;
-use report::Report;
+use report::{Report, WalkFigures};
 use score::PictureScore;
 use std::{
     path::{Path, PathBuf},
@@ -58,6 +59,10 @@ pub(crate) struct Args {
     /// the focal length). Default: they are stated to be exact, as they are.
     #[arg(long)]
     usual_camera: bool,
+    /// Send a robot from picture to picture of each world, too, and report its fused poses. Its
+    /// odometry, camera and mounting have errors as large as they are taken to have.
+    #[arg(long, conflicts_with = "strangers")]
+    walk: bool,
     /// Draw the pictures with a full view without a name, a wrong name or a false quad into this
     /// folder.
     #[arg(long, value_name = "DIR")]
@@ -105,6 +110,9 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     }
     let mut report = Report::new(worlds.len(), &scores, unreadable);
     report.sizes = (!args.strangers).then(|| sizes::sizes(&worlds, &scores)).flatten();
+    if args.walk {
+        report.walk = Some(walked(&worlds, &maps)?);
+    }
     if args.peer {
         match peer::beside(&args.python, &worlds) {
             Ok(peer) => report.peer = Some(peer),
@@ -113,6 +121,18 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     }
     screen::say(&if args.json { serde_json::to_string(&report)? } else { table::table(&report) });
     Ok(())
+}
+
+/// A robot goes through each world.
+fn walked(worlds: &[World], maps: &[MapSnapshot]) -> anyhow::Result<WalkFigures> {
+    let progress = screen::progress(worlds.len(), "walking");
+    let mut stops = Vec::new();
+    for (i, (world, map)) in worlds.iter().zip(maps).enumerate() {
+        stops.extend(walk::walk(world, map, i as u64)?);
+        progress.inc(1);
+    }
+    progress.finish_and_clear();
+    Ok(WalkFigures::new(&stops))
 }
 
 /// All worlds that the folders stand for.

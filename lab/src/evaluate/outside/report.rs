@@ -5,12 +5,15 @@ use super::peer::PeerReport;
 use super::poses::CameraScore;
 use super::score::{FOUND, FOUND_WELL, LabelScore, PICTURES, PictureScore, PoseOutcome, View};
 use super::sizes::SizeReport;
+use super::walk::WalkStop;
 use crate::evaluate::statistics::{median, quantile};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// Quantile that stands beside a median.
 const MOST: f64 = 0.9;
+/// 95 % quantile of chi squared with three degrees of freedom.
+const CHI2_3_95: f64 = 7.815;
 /// Share of the largest values that the second mean of the NEES leaves out.
 const OUTLIERS: f64 = 0.01;
 /// Standard deviations from which a pose does not fit its corners.
@@ -127,6 +130,20 @@ pub(super) struct MeasurementFigures {
     pub(super) misfit: Option<f64>,
 }
 
+/// Fused poses of a robot that goes from picture to picture.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct WalkFigures {
+    pub(super) pictures: usize,
+    /// Pictures that corrected the pose.
+    pub(super) corrections: usize,
+    /// Of pictures at which there is a pose.
+    pub(super) position_m: Errors,
+    pub(super) direction_deg: Errors,
+    pub(super) nees: Nees,
+    /// Share of poses within what is stated to be their 95 %.
+    pub(super) within_95: Option<f64>,
+}
+
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct Report {
     pub(super) worlds: usize,
@@ -151,11 +168,31 @@ pub(super) struct Report {
     pub(super) ms_per_picture: Option<f64>,
     /// Why full views have no name, most frequent first.
     pub(super) missed: Vec<(String, usize)>,
+    /// How often the check of sizes is right; `None` without true sizes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) sizes: Option<SizeReport>,
+    /// A robot that goes from picture to picture.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) walk: Option<WalkFigures>,
     /// SIFT on the same pictures.
     #[serde(skip_serializing_if = "Option::is_none")]
-    /// How often the check of sizes is right; `None` without true sizes.
-    pub(super) sizes: Option<SizeReport>,
     pub(super) peer: Option<PeerReport>,
+}
+
+impl WalkFigures {
+    pub(super) fn new(stops: &[WalkStop]) -> Self {
+        let errors = || stops.iter().filter_map(|stop| stop.error);
+        let squares = || stops.iter().filter_map(|stop| stop.nees);
+        let within = squares().filter(|squared| *squared < CHI2_3_95).count();
+        Self {
+            pictures: stops.len(),
+            corrections: stops.iter().filter(|stop| stop.corrected).count(),
+            position_m: Errors::of(errors().map(|error| error.xy().norm())),
+            direction_deg: Errors::of(errors().map(|error| error.z.abs().to_degrees())),
+            nees: Nees::of(3, squares()),
+            within_95: share(within, squares().count()),
+        }
+    }
 }
 
 impl Errors {
@@ -236,6 +273,7 @@ impl Report {
             ms_per_picture: median(&mut scores.iter().map(|s| s.ms).collect::<Vec<_>>()),
             missed: missed(scores),
             sizes: None,
+            walk: None,
             peer: None,
         }
     }

@@ -3,7 +3,7 @@
 use super::{
     bound::CORNER_SIGMA_PX,
     peer::PeerReport,
-    report::{Errors, Group, Nees, PositionFigures, Report},
+    report::{Errors, Group, Nees, PositionFigures, Report, WalkFigures},
     sizes::{SizeFigures, SizeReport},
 };
 
@@ -74,8 +74,22 @@ pub(super) fn table(r: &Report) -> String {
     lines.push(format!("  full views without a name: {}", counts(&r.missed)));
     lines.push(format!("  time a picture: {} ms", number(r.ms_per_picture, 1.0, 1)));
     lines.extend(r.sizes.as_ref().map(sizes).unwrap_or_default());
+    lines.extend(r.walk.as_ref().map(walk).unwrap_or_default());
     lines.extend(r.peer.as_ref().map(peer));
     lines.join("\n")
+}
+
+fn walk(w: &WalkFigures) -> [String; 5] {
+    [
+        format!(
+            "  a robot from picture to picture: {} of {} pictures corrected its pose",
+            w.corrections, w.pictures
+        ),
+        format!("    position, cm (median / 90 % / worst): {}", errors(&w.position_m, 100.0, 1)),
+        format!("    direction, deg: {}", errors(&w.direction_deg, 1.0, 2)),
+        format!("    NEES (mean / without the largest 1 % / median): {}", nees(&w.nees)),
+        format!("    within their 95 %: {} %", number(w.within_95, 100.0, 1)),
+    ]
 }
 
 /// Words with how often each was counted.

@@ -2,7 +2,6 @@
 //! In: scans, analysed frames, gaze queries. Out: poses, names by the pose, advice. No transport,
 //! no threads.
 
-use cli::simulated_errors::SimulatedRobotErrors;
 use engine::{
     context::FrameContext,
     gaze::{GazeControllers, GazeQuery},
@@ -14,85 +13,109 @@ use engine::{
     snapshot::{MapSnapshot, Snapshots},
 };
 use map::{
+    extrinsics::CameraExtrinsics,
     gaze::{GazeAction, GazeParams, PanTiltUnit},
     landmark_health::HealthChange,
     laser::Scan,
     pose2::{Pose2, Pose2Covariance},
 };
 use protos::Name;
-use sim::robot::SensorReadings;
 use std::{sync::Arc, time::Instant};
-use vision::{model::LandmarkId, pipeline::FrameAnalysis};
-
-/// Name of its map.
-pub(super) const MAP: &str = "corridor";
+use vision::{
+    frame::{GrayImage, Intrinsics},
+    model::LandmarkId,
+    pipeline::FrameAnalysis,
+};
 
 /// One run of the robot's software.
 const EPOCH: u64 = 1;
 
+/// A frame as the robot sends it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct SentFrame<'a> {
+    pub(crate) image: &'a GrayImage,
+    /// The camera as the robot states it.
+    pub(crate) camera: &'a Intrinsics,
+    /// Its mounting as the robot states it.
+    pub(crate) mounting: Option<&'a CameraExtrinsics>,
+    pub(crate) odom_from_robot: Pose2,
+    pub(crate) captured_ns: i64,
+}
+
 /// One robot in one map.
-pub(super) struct Server {
+pub(crate) struct Server {
     snapshots: Arc<Snapshots>,
     motion: MotionTracker,
     gazes: GazeControllers,
     robot: Name,
     camera: Name,
+    /// Name of its map.
+    map: String,
     /// Constant: no time of the computer passes in a drive.
     now: Instant,
 }
 
 impl Server {
-    pub(super) fn new(map: &MapSnapshot) -> anyhow::Result<Self> {
+    pub(crate) fn new(map: &MapSnapshot) -> anyhow::Result<Self> {
         let name = |text| Name::new(text).map_err(|refusal| anyhow::anyhow!("{refusal:?}"));
         let (robot, camera) = (name("robot")?, name("front")?);
         let snapshots = Arc::new(Snapshots::default());
         snapshots.publish(Arc::new(map.clone()));
-        snapshots.set_robot(robot.as_ref(), Some(MAP));
+        snapshots.set_robot(robot.as_ref(), Some(&map.name));
         let motion = MotionTracker::new(snapshots.clone(), Arc::new(LiveHub::default()));
-        Ok(Self { snapshots, motion, gazes: GazeControllers::default(), robot, camera, now: Instant::now() })
+        let (gazes, map, now) = (GazeControllers::default(), map.name.clone(), Instant::now());
+        Ok(Self { snapshots, motion, gazes, robot, camera, map, now })
     }
 
-    pub(super) fn map(&self) -> anyhow::Result<Arc<MapSnapshot>> {
-        self.snapshots.get(MAP).ok_or_else(|| anyhow::anyhow!("the map is gone"))
+    pub(crate) fn map(&self) -> anyhow::Result<Arc<MapSnapshot>> {
+        self.snapshots.get(&self.map).ok_or_else(|| anyhow::anyhow!("the map is gone"))
     }
 
     /// The fused pose.
-    pub(super) fn pose(&self) -> Option<Pose2Covariance> {
-        self.motion.pose(&self.robot, MAP, self.now)
+    pub(crate) fn pose(&self) -> Option<Pose2Covariance> {
+        self.motion.pose(&self.robot, &self.map, self.now)
     }
 
     /// A person says where the robot is, after its first scan.
-    pub(super) fn put(&self, pose: &Pose2Covariance) -> anyhow::Result<()> {
+    pub(crate) fn put(&self, pose: &Pose2Covariance) -> anyhow::Result<()> {
         let admitted = self.motion.epochs().admit(&self.robot, EPOCH, self.now);
         admitted.map_err(|refusal| anyhow::anyhow!("{refusal:?}"))?;
-        let put = self.motion.set_pose_by_hand(&self.robot, MAP, pose, self.now);
+        let put = self.motion.set_pose_by_hand(&self.robot, &self.map, pose, self.now);
         anyhow::ensure!(put.is_some(), "the robot has sent no odometry yet");
         Ok(())
     }
 
-    pub(super) fn scan(&self, scan: &Scan, odom_from_robot: Pose2, captured_ns: i64) {
+    pub(crate) fn scan(&self, scan: &Scan, odom_from_robot: Pose2, captured_ns: i64) {
         let job =
-            ScanJob { map: MAP.to_owned(), epoch: EPOCH, captured_ns, odom_from_robot, scan: scan.clone() };
+            ScanJob { map: self.map.clone(), epoch: EPOCH, captured_ns, odom_from_robot, scan: scan.clone() };
         self.motion.fix_by_scan(&self.robot, &job, self.now);
     }
 
+    /// Carries the pose on by odometry.
+    pub(crate) fn travel(&self, odom_from_robot: Pose2, captured_ns: i64) {
+        // Reading a pose at a time takes the odometry of that time.
+        self.motion.prior_pose(&self.robot, &self.camera, self.at(odom_from_robot, captured_ns));
+    }
+
+    fn at(&self, odom_from_robot: Pose2, captured_ns: i64) -> At<'_> {
+        At { map: &self.map, epoch: EPOCH, captured_ns, odometry: Some(odom_from_robot), now: self.now }
+    }
+
     /// Applies a frame to the robot's pose; returns changes of landmark health and guided names.
-    pub(super) fn frame(
+    pub(crate) fn frame(
         &self,
         map: &MapSnapshot,
         analysis: &FrameAnalysis,
-        (seen, odom_from_robot): (&SensorReadings, Pose2),
-        (wrong, captured_ns): (&SimulatedRobotErrors, i64),
+        frame: &SentFrame<'_>,
     ) -> (Vec<HealthChange>, Option<GuidedResult>) {
-        let at = At { map: MAP, epoch: EPOCH, captured_ns, odometry: Some(odom_from_robot), now: self.now };
-        let extrinsics = wrong.extrinsics(&seen.step.robot_from_camera).ok();
-        let image = &seen.frame.image;
+        let SentFrame { image, camera, mounting, odom_from_robot, captured_ns } = *frame;
+        let at = self.at(odom_from_robot, captured_ns);
         let frame = FrameContext {
             is_whole: true,
             analysis,
             map,
-            extrinsics: extrinsics.as_ref(),
-            camera: Some(&wrong.camera),
+            extrinsics: mounting,
+            camera: Some(camera),
             image_px: [image.width() as f64, image.height() as f64],
             prior: None,
         };
@@ -108,7 +131,7 @@ impl Server {
     }
 
     /// As the store does.
-    pub(super) fn change(&self, map: &MapSnapshot, changes: &[HealthChange]) {
+    pub(crate) fn change(&self, map: &MapSnapshot, changes: &[HealthChange]) {
         let mut next = map.clone();
         next.version += 1;
         for change in changes {
@@ -121,7 +144,7 @@ impl Server {
 
     /// The answer to `rpc/gaze` from the fused pose; none without a pose. `looked`: the landmark
     /// last looked at, and whether it was recognised.
-    pub(super) fn gaze(
+    pub(crate) fn gaze(
         &self,
         pan_tilt: PanTiltUnit,
         at_ns: i64,
@@ -134,28 +157,28 @@ impl Server {
     }
 
     /// Everything that corrected the pose so far.
-    pub(super) fn log(&self) -> Corrections {
+    pub(crate) fn log(&self) -> Corrections {
         self.motion.corrections(&self.robot)
     }
 
     /// Fixes by landmarks that corrected the pose so far.
-    pub(super) fn corrections(&self) -> u64 {
+    pub(crate) fn corrections(&self) -> u64 {
         of(&self.log(), "landmarks", &["started", "applied", "reset"])
     }
 
     /// Records what the robot sends and what fixes its pose, from now on.
-    pub(super) fn record(&self) -> anyhow::Result<()> {
-        Ok(self.motion.start_recording(&self.robot, MAP).map(|_| ())?)
+    pub(crate) fn record(&self) -> anyhow::Result<()> {
+        Ok(self.motion.start_recording(&self.robot, &self.map).map(|_| ())?)
     }
 
     /// Ends the recording and gives it.
-    pub(super) fn recording(&self) -> Option<Box<RunRecording>> {
+    pub(crate) fn recording(&self) -> Option<Box<RunRecording>> {
         self.motion.take_recording(&self.robot)
     }
 }
 
 /// How often a modality had one of these outcomes.
-pub(super) fn of(log: &Corrections, modality: &str, outcomes: &[&str]) -> u64 {
+pub(crate) fn of(log: &Corrections, modality: &str, outcomes: &[&str]) -> u64 {
     let counts = log.totals.get(modality);
     counts.map_or(0, |counts| outcomes.iter().filter_map(|o| counts.get(o)).sum())
 }
