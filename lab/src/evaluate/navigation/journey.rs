@@ -206,7 +206,9 @@ impl Journey {
                     self.corners.entry(how).or_default().extend(off(&corners, view));
                 }
             } else {
-                tracing::info!(landmark = world.name(id), ?found, verdict = ?quad.recognition, "a wrong name");
+                let overlap = overlap(world, id, seen, &found);
+                let verdict = &quad.recognition;
+                tracing::info!(landmark = world.name(id), overlap, ?found, ?verdict, "a wrong name");
                 self.false_matches += 1;
             }
         }
@@ -253,13 +255,18 @@ impl Journey {
 
 /// Whether a frame shows a landmark there.
 fn is_there(world: &World, id: LandmarkId, seen: &SensorReadings, found: &Corners) -> bool {
-    let (there, least) = if world.course.first_map.is_survey() {
-        (surveyed_at(world, id, seen), IOU_SURVEYED)
+    let least = if world.course.first_map.is_survey() { IOU_SURVEYED } else { IOU_TRUE };
+    overlap(world, id, seen, found) >= least
+}
+
+/// Overlap of a border with a landmark's in a frame; 0 where it is not in the frame.
+fn overlap(world: &World, id: LandmarkId, seen: &SensorReadings, found: &Corners) -> f64 {
+    let there = if world.course.first_map.is_survey() {
+        surveyed_at(world, id, seen)
     } else {
-        let view = seen.frame.truth.landmark(world.name(id));
-        (view.map(|view| *view.corners_px.points()), IOU_TRUE)
+        seen.frame.truth.landmark(world.name(id)).map(|view| *view.corners_px.points())
     };
-    there.is_some_and(|there| polygon::iou(found.points(), &there) >= least)
+    there.map_or(0.0, |there| polygon::iou(found.points(), &there))
 }
 
 /// The landmark in a frame, where the border that was learnt is the one that the building names: a
