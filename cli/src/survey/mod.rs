@@ -131,3 +131,19 @@ pub(crate) async fn run(args: &Args) -> anyhow::Result<()> {
     }
     session.show(&report, &report.text())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Args as _;
+
+    #[test]
+    fn a_survey_has_one_drive_or_up_to_eight() {
+        let survey = Args::augment_args(clap::Command::new("survey"));
+        let takes = |drives: usize| {
+            let words = (0..drives).map(|n| format!("{n}.mcap"));
+            survey.clone().try_get_matches_from(std::iter::once("survey".to_owned()).chain(words)).is_ok()
+        };
+        assert_eq!([0, 1, MAX_DRIVES, MAX_DRIVES + 1].map(takes), [false, true, true, false]);
+    }
+}

@@ -21,8 +21,8 @@ const REASONS: [(&str, &str); 7] = [
     ),
     (
         "E11",
-        "One false match each, of fewer frames. That of the default names the right poster, half out of the image, \
-         with an overlap of 0.485, and 0.5 counts.",
+        "One false match each; drives of the paper's preset have more frames. That of the default names the right \
+         poster, half out of the image: its border overlaps the true one by 0.485, and 0.5 is asked.",
     ),
     ("S3", "Over the quads that each finds: 134 and 41."),
     ("S5", "Over the quads that each finds: 90 and 26."),

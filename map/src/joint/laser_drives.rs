@@ -8,7 +8,7 @@ use super::{
     params::JointParams,
     problem::JointError,
     survey::{CameraStated, DriveRecord, LineSeen, Survey},
-    survey_map::{CONTRADICTED, Candidates, opened_from},
+    survey_map::{CONTRADICTED, Candidates, Closure, opened_from},
 };
 use crate::{fuse::FuseParams, pose2::Pose2, segments::LaserSegment, slam::MapKey};
 use nalgebra::{Matrix2, Point2};
@@ -83,17 +83,14 @@ impl<'a> Joined<'a> {
         let keyframes = laid.in_one_frame(&opened, keyframes);
         let mut joint = SurveyProblem::new(&self.survey, params, Some(keyframes))?;
         let closures = laid.settled(&self.survey, &mut joint, params)?;
-        let kept = closures.iter().filter(|closure| closure.weight > CONTRADICTED);
-        let same: Vec<[usize; 2]> = kept.map(|closure| closure.tracks).collect();
-        self.check_common(&same)?;
+        let same = self.common(&closures)?;
         self.share_walls(&joint);
         let keyframes = joint.problem.state.keyframes;
         let mut problem = SurveyProblem::new(&self.survey, params, Some(keyframes))?;
-        let all = Candidates::by_distance(same, &vec![0.0; closures.len()]);
-        let closures = all.settled(&self.survey, &mut problem, params)?;
-        let kept = closures.into_iter().filter(|closure| closure.weight > CONTRADICTED);
-        let same: Vec<[usize; 2]> = kept.map(|closure| closure.tracks).collect();
-        self.check_common(&same)?;
+        let distances_m = vec![0.0; same.len()];
+        let closures =
+            Candidates::by_distance(same, &distances_m).settled(&self.survey, &mut problem, params)?;
+        let same = self.common(&closures)?;
         Ok(JoinedSolution { problem, same })
     }
 
@@ -107,7 +104,10 @@ impl<'a> Joined<'a> {
         of.unwrap_or_default()
     }
 
-    fn check_common(&self, same: &[[usize; 2]]) -> Result<(), JointError> {
+    /// The pairs that nothing contradicts. Errors: a drive with too few of them.
+    fn common(&self, closures: &[Closure]) -> Result<Vec<[usize; 2]>, JointError> {
+        let kept = closures.iter().filter(|closure| closure.weight > CONTRADICTED);
+        let same: Vec<[usize; 2]> = kept.map(|closure| closure.tracks).collect();
         for drive in 1..self.made.len() {
             let of = |pair: &&[usize; 2]| {
                 let [a, b] = pair.map(|object| self.drive_of(object));
@@ -118,7 +118,7 @@ impl<'a> Joined<'a> {
                 return Err(JointError::Apart { drive: drive + 1, common });
             }
         }
-        Ok(())
+        Ok(same)
     }
 
     /// Gives lines of later drives to the walls of earlier ones that they lie on. A piece most of

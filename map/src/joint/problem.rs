@@ -25,7 +25,10 @@ pub enum JointError {
     #[error("the factors do not determine every variable")]
     Loose,
     /// A drive cannot be laid on those before it.
-    #[error("drive {drive} shares {common} objects with those before it, and needs 2")]
+    #[error(
+        "drive {drive} has {common} of the objects of those before it, and two are needed: drive past more of what \
+         they passed"
+    )]
     Apart {
         /// From 1.
         drive: usize,
