@@ -17,8 +17,8 @@ const AHEAD_M: f64 = 1.0;
 const ARRIVED_M: f64 = 0.05;
 /// Speed, m/s.
 const SPEED_MPS: f64 = 0.5;
-/// Share of its speed without a pose, so slow that the camera, which looks about, sees what it passes
-/// on both sides.
+/// Share of its speed without a pose, so slow that the camera, which looks about, sees what it
+/// passes on both sides.
 const LOST_PACE: f64 = 0.5;
 /// It looks about to either side, rad, so fast, rad/s.
 const SWEEP_RAD: f64 = 1.2;
