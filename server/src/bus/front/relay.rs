@@ -74,7 +74,13 @@ where
         router.write.shutdown().await?;
         tokio::io::copy(&mut router.read, &mut tokio::io::sink()).await
     };
-    drop(timeout(LINGER, last).await);
+    // A connection that is closed over unread bytes is reset, and the robot never reads why.
+    let rest = async {
+        if let End::Violation(_) = ended {
+            tokio::io::copy(&mut from_robot, &mut tokio::io::sink()).await.ok();
+        }
+    };
+    drop(tokio::join!(timeout(LINGER, last), timeout(LINGER, rest)));
     ended
 }
 

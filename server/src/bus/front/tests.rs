@@ -16,6 +16,7 @@ use crate::{
 };
 use serde_json::json;
 use std::net::{Ipv4Addr, UdpSocket};
+use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 use zenoh_codec::{WCodec as _, Zenoh080};
 use zenoh_protocol::{
     core::{Reliability, WhatAmI, WireExpr, ZenohIdProto},
@@ -232,6 +233,23 @@ fn no_bytes_panic() {
         passed += usize::from(opened().batch(&changed).is_ok());
     }
     assert!(passed > 0 && passed < 20_000, "{passed}");
+}
+
+#[tokio::test]
+async fn a_robot_that_is_still_sending_reads_why_its_connection_ends() {
+    let (mut robot, front) = tokio::io::duplex(1 << 10);
+    let (router, _far) = tokio::io::duplex(1 << 10);
+    let (read, write) = tokio::io::split(router);
+    let relayed = tokio::spawn(relay(front, ToRouter { read, write }, Arc::default()));
+    // No message of zenoh.
+    robot.write_all(&[1, 0, 0xff]).await.expect("sent");
+    let mut told = Vec::new();
+    robot.read_to_end(&mut told).await.expect("an end in order");
+    assert_eq!(told.get(2).map(|first| first & 0x1f), Some(0x03), "{told:?}");
+    robot.write_all(&[0; 1 << 16]).await.expect("the rest is read");
+    drop(robot);
+    let ended = timeout(Duration::from_secs(10), relayed).await.expect("ends").expect("no panic");
+    assert!(matches!(ended, End::Violation(_)), "{ended:?}");
 }
 
 /// What the front rests on inside zenoh: the name of the protocol of QUIC, its one stream and

@@ -253,7 +253,8 @@ async fn connection(router: &std::path::Path, random: &mut Random, lasting: &Las
     assert!(matches!(received(&mut from).await, TransportBody::OpenAck(_)));
     let taken = tokio::spawn(async move { tokio::io::copy(&mut from, &mut tokio::io::sink()).await });
     let mut sent = 0;
-    while sent < OF_CONNECTION && send(&mut to, &random.batch(&mut sn)).await.is_ok() {
+    while sent < OF_CONNECTION && !taken.is_finished() && send(&mut to, &random.batch(&mut sn)).await.is_ok()
+    {
         sent += 1;
     }
     drop(to.shutdown().await);
