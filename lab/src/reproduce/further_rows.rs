@@ -14,7 +14,8 @@ macro_rules! worlds {
          photoreal/22 photoreal/23 photoreal/24 photoreal/25 photoreal/26 photoreal/27 photoreal/28"
     };
 }
-const WORLDS: &str = worlds!();
+/// The landmarks of each picture, and a robot that goes from picture to picture.
+const WORLDS: &str = concat!(worlds!(), " --walk");
 const STRANGERS: &str = concat!(worlds!(), " --strangers");
 
 const NAMES: [Figure; 12] = [
@@ -30,6 +31,16 @@ const NAMES: [Figure; 12] = [
     Figure::less("camera position, median", M, "0/camera/position_m/median").of("0/camera/position_m/count"),
     Figure::less("camera position, 90 %", M, "0/camera/position_m/most"),
     Figure::less("camera position, worst", M, "0/camera/position_m/worst"),
+];
+
+const WALKED: [Figure; 7] = [
+    Figure::more("pictures with a pose", Count, "0/walk/position_m/count").of("0/walk/pictures"),
+    Figure::less("position, median", M, "0/walk/position_m/median"),
+    Figure::less("position, 90 %", M, "0/walk/position_m/most"),
+    Figure::less("position, worst", M, "0/walk/position_m/worst"),
+    Figure::less("heading, median", Deg, "0/walk/direction_deg/median"),
+    Figure::new("NEES of 3", Plain, "0/walk/nees/mean"),
+    Figure::new("within their 95 %", Share, "0/walk/within_95"),
 ];
 
 const FOUND: [Figure; 4] = [
@@ -81,12 +92,12 @@ const SURVEYED: [Figure; 13] = [
     Figure::new("NEES of a degree of freedom", Plain, "0/nees"),
 ];
 
-pub(super) const SETS: [Row; 10] = [
+pub(super) const SETS: [Row; 11] = [
     Row {
         id: "S1",
         title: "path-traced worlds of an independent generator",
         paper: "",
-        commands: &[of_set(WORLDS, "outside photoreal/15", &["photoreal"], 100, &NAMES)],
+        commands: &[of_set(WORLDS, "outside photoreal/15 --walk", &["photoreal"], 150, &NAMES)],
     },
     Row {
         id: "S2",
@@ -225,6 +236,12 @@ pub(super) const SETS: [Row; 10] = [
                 Figure::new("upenn-levine-lobby, explained", Share, "map=upenn-levine-lobby/explained"),
             ],
         }],
+    },
+    Row {
+        id: "S11",
+        title: "a robot that goes from picture to picture of the same worlds, without a laser: its fused pose",
+        paper: "",
+        commands: &[of_set(WORLDS, "outside photoreal/15 --walk", &["photoreal"], 150, &WALKED)],
     },
 ];
 

@@ -16,6 +16,12 @@ const CORRIDOR: Command = Command {
     figures: &[
         Figure::more("recall at IoU 0.7", Share, "0/recall_70").of("0/quads").within("0/recall_70_interval"),
         Figure::more("recall at IoU 0.85", Share, "0/recall_85").within("0/recall_85_interval"),
+        Figure::more("posters to 50 deg, recall at IoU 0.7", Share, "0/by_class_ahead/poster/recall_70")
+            .of("0/by_class_ahead/poster/quads")
+            .within("0/by_class_ahead/poster/recall_70_interval"),
+        Figure::more("doors, recall at IoU 0.7", Share, "0/by_class/door/recall_70")
+            .of("0/by_class/door/quads")
+            .within("0/by_class/door/recall_70_interval"),
         Figure::less("false quads an image", Plain, "0/false_per_image").within("0/false_per_image_interval"),
         Figure::less("corners, median", Px, "0/corner_error_px"),
     ],

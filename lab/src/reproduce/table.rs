@@ -76,22 +76,33 @@ fn lines(row: &RowFigures) -> String {
         writeln!(text, "| {left} | {name} | {paper} | {default} | {bold}{preset}{bold} |").ok();
         (left, paper) = (String::new(), "");
     }
+    if text.is_empty() {
+        let why = absent(row).next().map_or("no command", |(_, why)| why);
+        return format!("| {left} | | {paper} | {0} | {0} |\n", not_measured(why));
+    }
+    for (run, why) in absent(row) {
+        let which = run.seed.map_or_else(|| format!("`{}`", run.command), |seed| format!("seed {seed}"));
+        let why = not_measured(why);
+        let [default, paper] =
+            if run.preset == Some(Preset::Paper) { ["-", why.as_str()] } else { [why.as_str(), "-"] };
+        writeln!(text, "|  | {which} |  | {default} | {paper} |").ok();
+    }
     if let Some(reason) = comparison::reason(&row.id) {
         writeln!(text, "| | *{reason}* | | | |").ok();
-    }
-    if text.is_empty() {
-        writeln!(text, "| {left} | | {paper} | {0} | {0} |", reason(row)).ok();
     }
     text
 }
 
-/// Why a row has no figure at all.
-fn reason(row: &RowFigures) -> String {
-    let why = row.runs.iter().find_map(|run| match &run.outcome {
-        Outcome::NotMeasured(why) => Some(why.as_str()),
+/// Commands without figures, and why.
+fn absent(row: &RowFigures) -> impl Iterator<Item = (&Run, &str)> {
+    row.runs.iter().filter_map(|run| match &run.outcome {
+        Outcome::NotMeasured(why) => Some((run, why.as_str())),
         Outcome::Figures(_) => None,
-    });
-    format!("not measured: {}", escaped(why.unwrap_or("no command")))
+    })
+}
+
+fn not_measured(why: &str) -> String {
+    format!("not measured: {}", escaped(why))
 }
 
 /// The figure under a preset; one that no preset changes stands in the first column.
@@ -115,7 +126,7 @@ fn commands(row: &RowFigures) -> String {
         let seed = run.seed.map_or_else(String::new, |seed| seed.to_string());
         let of = |run: &Run| match &run.outcome {
             Outcome::Figures(_) => format!("{:.0}", run.seconds),
-            Outcome::NotMeasured(why) => format!("not measured: {}", escaped(why)),
+            Outcome::NotMeasured(why) => not_measured(why),
         };
         let seconds = std::iter::once(run).chain(paper).map(of).collect::<Vec<_>>().join(", ");
         writeln!(text, "| {} | `{}` | {seed} | {seconds} |", row.id, run.command).ok();
@@ -187,8 +198,10 @@ pub(super) mod tests {
             ),
         ];
         let reach = Measured { beyond: true, ..m("reach", Unit::Deg, 85.0) };
-        let once =
-            [run("calibration", None, Outcome::Figures(vec![m("error", Unit::Percent, 0.0035), reach]))];
+        let once = [
+            run("calibration", None, Outcome::Figures(vec![m("error", Unit::Percent, 0.0035), reach])),
+            run("calibration --seed 931", None, Outcome::NotMeasured("it was refused".into())),
+        ];
         let absent = [run("outside x", Some(Preset::Default), Outcome::NotMeasured("set x absent".into()))];
         let row = |id: &str, paper: &str, runs: &[Run]| RowFigures {
             id: id.into(),
@@ -212,10 +225,11 @@ pub(super) mod tests {
     fn a_table_has_a_line_for_each_figure_both_presets_and_what_was_not_measured() {
         let text = evaluation(&fixture());
         for line in [
-            "Measured on 2026-11-28 at commit 01234567 by `waymark-lab reproduce`, 3 of 4 commands, in 72",
+            "Measured on 2026-11-28 at commit 01234567 by `waymark-lab reproduce`, 3 of 5 commands, in 72",
             "| **E1** a title | recall | 88 % | 0.894 (0.860-0.920) of 432 | 0.500 (0.860-0.920) of 432 |",
             "| **E9** a title | error |  | 0.35 % | - |",
             "|  | reach |  | beyond 85.0 deg | - |",
+            "|  | seed 931 |  | not measured: it was refused | - |",
             "| **S1** a title | |  | not measured: set x absent | not measured: set x absent |",
             "| E1 | `waymark-lab evaluate detection corridor` | 931 | 12, 12 |",
             "| S1 | `waymark-lab evaluate outside x` | 931 | not measured: set x absent |",

@@ -15,6 +15,8 @@ const MOST: f64 = 0.9;
 const SIDES_PX: [u32; 6] = [0, 20, 30, 50, 100, 200];
 /// Lower ends of the groups by view angle, degrees.
 const ANGLES_DEG: [u32; 5] = [0, 30, 50, 60, 70];
+/// A quad whose normal points at most this far away from the camera is seen from ahead, degrees.
+pub(super) const AHEAD_DEG: f64 = 50.0;
 
 /// Figures of labelled quads.
 #[derive(Debug, Clone, Serialize)]
@@ -72,6 +74,8 @@ pub(crate) struct Report {
     pub(crate) easy: Option<Group>,
     pub(crate) by_state: BTreeMap<String, Group>,
     pub(crate) by_class: BTreeMap<String, Group>,
+    /// Of those seen from ahead.
+    pub(crate) by_class_ahead: BTreeMap<String, Group>,
     pub(crate) by_stratum: BTreeMap<String, Group>,
     pub(crate) by_shortest_side: Vec<(String, Group)>,
     pub(crate) by_view_angle: Vec<(String, Group)>,
@@ -103,11 +107,11 @@ impl Report {
         worst: usize,
     ) -> Self {
         let full = |l: &LabelScore| l.state == QuadState::Full;
-        let by = |key: fn(&LabelScore) -> String| {
-            let keys = scores.iter().flat_map(|s| &s.labels).filter(|l| full(l)).map(key);
+        let by = |key: fn(&LabelScore) -> String, of: fn(&LabelScore) -> bool| {
+            let keys = scores.iter().flat_map(|s| &s.labels).filter(|l| full(l) && of(l)).map(key);
             let keys: std::collections::BTreeSet<String> = keys.collect();
             let figures = |k: String| {
-                let group = Group::of(&scores, |l| full(l) && key(l) == k)?;
+                let group = Group::of(&scores, |l| full(l) && of(l) && key(l) == k)?;
                 Some((k, group))
             };
             keys.into_iter().filter_map(figures).collect()
@@ -130,8 +134,12 @@ impl Report {
             images: ImageFigures::of(&scores.iter().collect::<Vec<_>>()),
             easy: Group::of(&scores, |l| l.is_easy),
             by_state,
-            by_class: by(|l| l.class.clone()),
-            by_stratum: by(|l| l.stratum.clone()),
+            by_class: by(|l| l.class.clone(), |_| true),
+            by_class_ahead: by(
+                |l| l.class.clone(),
+                |l| l.view_angle_rad.is_some_and(|angle| angle.to_degrees() <= AHEAD_DEG),
+            ),
+            by_stratum: by(|l| l.stratum.clone(), |_| true),
             by_shortest_side: binned(&scores, &SIDES_PX, "px", |l| Some(l.min_side_px)),
             by_view_angle: binned(&scores, &ANGLES_DEG, "deg", |l| Some(l.view_angle_rad?.to_degrees())),
             images_by_stratum: strata.into_iter().map(of_stratum).collect(),
@@ -325,9 +333,13 @@ pub(super) mod tests {
     fn other_states_are_a_group_of_their_own() {
         let mut hidden = label(0.1, 50.0, 0.0);
         hidden.state = QuadState::Occluded;
-        let r =
-            Report::new("set", "default", vec![image("a", vec![hidden, label(0.9, 50.0, 1.0)], &[])], 0, 0);
-        assert_eq!((r.all.quads, r.by_state["occluded"].quads, r.by_class["poster"].quads), (1, 1, 1));
+        let mut slanted = label(0.1, 50.0, 0.0);
+        slanted.view_angle_rad = Some(1.0);
+        let labels = vec![hidden, label(0.9, 50.0, 1.0), slanted];
+        let r = Report::new("set", "default", vec![image("a", labels, &[])], 0, 0);
+        assert_eq!((r.all.quads, r.by_state["occluded"].quads, r.by_class["poster"].quads), (2, 1, 2));
+        let ahead = &r.by_class_ahead["poster"];
+        assert_eq!((ahead.quads, ahead.recall_70), (1, 1.0));
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use super::{
     easy::{MIN_CONTRAST, MIN_SIDE_PX},
-    report::{Group, ImageFigures, Report},
+    report::{AHEAD_DEG, Group, ImageFigures, Report},
 };
 use crate::evaluate::statistics::Interval;
 
@@ -33,6 +33,7 @@ pub(crate) fn table(r: &Report) -> String {
         }
     };
     add("by class", &mut r.by_class.iter());
+    add(&format!("by class, at most {AHEAD_DEG} deg from the normal"), &mut r.by_class_ahead.iter());
     add("by stratum", &mut r.by_stratum.iter());
     add("by shortest side", &mut r.by_shortest_side.iter().map(|(n, g)| (n, g)));
     add("by angle of view", &mut r.by_view_angle.iter().map(|(n, g)| (n, g)));
