@@ -22,6 +22,7 @@ mod known_map;
 mod window;
 mod laser_drive;
 mod laser_drives;
+mod shared_errors;
 mod laser_map;
 
 pub use build::SurveyProblem;

@@ -35,7 +35,24 @@ pub struct LandmarkPlace {
     pub size: LandmarkSize,
     /// Covariance over (x, y, theta, z, width, height), in this order; metres and radians.
     pub covariance: Matrix6<f64>,
+    /// The part of it that is common with other places; `None` where nothing is known of such.
+    pub shared: Option<SharedErrors>,
 }
+
+/// Errors that all places of one survey have in common, as where the whole map is stretched or
+/// bent: `error of the place = by * e + an error of its own`, e of six independent numbers of
+/// variance 1 that are the same for every place of the survey.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SharedErrors {
+    /// The survey. Errors of two surveys are independent.
+    pub survey: SurveyId,
+    /// Derivative of (x, y, theta, z, width, height) by e; metres and radians.
+    pub by: Matrix6<f64>,
+}
+
+/// Number of a survey: a digest of what it found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct SurveyId(pub u64);
 
 /// Standard deviations of a place that was measured by hand.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -69,7 +86,8 @@ impl LandmarkPlace {
         let (p, t, s) = (sigmas.position_m.powi(2), sigmas.theta_rad.powi(2), sigmas.size_m.powi(2));
         let covariance = Matrix6::from_diagonal(&Vector6::new(p, p, t, p, s, s));
         let (x_m, y_m, z_m) = (centre_m.x, centre_m.y, centre_m.z);
-        let made = Self { x_m, y_m, z_m, theta_rad, roll_rad: 0.0, tilt_rad: 0.0, size, covariance };
+        let (roll_rad, tilt_rad, shared) = (0.0, 0.0, None);
+        let made = Self { x_m, y_m, z_m, theta_rad, roll_rad, tilt_rad, size, covariance, shared };
         made.check()?;
         Ok(made)
     }
@@ -85,7 +103,13 @@ impl LandmarkPlace {
         let (low, high) = (LandmarkSize::MIN_M, LandmarkSize::MAX_M);
         check::within("width_m", self.size.width_m, low, high)?;
         check::within("height_m", self.size.height_m, low, high)?;
-        check::covariance("covariance", &self.covariance)
+        check::covariance("covariance", &self.covariance)?;
+        check::covariance("shared", &self.own_covariance())
+    }
+
+    /// The covariance of the errors that no other place has.
+    pub fn own_covariance(&self) -> Matrix6<f64> {
+        self.shared.map_or(self.covariance, |shared| self.covariance - shared.by * shared.by.transpose())
     }
 
     /// The place in another frame of the floor, whose relation to this one is exact.
@@ -100,6 +124,7 @@ impl LandmarkPlace {
             y_m: at.y,
             theta_rad: wrap_rad(self.theta_rad + there_from_here.theta_rad),
             covariance: turn * self.covariance * turn.transpose(),
+            shared: self.shared.map(|shared| SharedErrors { by: turn * shared.by, ..shared }),
             ..*self
         }
     }
@@ -144,6 +169,8 @@ mod tests {
         let mut place =
             LandmarkPlace::by_hand(Vector3::new(2.0, 5.0, 1.5), 3.0, SIZE, PlaceSigmas::default()).unwrap();
         (place.covariance[(0, 0)], place.covariance[(1, 1)]) = (0.04, 0.01);
+        let by = Matrix6::from_diagonal(&Vector6::new(0.1, 0.05, 0.0, 0.0, 0.0, 0.0));
+        place.shared = Some(SharedErrors { survey: SurveyId(1), by });
         let moved = place.moved(&Pose2::new(1.0, 0.0, std::f64::consts::FRAC_PI_2));
         let wanted = Vector3::new(-4.0, 2.0, 1.5);
         assert!((moved.map_from_landmark().translation.vector - wanted).norm() < 1e-12, "{moved:?}");
@@ -154,6 +181,12 @@ mod tests {
             (moved.covariance[(0, 0)] - 0.01).abs() < 1e-12
                 && (moved.covariance[(1, 1)] - 0.04).abs() < 1e-12
         );
+        let own = moved.own_covariance();
+        assert!((own[(0, 0)] - 0.0075).abs() < 1e-12 && (own[(1, 1)] - 0.03).abs() < 1e-12, "{own}");
+        assert!(moved.check().is_ok());
+        let beyond = SharedErrors { survey: SurveyId(1), by: 3.0 * by };
+        let refused = LandmarkPlace { shared: Some(beyond), ..place }.check().unwrap_err();
+        assert_eq!(refused.field, "shared");
     }
 
     #[test]

@@ -96,15 +96,33 @@ impl DriveFrame {
         variable: Variable,
         covariance: &DMatrix<f64>,
     ) -> DMatrix<f64> {
-        let moves = self.moves(state, variable);
-        let mut with = DMatrix::zeros(variable.size(), 3);
-        if let Some(block) = self.layout.block(variable) {
-            for (k, row) in self.layout.pattern.rows(block).enumerate() {
-                with.set_row(k, &self.with[row].transpose());
+        let one = DMatrix::identity(variable.size(), variable.size());
+        self.relative_product(state, &[variable], &one, covariance)
+    }
+
+    /// The joint covariance of variables relative to the drive as a whole, times some vectors, from
+    /// that relative to the first pose, times the same.
+    pub(super) fn relative_product(
+        &self,
+        state: &State,
+        variables: &[Variable],
+        vectors: &DMatrix<f64>,
+        product: &DMatrix<f64>,
+    ) -> DMatrix<f64> {
+        let mut moves = DMatrix::zeros(vectors.nrows(), 3);
+        let mut with = moves.clone();
+        let mut at = 0;
+        for &variable in variables {
+            moves.rows_mut(at, variable.size()).copy_from(&self.moves(state, variable));
+            if let Some(block) = self.layout.block(variable) {
+                for (k, row) in self.layout.pattern.rows(block).enumerate() {
+                    with.set_row(at + k, &self.with[row].transpose());
+                }
             }
+            at += variable.size();
         }
-        let both = &with * moves.transpose();
-        covariance - &both - both.transpose() + &moves * self.covariance * moves.transpose()
+        let (moved, along) = (moves.tr_mul(vectors), with.tr_mul(vectors));
+        product - &with * &moved - &moves * along + &moves * (self.covariance * moved)
     }
 
     /// How a shift and turn of all moves the parameters of a variable.

@@ -10,13 +10,14 @@ use super::{
     marginals::Marginals,
     params::JointParams,
     problem::JointError,
+    shared_errors::{Placed, shared_errors},
     survey::CameraStated,
     variables::{CameraState, LandmarkState, OdometryErrors, Variable, WallLine},
 };
 use crate::{
     check::OutOfRange,
     fuse::FuseParams,
-    place::LandmarkPlace,
+    place::{LandmarkPlace, SharedErrors, SurveyId},
     pose2::{Pose2, Pose2Covariance},
     segments::LaserSegment,
 };
@@ -165,16 +166,32 @@ fn objects(solved: &Solved) -> Result<Vec<Option<MappedObject>>, JointError> {
     for (landmark, block) in known.iter().zip(solved.covariances(&chosen)?) {
         covariances[*landmark] = Matrix6::from_fn(|r, c| block[(OF_PLACE[r], OF_PLACE[c])]);
     }
+    let sigma_m = |landmark: usize| (0.5 * covariances[landmark].fixed_view::<2, 2>(0, 0).trace()).sqrt();
+    let placed: Vec<Placed> = known.iter().map(|landmark| (*landmark, sigma_m(*landmark))).collect();
+    let shared = shared_errors(&solved.problem, solved.frame.as_ref(), &placed, &OF_PLACE)?;
+    let survey = survey_id(&solved.problem.state.landmarks);
+    let shared_by: BTreeMap<usize, Matrix6<f64>> =
+        known.iter().copied().zip(shared.into_iter().flatten()).collect();
     let made = |landmark: usize| {
-        let place = place(&solved.problem.state.landmarks[landmark], &covariances[landmark]);
+        let shared = shared_by.get(&landmark).map(|by| SharedErrors { survey, by: *by });
+        let place = place(&solved.problem.state.landmarks[landmark], &covariances[landmark], shared);
         place.check().ok()?;
         Some(MappedObject { place, agreement: agreements[landmark] })
     };
     Ok(solved.landmark_of.iter().map(|landmark| landmark.and_then(made)).collect())
 }
 
-/// A landmark's place; `covariance` is over x, y, theta, z, log width and log height.
-fn place(landmark: &LandmarkState, covariance: &Matrix6<f64>) -> LandmarkPlace {
+/// FNV-1a of all places.
+fn survey_id(landmarks: &[LandmarkState]) -> SurveyId {
+    let numbers =
+        landmarks.iter().flat_map(|landmark| [landmark.centre.x, landmark.centre.y, landmark.centre.z]);
+    let bytes = numbers.flat_map(f64::to_le_bytes);
+    let hash = |hash: u64, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
+    SurveyId(bytes.fold(0xcbf2_9ce4_8422_2325, hash))
+}
+
+/// A landmark's place; `covariance` and `shared` are over x, y, theta, z, log width and log height.
+fn place(landmark: &LandmarkState, covariance: &Matrix6<f64>, shared: Option<SharedErrors>) -> LandmarkPlace {
     let size = landmark.size();
     let mut by = Matrix6::identity();
     (by[(4, 4)], by[(5, 5)]) = (size.width_m, size.height_m);
@@ -188,6 +205,7 @@ fn place(landmark: &LandmarkState, covariance: &Matrix6<f64>) -> LandmarkPlace {
         tilt_rad: 0.0,
         size,
         covariance: by * covariance * by,
+        shared: shared.map(|shared| SharedErrors { by: by * shared.by, ..shared }),
     }
 }
 

@@ -8,6 +8,7 @@ mod closures;
 mod datum;
 mod golden;
 mod laser_drive;
+mod shared_errors;
 mod window;
 
 use super::*;

@@ -1,6 +1,10 @@
 //! Input and result of a fix: observations, nuisance parameters, the fix, refusals.
 
-use crate::{place::LandmarkPlace, pose_cell::PoseCell, pose2::Pose2Covariance};
+use crate::{
+    place::{LandmarkPlace, SurveyId},
+    pose_cell::PoseCell,
+    pose2::Pose2Covariance,
+};
 use nalgebra::{Matrix3, Matrix3x6, Matrix6};
 use vision::{model::LandmarkId, pose::LandmarkPose};
 
@@ -19,8 +23,10 @@ pub struct LandmarkObservation<'a> {
 /// becomes overconfident.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum NuisanceKey {
-    /// Place and size of a landmark: (x, y, theta, z, width, height).
+    /// Place and size of a landmark: (x, y, theta, z, width, height), without what it shares.
     Landmark(LandmarkId),
+    /// What all places of a survey share: six unit errors.
+    Survey(SurveyId),
     /// Extrinsics of the camera: left perturbation (rotation, translation), robot frame.
     Extrinsics,
     /// Intrinsics of the camera: the first three of six are the errors of the focal length (as a

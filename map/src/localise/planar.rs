@@ -9,6 +9,7 @@ use crate::{
         fix::{LandmarkObservation, NuisanceKey},
         predict::corners,
     },
+    place::SurveyId,
     pose2::Pose2,
 };
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Matrix6, Point2, Vector2, Vector3};
@@ -66,6 +67,8 @@ pub(super) struct Planar<'a> {
     camera: Option<Vector3<f64>>,
     /// Corners of each landmark, map frame.
     corners_m: Vec<[Vector3<f64>; 4]>,
+    /// Surveys whose places share errors, each once.
+    surveys: Vec<SurveyId>,
 }
 
 impl<'a> Planar<'a> {
@@ -80,7 +83,11 @@ impl<'a> Planar<'a> {
         let stated = observations.first().map(|s| &s.seen.measured.camera).filter(|c| c.sigmas.is_some());
         let camera = stated.map(Intrinsics::error_sigmas);
         let corners_m = observations.iter().map(corners).collect();
-        Self { observations, mounting, camera_from_robot, camera, corners_m }
+        let mut surveys: Vec<SurveyId> =
+            observations.iter().filter_map(|s| Some(s.place.shared?.survey)).collect();
+        surveys.sort_unstable();
+        surveys.dedup();
+        Self { observations, mounting, camera_from_robot, camera, corners_m, surveys }
     }
 
     /// The same problem with exact intrinsics.
@@ -108,17 +115,19 @@ impl<'a> Planar<'a> {
         centre(self.observations.iter().map(|s| s.place))
     }
 
-    /// Keys and covariances of the nuisance parameters: each landmark, the extrinsics, then the
-    /// intrinsics unless exact.
+    /// Keys and covariances of the nuisance parameters: each landmark, the extrinsics, the surveys,
+    /// then the intrinsics unless exact.
     pub(super) fn nuisances(&self) -> Vec<(NuisanceKey, Matrix6<f64>)> {
         let places =
-            self.observations.iter().map(|s| (NuisanceKey::Landmark(s.landmark), s.place.covariance));
+            self.observations.iter().map(|s| (NuisanceKey::Landmark(s.landmark), s.place.own_covariance()));
+        let surveys = self.surveys.iter().map(|survey| (NuisanceKey::Survey(*survey), Matrix6::identity()));
         let camera = self.camera.map(|sigmas| {
             let mut covariance = Matrix6::zeros();
             covariance.fixed_view_mut::<3, 3>(0, 0).set_diagonal(&sigmas.component_mul(&sigmas));
             (NuisanceKey::Camera, covariance)
         });
-        places.chain([(NuisanceKey::Extrinsics, self.mounting.covariance)]).chain(camera).collect()
+        let extrinsics = (NuisanceKey::Extrinsics, self.mounting.covariance);
+        places.chain([extrinsics]).chain(surveys).chain(camera).collect()
     }
 
     /// `camera_from_landmark` of observation `i` for a robot pose.
@@ -168,18 +177,25 @@ impl<'a> Planar<'a> {
     pub(super) fn linearise(&self, pose: &Pose2) -> Option<FullLinearisation> {
         let n = self.observations.len();
         let PoseLinearisation { residual, by_pose } = self.pose_linearisation(pose)?;
-        let blocks = n + 1 + usize::from(self.camera.is_some());
+        let of_camera = n + 1 + self.surveys.len();
+        let blocks = of_camera + usize::from(self.camera.is_some());
         let mut by_nuisance = DMatrix::zeros(8 * n, 6 * blocks);
         for (i, observation) in self.observations.iter().enumerate() {
             let predicted =
                 corners(pose, observation.place, self.mounting, &observation.seen.measured.camera)?;
             by_nuisance.view_mut((8 * i, 6 * i), (8, 6)).copy_from(&predicted.place);
             by_nuisance.view_mut((8 * i, 6 * n), (8, 6)).copy_from(&predicted.mounting);
+            if let Some(shared) = observation.place.shared
+                && let Ok(survey) = self.surveys.binary_search(&shared.survey)
+            {
+                let by = predicted.place * shared.by;
+                by_nuisance.view_mut((8 * i, 6 * (n + 1 + survey)), (8, 6)).copy_from(&by);
+            }
             if self.camera.is_some() {
                 for (c, by_camera) in observation.seen.measured.by_camera.iter().enumerate() {
                     // The residual is measured minus predicted, so the derivative of the measured
                     // corner changes its sign.
-                    by_nuisance.view_mut((8 * i + 2 * c, 6 * (n + 1)), (2, 3)).copy_from(&-by_camera);
+                    by_nuisance.view_mut((8 * i + 2 * c, 6 * of_camera), (2, 3)).copy_from(&-by_camera);
                 }
             }
         }

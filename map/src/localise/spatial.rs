@@ -5,8 +5,10 @@
 use crate::{
     gate::{Z_95, chi2_quantile},
     localise::{derivatives::point_by_place, fix::LandmarkObservation},
+    place::SurveyId,
 };
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Matrix6, SMatrix, Vector3, Vector6};
+use std::collections::BTreeMap;
 use vision::{
     frame::Intrinsics,
     pose::reprojection::{corner_points, perturbed, project},
@@ -136,6 +138,7 @@ impl<'a> Spatial<'a> {
         let turn = camera_from_map.rotation.to_rotation_matrix().into_inner();
         let mut sum = DMatrix::zeros(8 * n, 8 * n);
         let mut by_camera = DMatrix::zeros(8 * n, 3);
+        let mut by_survey: BTreeMap<SurveyId, DMatrix<f64>> = BTreeMap::new();
         for (i, observation) in self.observations.iter().enumerate() {
             let (measured, place) = (&observation.seen.measured, observation.place);
             let at = place.map_from_landmark();
@@ -148,10 +151,17 @@ impl<'a> Spatial<'a> {
                 by_place.fixed_rows_mut::<2>(2 * c).copy_from(&own);
                 by_camera.view_mut((8 * i + 2 * c, 0), (2, 3)).copy_from(&measured.by_camera[c]);
             }
-            let by_place =
-                by_place * place.covariance * by_place.transpose() + measured.covariance_px2.matrix();
+            let own =
+                by_place * place.own_covariance() * by_place.transpose() + measured.covariance_px2.matrix();
             let mut block = sum.view_mut((8 * i, 8 * i), (8, 8));
-            block += by_place;
+            block += own;
+            if let Some(shared) = place.shared {
+                let of_survey = by_survey.entry(shared.survey).or_insert_with(|| DMatrix::zeros(8 * n, 6));
+                of_survey.view_mut((8 * i, 0), (8, 6)).copy_from(&(by_place * shared.by));
+            }
+        }
+        for by_shared in by_survey.values() {
+            sum += by_shared * by_shared.transpose();
         }
         if let Some(sigmas) = self.camera {
             let variances = Matrix3::from_diagonal(&sigmas.component_mul(&sigmas));

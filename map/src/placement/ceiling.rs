@@ -246,6 +246,7 @@ fn fused(
         tilt_rad: FRAC_PI_2,
         size: LandmarkSize { width_m: q[3], height_m: q[4] },
         covariance: 0.5 * (covariance + covariance.transpose()),
+        shared: None,
     })
 }
 

@@ -54,6 +54,7 @@ fn place_on(wall: &LaserSegment, along_m: f64) -> LandmarkPlace {
         tilt_rad: 0.0,
         size: SIZE,
         covariance: Matrix6::zeros(),
+        shared: None,
     }
 }
 

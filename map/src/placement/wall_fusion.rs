@@ -100,6 +100,7 @@ fn fused(views: &[&WallRectangle], wall: &LaserSegment, p: &PlacementParams) -> 
         tilt_rad: 0.0,
         size: LandmarkSize { width_m: rectangle[2], height_m: rectangle[3] },
         covariance: 0.5 * (covariance + covariance.transpose()),
+        shared: None,
     })
 }
 

@@ -92,6 +92,7 @@ fn landmark_shape(landmark: &Landmark) -> Option<(LinePrimitive, TextPrimitive)>
         tilt_rad: place.tilt_rad,
         size,
         covariance: Matrix6::zeros(),
+        shared: None,
     };
     let map_from_landmark = place.map_from_landmark();
     let color = if landmark.status == LandmarkStatus::Active { ACTIVE } else { INACTIVE };

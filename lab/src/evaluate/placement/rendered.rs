@@ -173,5 +173,6 @@ fn truth(object: &LandmarkTruth) -> LandmarkPlace {
         tilt_rad: if is_up { FRAC_PI_2 } else { 0.0 },
         size: LandmarkSize { width_m: object.width_m, height_m: object.height_m },
         covariance: Matrix6::zeros(),
+        shared: None,
     }
 }

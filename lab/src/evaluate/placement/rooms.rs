@@ -103,6 +103,7 @@ fn poster(room: &Room, random: &mut Random) -> LandmarkPlace {
         tilt_rad: 0.0,
         size,
         covariance: Matrix6::zeros(),
+        shared: None,
     }
 }
 
@@ -116,6 +117,7 @@ fn lamp(room: &Room, random: &mut Random) -> LandmarkPlace {
         tilt_rad: FRAC_PI_2,
         size: LandmarkSize { width_m: random.range(0.4, 1.2), height_m: random.range(0.3, 0.8) },
         covariance: Matrix6::zeros(),
+        shared: None,
     }
 }
 

@@ -76,6 +76,9 @@ struct Figures {
     /// Squared errors on the floor over their covariance, for each degree of freedom, in the frame
     /// of the whole drive.
     nees: Vec<f64>,
+    /// The same along and across the corridor, each alone.
+    nees_along: Vec<f64>,
+    nees_across: Vec<f64>,
     /// Errors of the mounting's rotation as stated and as found, degrees.
     stated_deg: Vec<f64>,
     found_deg: Vec<f64>,
@@ -95,6 +98,8 @@ impl Figures {
             (&mut self.size_percent, other.size_percent),
             (&mut self.two_steps_size_percent, other.two_steps_size_percent),
             (&mut self.nees, other.nees),
+            (&mut self.nees_along, other.nees_along),
+            (&mut self.nees_across, other.nees_across),
             (&mut self.stated_deg, other.stated_deg),
             (&mut self.found_deg, other.found_deg),
         ] {
@@ -107,6 +112,7 @@ impl Figures {
             median: quantile(&mut all.to_vec(), 0.5),
             p95: quantile(&mut all.to_vec(), 0.95),
         };
+        let mean = |all: &[f64]| all.iter().sum::<f64>() / all.len().max(1) as f64;
         Report {
             experiment: "survey",
             shown: self.shown,
@@ -118,7 +124,9 @@ impl Figures {
             two_steps_aligned_m: spread(&self.two_steps_aligned_m),
             size_percent: spread(&self.size_percent),
             two_steps_size_percent: spread(&self.two_steps_size_percent),
-            nees: self.nees.iter().sum::<f64>() / self.nees.len().max(1) as f64,
+            nees: mean(&self.nees),
+            nees_along: mean(&self.nees_along),
+            nees_across: mean(&self.nees_across),
             stated_deg: spread(&self.stated_deg),
             found_deg: spread(&self.found_deg),
             lost: self.lost,
@@ -155,6 +163,8 @@ struct Report {
     two_steps_size_percent: Spread,
     /// Mean; 1 expected.
     nees: f64,
+    nees_along: f64,
+    nees_across: f64,
     stated_deg: Spread,
     found_deg: Spread,
     lost: Vec<String>,
@@ -177,8 +187,9 @@ impl Report {
             format!("  mounting, stated     {}", self.stated_deg.in_words(1.0, 2, "deg")),
             format!("  mounting, found      {}", self.found_deg.in_words(1.0, 2, "deg")),
             format!(
-                "NEES of landmarks for each degree of freedom, in the frame of the whole drive: {:.2}",
-                self.nees
+                "NEES of landmarks for each degree of freedom, in the frame of the whole drive: {:.2}; along the \
+                 corridor {:.2}, across {:.2}",
+                self.nees, self.nees_along, self.nees_across
             ),
         ];
         lines.extend(self.lost.iter().map(|lost| format!("  lost: {lost}")));
@@ -233,6 +244,8 @@ fn figures(driven: &Driven, building: &SurveyedBuilding) -> Figures {
         let covariance = place.covariance.fixed_view::<2, 2>(0, 0).into_owned();
         let d = Vector2::new(place.x_m, place.y_m) - at;
         made.nees.extend(covariance.cholesky().map(|c| d.dot(&c.solve(&d)) / 2.0));
+        made.nees_along.push(d.x * d.x / covariance[(0, 0)]);
+        made.nees_across.push(d.y * d.y / covariance[(1, 1)]);
         made.size_percent.extend(size_errors(&object.place, &driven.borders(truth)));
         joint.push((here, at));
         if let Some(place) = two_steps(driven, building, object) {

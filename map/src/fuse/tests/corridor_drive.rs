@@ -5,10 +5,10 @@ use crate::{
     extrinsics::{CameraExtrinsics, pan_tilt},
     fuse::{fuser::Fuser, params::FuseParams},
     localise::{FixResult, LandmarkObservation, LocaliseParams, robot_pose},
-    place::{LandmarkPlace, PlaceSigmas},
+    place::{LandmarkPlace, PlaceSigmas, SharedErrors, SurveyId},
     pose2::Pose2,
 };
-use nalgebra::{Matrix2, Point2, Vector2, Vector3};
+use nalgebra::{Matrix2, Matrix6, Point2, Vector2, Vector3, Vector6};
 use std::f64::consts::FRAC_PI_2;
 use vision::{
     frame::{Distortion, Intrinsics},
@@ -25,9 +25,9 @@ const SIZE: LandmarkSize = LandmarkSize { width_m: 0.6, height_m: 0.84 };
 const SIGMA_PX: f64 = 0.5;
 
 /// 25 m along x; posters on the walls at y = 1.2 and -1.2, observed from 1 to 4 m ahead by a camera
-/// turned to that wall. Mean squared error along the corridor after the first fix, NEES at the end,
-/// corrections.
-fn corridor(random: &mut Random) -> (f64, f64, u64) {
+/// turned to that wall. All places have the errors `shared` in common, which the map may know of.
+/// Mean squared error along the corridor after the first fix, NEES at the end, corrections.
+fn corridor(shared: &Matrix6<f64>, is_known: bool, random: &mut Random) -> (f64, f64, u64) {
     let camera = Intrinsics::new(500.0, 500.0, 320.0, 240.0, Distortion::None).unwrap();
     let places: Vec<LandmarkPlace> = (0..4)
         .map(|i| {
@@ -36,15 +36,23 @@ fn corridor(random: &mut Random) -> (f64, f64, u64) {
             LandmarkPlace::by_hand(centre, theta, SIZE, PlaceSigmas::default()).unwrap()
         })
         .collect();
+    let in_common = shared * Vector6::from_fn(|_, _| random.normal());
     let true_places: Vec<LandmarkPlace> = places
         .iter()
         .map(|p| {
-            let e = p.covariance.map_diagonal(f64::sqrt).map(|s| s * random.normal());
+            let e = p.covariance.map_diagonal(f64::sqrt).map(|s| s * random.normal()) + in_common;
             let size = LandmarkSize { width_m: p.size.width_m + e[4], height_m: p.size.height_m + e[5] };
             let (x_m, y_m, z_m) = (p.x_m + e[0], p.y_m + e[1], p.z_m + e[3]);
             LandmarkPlace { x_m, y_m, z_m, theta_rad: p.theta_rad + e[2], size, ..*p }
         })
         .collect();
+    let stated = SharedErrors { survey: SurveyId(7), by: *shared };
+    let whole = |p: &LandmarkPlace| LandmarkPlace {
+        covariance: p.covariance + shared * shared.transpose(),
+        shared: is_known.then_some(stated),
+        ..*p
+    };
+    let places: Vec<LandmarkPlace> = places.iter().map(whole).collect();
     let base = CameraExtrinsics::new(pan_tilt(0.0, 0.0, Vector3::new(0.1, 0.0, 1.3))).unwrap();
     let wrong = base.covariance.map_diagonal(f64::sqrt).map(|s| s * random.normal());
     let params = FuseParams::default();
@@ -106,7 +114,7 @@ fn the_error_along_the_corridor_is_below_twenty_centimetres() {
     let mut random = Random::new(1);
     let (mut squares, mut nees, drives) = (0.0, 0.0, 60);
     for _ in 0..drives {
-        let (s, e, corrections) = corridor(&mut random);
+        let (s, e, corrections) = corridor(&Matrix6::zeros(), false, &mut random);
         assert!(corrections >= 8, "{corrections}");
         (squares, nees) = (squares + s, nees + e);
     }
@@ -115,4 +123,17 @@ fn the_error_along_the_corridor_is_below_twenty_centimetres() {
     // freedom.
     assert!(rms < 0.2, "{rms} m along");
     assert!((2.25..3.85).contains(&nees), "{nees}");
+}
+
+#[test]
+fn what_all_places_have_in_common_does_not_average_out() {
+    // The map is shifted by 8 cm and turned by 0.2 degrees.
+    let shared = Matrix6::from_diagonal(&Vector6::new(0.08, 0.08, 0.0035, 0.0, 0.0, 0.0));
+    let mean = |is_known| {
+        let mut random = Random::new(2);
+        (0..60).map(|_| corridor(&shared, is_known, &mut random).1).sum::<f64>() / 60.0
+    };
+    let (known, unknown) = (mean(true), mean(false));
+    assert!((2.25..3.85).contains(&known), "{known}");
+    assert!(unknown > 4.5, "{unknown}");
 }

@@ -194,6 +194,7 @@ fn a_view_is_that_of_the_projection() {
         tilt_rad: m.tilt_rad,
         size: m.size(),
         covariance: SMatrix::zeros(),
+        shared: None,
     };
     let intrinsics = vision::frame::Intrinsics::new(
         c.focal_px,

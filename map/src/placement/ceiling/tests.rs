@@ -34,6 +34,7 @@ fn truth(height_m: f64) -> LandmarkPlace {
         tilt_rad: FRAC_PI_2,
         size: SIZE,
         covariance: Matrix6::zeros(),
+        shared: None,
     }
 }
 

@@ -35,6 +35,7 @@ fn truth() -> LandmarkPlace {
         tilt_rad: 0.0,
         size: SIZE,
         covariance: Matrix6::zeros(),
+        shared: None,
     }
 }
 
