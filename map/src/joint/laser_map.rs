@@ -174,7 +174,7 @@ fn objects(solved: &Solved) -> Result<Vec<Option<MappedObject>>, JointError> {
         known.iter().copied().zip(shared.into_iter().flatten()).collect();
     let made = |landmark: usize| {
         let shared = shared_by.get(&landmark).map(|by| SharedErrors { survey, by: *by });
-        let place = place(&solved.problem.state.landmarks[landmark], &covariances[landmark], shared);
+        let place = place(&solved.problem.state.landmarks[landmark], &covariances[landmark], shared.as_ref());
         place.check().ok()?;
         Some(MappedObject { place, agreement: agreements[landmark] })
     };
@@ -191,7 +191,11 @@ fn survey_id(landmarks: &[LandmarkState]) -> SurveyId {
 }
 
 /// A landmark's place; `covariance` and `shared` are over x, y, theta, z, log width and log height.
-fn place(landmark: &LandmarkState, covariance: &Matrix6<f64>, shared: Option<SharedErrors>) -> LandmarkPlace {
+fn place(
+    landmark: &LandmarkState,
+    covariance: &Matrix6<f64>,
+    shared: Option<&SharedErrors>,
+) -> LandmarkPlace {
     let size = landmark.size();
     let mut by = Matrix6::identity();
     (by[(4, 4)], by[(5, 5)]) = (size.width_m, size.height_m);
@@ -205,7 +209,7 @@ fn place(landmark: &LandmarkState, covariance: &Matrix6<f64>, shared: Option<Sha
         tilt_rad: 0.0,
         size,
         covariance: by * covariance * by,
-        shared: shared.map(|shared| SharedErrors { by: by * shared.by, ..shared }),
+        shared: shared.map(|shared| SharedErrors { by: by * shared.by, ..*shared }),
     }
 }
 

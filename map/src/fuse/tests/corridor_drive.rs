@@ -24,35 +24,42 @@ use vision::{
 const SIZE: LandmarkSize = LandmarkSize { width_m: 0.6, height_m: 0.84 };
 const SIGMA_PX: f64 = 0.5;
 
-/// 25 m along x; posters on the walls at y = 1.2 and -1.2, observed from 1 to 4 m ahead by a camera
-/// turned to that wall. All places have the errors `shared` in common, which the map may know of.
-/// Mean squared error along the corridor after the first fix, NEES at the end, corrections.
+/// Posters on the walls at y = 1.2 and -1.2.
+fn hung() -> Vec<LandmarkPlace> {
+    let place = |i: usize| {
+        let (y, theta) = if i.is_multiple_of(2) { (1.2, -FRAC_PI_2) } else { (-1.2, FRAC_PI_2) };
+        let centre = Vector3::new(4.0 + 6.0 * i as f64, y, 1.5);
+        LandmarkPlace::by_hand(centre, theta, SIZE, PlaceSigmas::default()).unwrap()
+    };
+    (0..4).map(place).collect()
+}
+
+/// Places with errors as stated, and the errors `shared`, which all have in common.
+fn drawn(places: &[LandmarkPlace], shared: &Matrix6<f64>, random: &mut Random) -> Vec<LandmarkPlace> {
+    let in_common = shared * Vector6::from_fn(|_, _| random.normal());
+    let mut draw = |p: &LandmarkPlace| {
+        let e = p.covariance.map_diagonal(f64::sqrt).map(|s| s * random.normal()) + in_common;
+        let size = LandmarkSize { width_m: p.size.width_m + e[4], height_m: p.size.height_m + e[5] };
+        let (x_m, y_m, z_m) = (p.x_m + e[0], p.y_m + e[1], p.z_m + e[3]);
+        LandmarkPlace { x_m, y_m, z_m, theta_rad: p.theta_rad + e[2], size, ..*p }
+    };
+    places.iter().map(&mut draw).collect()
+}
+
+/// 25 m along x; each poster is observed from 1 to 4 m ahead by a camera turned to its wall. All
+/// places have the errors `shared` in common, which the map may know of. Mean squared error along
+/// the corridor after the first fix, NEES at the end, corrections.
 fn corridor(shared: &Matrix6<f64>, is_known: bool, random: &mut Random) -> (f64, f64, u64) {
     let camera = Intrinsics::new(500.0, 500.0, 320.0, 240.0, Distortion::None).unwrap();
-    let places: Vec<LandmarkPlace> = (0..4)
-        .map(|i| {
-            let (y, theta) = if i % 2 == 0 { (1.2, -FRAC_PI_2) } else { (-1.2, FRAC_PI_2) };
-            let centre = Vector3::new(4.0 + 6.0 * f64::from(i), y, 1.5);
-            LandmarkPlace::by_hand(centre, theta, SIZE, PlaceSigmas::default()).unwrap()
-        })
-        .collect();
-    let in_common = shared * Vector6::from_fn(|_, _| random.normal());
-    let true_places: Vec<LandmarkPlace> = places
-        .iter()
-        .map(|p| {
-            let e = p.covariance.map_diagonal(f64::sqrt).map(|s| s * random.normal()) + in_common;
-            let size = LandmarkSize { width_m: p.size.width_m + e[4], height_m: p.size.height_m + e[5] };
-            let (x_m, y_m, z_m) = (p.x_m + e[0], p.y_m + e[1], p.z_m + e[3]);
-            LandmarkPlace { x_m, y_m, z_m, theta_rad: p.theta_rad + e[2], size, ..*p }
-        })
-        .collect();
+    let places = hung();
+    let true_places = drawn(&places, shared, random);
     let stated = SharedErrors { survey: SurveyId(7), by: *shared };
-    let whole = |p: &LandmarkPlace| LandmarkPlace {
+    let whole = |p: LandmarkPlace| LandmarkPlace {
         covariance: p.covariance + shared * shared.transpose(),
         shared: is_known.then_some(stated),
-        ..*p
+        ..p
     };
-    let places: Vec<LandmarkPlace> = places.iter().map(whole).collect();
+    let places: Vec<LandmarkPlace> = places.into_iter().map(whole).collect();
     let base = CameraExtrinsics::new(pan_tilt(0.0, 0.0, Vector3::new(0.1, 0.0, 1.3))).unwrap();
     let wrong = base.covariance.map_diagonal(f64::sqrt).map(|s| s * random.normal());
     let params = FuseParams::default();

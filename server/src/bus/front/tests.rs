@@ -246,7 +246,7 @@ async fn a_robot_that_is_still_sending_reads_why_its_connection_ends() {
     let mut told = Vec::new();
     robot.read_to_end(&mut told).await.expect("an end in order");
     assert_eq!(told.get(2).map(|first| first & 0x1f), Some(0x03), "{told:?}");
-    robot.write_all(&[0; 1 << 16]).await.expect("the rest is read");
+    robot.write_all(&vec![0; 1 << 16]).await.expect("the rest is read");
     drop(robot);
     let ended = timeout(Duration::from_secs(10), relayed).await.expect("ends").expect("no panic");
     assert!(matches!(ended, End::Violation(_)), "{ended:?}");
