@@ -38,17 +38,23 @@ fn a_robot_of_the_demo_is_localised() {
         answers += usize::from(matches!(message.body, Body::Answer(_)));
     }
     assert_eq!((frames as f64, answers as f64), (of("/frames"), of("/answers")), "{summary}");
-    a_recording_is_surveyed(&file);
+    let alone = a_recording_is_surveyed(&file);
+    two_recordings_are_one_map(&file, &alone);
 }
 
-fn a_recording_is_surveyed(file: &Path) {
+/// The landmarks that a survey accepts.
+fn accepted(report: &Value) -> Vec<&Value> {
+    let landmarks = report["landmarks"].as_array().expect("landmarks");
+    landmarks.iter().filter(|landmark| landmark["refused"].is_null()).collect()
+}
+
+fn a_recording_is_surveyed(file: &Path) -> Value {
     let run = waymark(["survey", file.to_str().expect("a path"), "--json"], LONGEST);
     assert_eq!(run.status, 0, "{run:?}");
     assert!(run.stderr.contains("--into MAP"), "{run:?}");
     let report = run.last_json();
-    let landmarks = report["landmarks"].as_array().expect("landmarks");
-    let found = landmarks.iter().filter(|landmark| landmark["refused"].is_null());
-    assert!(found.clone().count() >= 3, "{report}");
+    let found = accepted(&report);
+    assert!(found.len() >= 3, "{report}");
     for landmark in found {
         // Posters hang on walls, in reach of the eye, and are no larger than a door.
         let of = |field: &str| number(landmark, field);
@@ -56,6 +62,30 @@ fn a_recording_is_surveyed(file: &Path) {
         assert!((0.2..2.5).contains(&of("/width_m")) && (0.2..2.5).contains(&of("/height_m")), "{landmark}");
     }
     assert!(number(&report, "/walls") >= 4.0 && number(&report, "/distance_m") > 15.0, "{report}");
+    report
+}
+
+/// The same drive twice is two drives through one building. The map begins where it is told to: it
+/// is that of the first drive `alone`, turned to the left and moved.
+fn two_recordings_are_one_map(file: &Path, alone: &Value) {
+    let again = file.with_file_name("again.mcap");
+    std::fs::copy(file, &again).expect("a copy");
+    let [file, again] = [file, &again].map(|path| path.to_str().expect("a path"));
+    let origin = format!("--origin=3,-2,{}", std::f64::consts::FRAC_PI_2);
+    let run = waymark(["survey", file, again, &origin, "--json"], LONGEST);
+    assert_eq!(run.status, 0, "{run:?}");
+    let report = run.last_json();
+    assert_eq!(report["odometry_scale_percent"].as_array().map(Vec::len), Some(2), "{report}");
+    assert!((number(&report, "/frames") - 2.0 * number(alone, "/frames")).abs() < 1e-9, "{report}");
+    let (found, before) = (accepted(&report), accepted(alone));
+    assert!(found.len() >= 3, "{report}");
+    for landmark in found {
+        let of = |field: &str| number(landmark, field);
+        let [x, y] = [of("/y_m") + 2.0, 3.0 - of("/x_m")];
+        let there = |other: &&&Value| (number(other, "/x_m") - x).hypot(number(other, "/y_m") - y) < 0.15;
+        let one = before.iter().find(there).unwrap_or_else(|| panic!("{landmark} in {alone}"));
+        assert!(of("/views") > 1.5 * number(one, "/views"), "{landmark} {one}");
+    }
 }
 
 #[test]

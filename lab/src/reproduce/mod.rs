@@ -1,14 +1,15 @@
 //! `waymark-lab reproduce`: every figure of accuracy, measured by the commands that are printed
 //! beside it, and the tables of docs/EVALUATION.md and README.md from them.
 //!
-//! `row` says what a row is, `paper_rows` and `further_rows` list them; `execute` runs their
-//! commands; `figures` takes the numbers from the reports; `comparison` says where the paper's
-//! preset is better; `documents` writes them.
+//! `row` says what a row is, `paper_rows`, `set_rows` and `further_rows` list them; `execute` runs
+//! their commands; `figures` takes the numbers from the reports; `comparison` says where the
+//! paper's preset is better; `documents` writes them.
 
 mod figures;
 mod row;
 mod paper_rows;
 mod further_rows;
+mod set_rows;
 mod machine;
 mod execute;
 mod comparison;
@@ -51,7 +52,7 @@ pub(crate) struct Args {
 
 /// All rows in the order of the table.
 fn rows() -> impl Iterator<Item = &'static Row> {
-    paper_rows::ROWS.iter().chain(&further_rows::SETS).chain(&further_rows::BEYOND)
+    paper_rows::ROWS.iter().chain(&set_rows::SETS).chain(&further_rows::BEYOND)
 }
 
 fn id(text: &str) -> Result<&'static str, String> {

@@ -27,6 +27,9 @@ const MIN_LANDMARKS: usize = 2;
 const ITERATIONS: usize = 8;
 /// A centre is not taken to be known better, metres.
 const LEAST_SIGMA_M: f64 = 1e-3;
+/// What is left to a place is at least `1 - KEPT^2` of its covariance, also where a few landmarks
+/// have all in common: rounding would leave less than nothing.
+const KEPT: f64 = 0.999;
 /// Parameters of a landmark.
 const SIZE: usize = 8;
 
@@ -75,7 +78,7 @@ pub(super) fn shared_errors(
     // `product / L'`, so that its square is the approximation.
     let Some(by) = strength.l().solve_lower_triangular(&product.transpose()) else { return Ok(None) };
     let of = |landmark: usize| {
-        let error = |row: usize, error: usize| by[(error, SIZE * landmark + of_place[row])];
+        let error = |row: usize, error: usize| KEPT * by[(error, SIZE * landmark + of_place[row])];
         Matrix6::from_fn(|row, column| if column < columns { error(row, column) } else { 0.0 })
     };
     Ok(Some((0..landmarks.len()).map(of).collect()))

@@ -1,9 +1,12 @@
 //! Errors that landmarks have in common against the dense covariance of all of them.
 
 use super::*;
-use crate::joint::{
-    datum::DriveFrame,
-    shared_errors::{Placed, shared_errors},
+use crate::{
+    check,
+    joint::{
+        datum::DriveFrame,
+        shared_errors::{Placed, shared_errors},
+    },
 };
 
 /// Parameters of a landmark that are of its place.
@@ -42,6 +45,12 @@ fn six_errors_are_most_of_what_places_have_in_common_and_leave_covariances() {
         let common = centres(&all, true);
         assert!(centres(&left, true) < 0.2 * common, "{} {common}", centres(&left, true));
         assert!(common > 0.1 * centres(&all, false), "{common} {}", centres(&all, false));
+        // Two have no more errors than are taken to be in common.
+        let few = shared_errors(problem, frame, &placed[..2], &OF_PLACE).unwrap().unwrap();
+        for (i, by) in few.iter().enumerate() {
+            let own = all.fixed_view::<6, 6>(6 * i, 6 * i) - by * by.transpose();
+            assert_eq!(check::covariance("own", &own), Ok(()), "{own}");
+        }
     }
     assert_eq!(shared_errors(problem, None, &[(0, 0.1)], &OF_PLACE).unwrap(), None);
 }
