@@ -4,7 +4,7 @@ use super::row::{
     Command, Figure,
     Presets::{Each, One},
     Row,
-    Unit::{Count, Deg, M, Plain, Share},
+    Unit::{Count, Deg, M, Plain},
 };
 
 /// What no preset changes.
