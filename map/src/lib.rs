@@ -5,6 +5,7 @@
 //! frame: x, y on the floor, z up, metres, radians. Modules are in reading order.
 
 pub mod check;
+mod digest;
 pub mod gate;
 pub mod pose2;
 mod pose_cell;

@@ -75,7 +75,7 @@ pub(super) const SETS: [Row; 11] = [
         id: "S1",
         title: "path-traced worlds of an independent generator",
         paper: "",
-        commands: &[of_set(WORLDS, "outside photoreal/15 --walk", &["photoreal"], 150, &NAMES)],
+        commands: &[of_set(WORLDS, "outside photoreal/15 --walk", &["photoreal"], 30, &NAMES)],
     },
     Row {
         id: "S2",
@@ -144,7 +144,7 @@ pub(super) const SETS: [Row; 11] = [
             STRANGERS,
             "outside photoreal/15 photoreal/16 --strangers",
             &["photoreal"],
-            100,
+            40,
             &[Figure::less("wrong names", Count, "0/wrong_names")],
         )],
     },
@@ -219,6 +219,6 @@ pub(super) const SETS: [Row; 11] = [
         id: "S11",
         title: "a robot that goes from picture to picture of the same worlds, without a laser: its fused pose",
         paper: "",
-        commands: &[of_set(WORLDS, "outside photoreal/15 --walk", &["photoreal"], 150, &WALKED)],
+        commands: &[of_set(WORLDS, "outside photoreal/15 --walk", &["photoreal"], 30, &WALKED)],
     },
 ];

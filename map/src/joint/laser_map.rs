@@ -16,6 +16,7 @@ use super::{
 };
 use crate::{
     check::OutOfRange,
+    digest::digest,
     fuse::FuseParams,
     place::{LandmarkPlace, SharedErrors, SurveyId},
     pose2::{Pose2, Pose2Covariance},
@@ -169,7 +170,8 @@ fn objects(solved: &Solved) -> Result<Vec<Option<MappedObject>>, JointError> {
     let sigma_m = |landmark: usize| (0.5 * covariances[landmark].fixed_view::<2, 2>(0, 0).trace()).sqrt();
     let placed: Vec<Placed> = known.iter().map(|landmark| (*landmark, sigma_m(*landmark))).collect();
     let shared = shared_errors(&solved.problem, solved.frame.as_ref(), &placed, &OF_PLACE)?;
-    let survey = survey_id(&solved.problem.state.landmarks);
+    let centres = solved.problem.state.landmarks.iter().map(|landmark| landmark.centre);
+    let survey = SurveyId(digest(centres.flat_map(|centre| [centre.x, centre.y, centre.z])));
     let shared_by: BTreeMap<usize, Matrix6<f64>> =
         known.iter().copied().zip(shared.into_iter().flatten()).collect();
     let made = |landmark: usize| {
@@ -179,15 +181,6 @@ fn objects(solved: &Solved) -> Result<Vec<Option<MappedObject>>, JointError> {
         Some(MappedObject { place, agreement: agreements[landmark] })
     };
     Ok(solved.landmark_of.iter().map(|landmark| landmark.and_then(made)).collect())
-}
-
-/// FNV-1a of all places.
-fn survey_id(landmarks: &[LandmarkState]) -> SurveyId {
-    let numbers =
-        landmarks.iter().flat_map(|landmark| [landmark.centre.x, landmark.centre.y, landmark.centre.z]);
-    let bytes = numbers.flat_map(f64::to_le_bytes);
-    let hash = |hash: u64, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
-    SurveyId(bytes.fold(0xcbf2_9ce4_8422_2325, hash))
 }
 
 /// A landmark's place; `covariance` and `shared` are over x, y, theta, z, log width and log height.

@@ -1,7 +1,7 @@
 //! An index of a map's walls: the wall nearest to a point, by buckets of the floor. In: segments.
 //! Out: the index, made once for each version of the walls.
 
-use crate::{segments::LaserSegment, walls::local};
+use crate::{digest::digest, segments::LaserSegment, walls::local};
 use nalgebra::{Matrix2, Point2, Vector2};
 
 /// Most walls of an index; later ones are left out.
@@ -153,11 +153,9 @@ impl WallIndex {
     }
 }
 
-/// A hash of a wall's ends (FNV-1a): its name.
+/// The digest of a wall's ends: its name.
 fn name(wall: &LaserSegment) -> u64 {
-    let ends = [wall.a.x, wall.a.y, wall.b.x, wall.b.y];
-    let bytes = ends.into_iter().flat_map(|v| v.to_bits().to_le_bytes());
-    bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
+    digest([wall.a.x, wall.a.y, wall.b.x, wall.b.y])
 }
 
 #[cfg(test)]

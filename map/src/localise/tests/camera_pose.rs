@@ -2,7 +2,10 @@
 //! refusals.
 
 use super::*;
-use crate::localise::camera_pose::{CameraPose, CameraPoseRefusal, camera_pose};
+use crate::{
+    localise::camera_pose::{CameraPose, CameraPoseRefusal, camera_pose},
+    place::{SharedErrors, SurveyId},
+};
 use nalgebra::UnitQuaternion;
 
 /// A camera at `d_m` and azimuth `psi_deg` from the landmark's normal, 1.6 m high, tilted and
@@ -67,6 +70,24 @@ fn the_covariance_of_a_camera_in_a_hand_is_that_of_its_errors() {
     // 6 where the covariance is right; the mean of 500 has a standard deviation of 0.15.
     let mean = nees / f64::from(count);
     assert!(count > 500 && (5.0..7.2).contains(&mean), "mean {mean} of {count}");
+}
+
+#[test]
+fn a_shift_that_two_places_share_stays_in_the_pose_of_the_camera() {
+    let (first, mut random) = (place(), Random::new(5));
+    let places = [first, beside(&first, 1.8)];
+    let truth = held(&first, 2.5, 20.0);
+    let [a, b] = places.map(|place| photograph(&place, &truth, 0.3, &mut random));
+    let variance_x = |[first, second]: [LandmarkPlace; 2]| {
+        camera_pose(&[seen(1, &a, &first), seen(2, &b, &second)]).unwrap().unwrap().covariance[(3, 3)]
+    };
+    let mut by = Matrix6::zeros();
+    by[(0, 0)] = 0.05;
+    let shared = Some(SharedErrors { survey: SurveyId(1), by });
+    let shifted =
+        |place: LandmarkPlace| LandmarkPlace { shared, covariance: place.covariance + by * by, ..place };
+    let added = variance_x(places.map(shifted)) - variance_x(places);
+    assert!((added / 0.0025 - 1.0).abs() < 0.02, "{added}");
 }
 
 #[test]
